@@ -1,12 +1,14 @@
 //! How fast the explicit method steps, and how the explicit relaxation compares
 //! with the semi-implicit one. `cargo bench --bench explicit`.
 
+mod shared;
+
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
 use leafdyn::internals::motion::{Explicit, Method, Physics};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::{self, Options, relax};
 use leafdyn::scenario::Scenario;
-use std::path::Path;
+use shared::{figure, median, print_head};
 use std::time::Instant;
 
 /// Veins and segments a vein.
@@ -29,20 +31,10 @@ const STEPS: usize = 1000;
 
 const REPEATS: usize = 15;
 
-fn read(figure: &str, rods: usize) -> Scenario {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/paper/{figure}.toml"));
-    Scenario::read_with(&file, &[format!("leaf.rods={rods}")]).expect("the scenario is sound")
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// Nanoseconds per segment and step; threads take turns, so that a busy machine
 /// treats them alike.
 fn rates(rods: usize, segments: usize, pools: &[rayon::ThreadPool]) -> Vec<f64> {
-    let scenario = read("fig04", rods);
+    let scenario = figure("fig04", rods);
     let leaf = Leaf::new(&scenario);
     let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
     let physics = Physics::new(&leaf);
@@ -62,7 +54,7 @@ fn rates(rods: usize, segments: usize, pools: &[rayon::ThreadPool]) -> Vec<f64> 
             found.push(1e9 * seconds / (rods * segments * steps) as f64);
         }
     }
-    found.into_iter().map(median).collect()
+    found.iter_mut().map(|found| median(found)).collect()
 }
 
 fn milliseconds(scenario: &Scenario, method: relax::Method) -> (f64, usize) {
@@ -71,46 +63,37 @@ fn milliseconds(scenario: &Scenario, method: relax::Method) -> (f64, usize) {
         ..Options::default()
     };
     let mut steps = 0;
-    let runs = (0..5).map(|_| {
+    let mut runs = [0.0; 5].map(|_| {
         let leaf = relax(scenario, &options, &mut |_| {}).expect("the request is sound");
         assert!(leaf.outcome.is_success());
         steps = leaf.work.steps;
         1e3 * leaf.wall_seconds
     });
-    (median(runs.collect()), steps)
+    (median(&mut runs), steps)
 }
 
 fn main() {
     let threads = rayon::current_num_threads();
-    let pools: Vec<rayon::ThreadPool> = [1, threads]
-        .map(|count| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
-            pool.build().expect("threads can be started")
-        })
-        .into();
+    let pools = [1, threads].map(shared::threads);
     println!("Fig. 4's leaf, explicit: nanoseconds per segment and step, looks at the energy");
     println!("included, median of {REPEATS}.");
     println!();
-    println!("| N | segments a vein | 1 thread | {threads} threads |");
-    println!("| --- | --- | --- | --- |");
+    print_head(&format!(
+        "N | segments a vein | 1 thread | {threads} threads"
+    ));
     for (rods, segments) in LEAVES {
         let found = rates(rods, segments, &pools);
-        println!(
-            "| {rods} | {segments} | {:.1} | {:.1} |",
-            found[0], found[1]
-        );
+        let [one, all] = [found[0], found[1]];
+        println!("| {rods} | {segments} | {one:.1} | {all:.1} |");
     }
     println!();
     println!("Relaxation to 1e-6 with error estimate and index, N = 5: milliseconds, median of 5.");
     println!();
-    println!("| figure | semi-implicit | steps | explicit | steps |");
-    println!("| --- | --- | --- | --- | --- |");
-    for figure in [
-        "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
-    ] {
-        let scenario = read(figure, 5);
+    print_head("figure | semi-implicit | steps | explicit | steps");
+    for name in [4, 5, 6, 8, 9, 10, 13].map(|number| format!("fig{number:02}")) {
+        let scenario = figure(&name, 5);
         let (semi_implicit, few) = milliseconds(&scenario, relax::Method::default());
         let (explicit, many) = milliseconds(&scenario, relax::Method::Explicit { segments: None });
-        println!("| {figure} | {semi_implicit:.1} | {few} | {explicit:.0} | {many} |");
+        println!("| {name} | {semi_implicit:.1} | {few} | {explicit:.0} | {many} |");
     }
 }

@@ -2,9 +2,11 @@
 //! On one thread, which shows the cost per unknown, and on all there are.
 //! `cargo bench --bench growth`.
 
-use leafdyn::relax::{Equilibrium, Options, relax};
+mod shared;
+
+use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
-use std::path::Path;
+use shared::{figure, print_head, to};
 
 const RODS: [usize; 6] = [35, 100, 350, 1000, 3500, 10_000];
 
@@ -24,17 +26,10 @@ fn peak_memory() -> Option<f64> {
 
 /// The fastest of several runs on so many threads.
 fn fastest(leaf: &Scenario, threads: usize) -> Equilibrium {
-    let options = Options {
-        tolerance: Some(1e-6),
-        ..Options::default()
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("threads can be started");
+    let pool = shared::threads(threads);
     let runs = (RODS_IN_ALL / leaf.rods.len()).clamp(FEWEST_RUNS, MOST_RUNS);
     let best = (0..runs)
-        .map(|_| pool.install(|| relax(leaf, &options, &mut |_| {}).expect("a valid request")))
+        .map(|_| pool.install(|| relax(leaf, &to(1e-6), &mut |_| {}).expect("a valid request")))
         .min_by(|a, b| a.wall_seconds.total_cmp(&b.wall_seconds))
         .expect("at least one run");
     assert!(best.outcome.is_success(), "{:?}", best.outcome);
@@ -46,15 +41,12 @@ fn main() {
     println!("Fig. 4's leaf to 1e-6; gradients: iterations of the conjugate gradients; ratio: of");
     println!("the time per unknown on one thread to the first row's.");
     println!();
-    println!(
-        "| N | steps | gradients | unknowns | 1 thread, s | µs per unknown | ratio | {threads} threads, s | peak MB |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    print_head(&format!(
+        "N | steps | gradients | unknowns | 1 thread, s | µs per unknown | ratio | {threads} threads, s | peak MB"
+    ));
     let mut smallest = None;
     for rods in RODS {
-        let entry = [format!("leaf.rods={rods}")];
-        let leaf = Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &entry)
-            .expect("the scenario is valid");
+        let leaf = figure("fig04", rods);
         let (one, all) = (fastest(&leaf, 1), fastest(&leaf, threads));
         let unknowns = 6 * rods * one.accuracy.segments.last().expect("at least one grid");
         let each = 1e6 * one.wall_seconds / unknowns as f64;

@@ -2,12 +2,14 @@
 //! where the time of a whole run goes. One thread, all in the same run:
 //! `cargo bench --bench linear_solvers`.
 
+mod shared;
+
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, Solved, SparsePattern, State, System};
 use leafdyn::internals::relax::start;
-use leafdyn::relax::{Equilibrium, Options, Progress, relax};
+use leafdyn::relax::{Equilibrium, Progress, relax};
 use leafdyn::scenario::Scenario;
+use shared::{figure, on_one_thread, print_head, to};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::time::Instant;
 
 const RODS: [usize; 6] = [5, 10, 15, 21, 28, 35];
@@ -92,12 +94,6 @@ fn iterations(solved: Solved) -> usize {
     }
 }
 
-fn fig04(rods: usize) -> Scenario {
-    let rods = [format!("leaf.rods={rods}")];
-    Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &rods)
-        .expect("the scenario is valid")
-}
-
 /// The state after some Newton steps, and room for its equation.
 fn nearly_at_rest(leaf: &DiscreteLeaf) -> (State, System) {
     let (mut state, mut system) = (start(leaf), System::new(leaf));
@@ -113,7 +109,7 @@ fn nearly_at_rest(leaf: &DiscreteLeaf) -> (State, System) {
 }
 
 fn compare_solvers(rods: usize) {
-    let scenario = fig04(rods);
+    let scenario = figure("fig04", rods);
     let model = Leaf::new(&scenario);
     let leaf = DiscreteLeaf::new(&model, Grid::new(SEGMENTS, model.kinks()));
     let (state, mut system) = nearly_at_rest(&leaf);
@@ -148,12 +144,8 @@ fn compare_solvers(rods: usize) {
 
 /// Runs a relaxation to 1e-6; also counts its steps on each grid.
 fn run(scenario: &Scenario) -> (Equilibrium, BTreeMap<usize, usize>) {
-    let options = Options {
-        tolerance: Some(1e-6),
-        ..Options::default()
-    };
     let mut steps = BTreeMap::new();
-    let found = relax(scenario, &options, &mut |progress| {
+    let found = relax(scenario, &to(1e-6), &mut |progress| {
         if let Progress::Relaxing { grid, .. } = progress {
             *steps.entry(*grid).or_default() += 1;
         }
@@ -164,20 +156,16 @@ fn run(scenario: &Scenario) -> (Equilibrium, BTreeMap<usize, usize>) {
 }
 
 fn share_out(rods: usize) {
-    let scenario = fig04(rods);
+    let scenario = figure("fig04", rods);
     let model = Leaf::new(&scenario);
     let (found, steps) = run(&scenario);
-    let leaves: Vec<DiscreteLeaf> = steps
-        .keys()
-        .map(|&segments| DiscreteLeaf::new(&model, Grid::new(segments, model.kinks())))
-        .collect();
-    let mut grids: Vec<(Parts, State, State, System)> = leaves
-        .iter()
-        .map(|leaf| {
-            let (state, system) = nearly_at_rest(leaf);
-            (Parts::NONE, state.clone(), state, system)
-        })
-        .collect();
+    let on = |segments: &usize| DiscreteLeaf::new(&model, Grid::new(*segments, model.kinks()));
+    let leaves: Vec<DiscreteLeaf> = steps.keys().map(on).collect();
+    let begun = |leaf: &DiscreteLeaf| {
+        let (state, system) = nearly_at_rest(leaf);
+        (Parts::NONE, state.clone(), state, system)
+    };
+    let mut grids: Vec<(Parts, State, State, System)> = leaves.iter().map(begun).collect();
     let mut total = Best::NONE;
     for _ in 0..ROUNDS {
         total.time(|| run(&scenario));
@@ -199,10 +187,10 @@ fn share_out(rods: usize) {
     }
     let rest = total.0 - assembly - factor - solves - advance;
     let percent = |part: f64| 100.0 * part / total.0;
-    let steps: Vec<String> = steps
+    let steps = steps
         .iter()
-        .map(|(segments, steps)| format!("{steps} on {segments}"))
-        .collect();
+        .map(|(segments, steps)| format!("{steps} on {segments}"));
+    let steps: Vec<String> = steps.collect();
     println!(
         "| {rods:2} | {:.2} | {:.0}% | {:.0}% | {:.0}% | {:.0}% | {:.0}% | {} |",
         1e3 * total.0,
@@ -216,20 +204,16 @@ fn share_out(rods: usize) {
 }
 
 fn main() {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("no thread pool was built before");
+    on_one_thread();
 
     println!("One Newton equation of Fig. 4's leaf on {SEGMENTS} segments a rod; microseconds.");
     println!("Rod by rod: factorisation, then conjugate gradients (iterations). Direct: order and");
     println!("symbolic part, numeric factorisation, solution. Ratios: direct without the symbolic");
     println!("part over rod by rod, each with its factorisation.");
     println!();
-    println!(
-        "| N | rods: factorise | to 1e-3 | to 1e-10 | direct: order | factorise | solve | ratio at 1e-3 | at 1e-10 |"
+    print_head(
+        "N | rods: factorise | to 1e-3 | to 1e-10 | direct: order | factorise | solve | ratio at 1e-3 | at 1e-10",
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for rods in RODS {
         compare_solvers(rods);
     }
@@ -239,10 +223,9 @@ fn main() {
     println!("factorisations, solutions and updates on each grid, times the time of one.");
     println!("The rest is setting up, prolongation, extrapolation and reporting.");
     println!();
-    println!(
-        "| N | run, ms | assembly | factorisation | solves | update | the rest | steps on grids of segments |"
+    print_head(
+        "N | run, ms | assembly | factorisation | solves | update | the rest | steps on grids of segments",
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for rods in RODS {
         share_out(rods);
     }

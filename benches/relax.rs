@@ -2,27 +2,19 @@
 //! One thread, in process, without reading and writing:
 //! `cargo bench --bench relax`. The medians are printed as a table at the end.
 
+mod shared;
+
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use leafdyn::relax::{Options, relax};
-use leafdyn::scenario::Scenario;
+use leafdyn::relax::relax;
+use shared::{figure, on_one_thread, print_head, to};
 use std::hint::black_box;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 const RODS: [usize; 6] = [5, 10, 15, 21, 28, 35];
 const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
 
-fn fig04(rods: usize) -> Scenario {
-    let rods = [format!("leaf.rods={rods}")];
-    Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &rods)
-        .expect("the scenario is valid")
-}
-
 fn benchmark(criterion: &mut Criterion) {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("no thread pool was built before");
+    on_one_thread();
     let mut medians = [[None; TOLERANCES.len()]; RODS.len()];
     for (column, tolerance) in TOLERANCES.into_iter().enumerate() {
         let mut group = criterion.benchmark_group(format!("fig04 at {tolerance:e}"));
@@ -31,11 +23,7 @@ fn benchmark(criterion: &mut Criterion) {
             .warm_up_time(Duration::from_secs(1))
             .measurement_time(Duration::from_secs(3));
         for (row, rods) in RODS.into_iter().enumerate() {
-            let leaf = fig04(rods);
-            let options = Options {
-                tolerance: Some(tolerance),
-                ..Options::default()
-            };
+            let (leaf, options) = (figure("fig04", rods), to(tolerance));
             let relaxed = || relax(&leaf, &options, &mut |_| {}).expect("a valid request");
             // Only what succeeds is worth timing.
             assert!(relaxed().outcome.is_success());
@@ -60,8 +48,10 @@ fn benchmark(criterion: &mut Criterion) {
 
 fn print_table(medians: &[[Option<f64>; TOLERANCES.len()]]) {
     println!("Milliseconds, median:\n");
-    println!("| N |{}", TOLERANCES.map(|t| format!(" {t:e} |")).concat());
-    println!("| --- |{}", " --- |".repeat(TOLERANCES.len()));
+    print_head(&format!(
+        "N | {}",
+        TOLERANCES.map(|t| format!("{t:e}")).join(" | ")
+    ));
     for (rods, row) in RODS.iter().zip(medians) {
         // Not measured if the command line asked for others only.
         let cell =

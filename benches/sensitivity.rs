@@ -3,8 +3,11 @@
 //! `cargo bench --bench sensitivity`. Relaxations with and without derivatives run in
 //! turns, and the medians are printed.
 
+mod shared;
+
 use leafdyn::relax::{Options, relax};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+use shared::{median, on_one_thread, print_head, to};
 use std::time::Instant;
 
 const TURNS: usize = 101;
@@ -25,37 +28,26 @@ const KEYS: [&str; 10] = [
 ];
 
 fn main() {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("no thread pool was built before");
-    let keys: Vec<Keys> = (KEYS.iter())
-        .map(|key| key.parse().expect("a key"))
-        .collect();
-    let text =
-        std::fs::read_to_string("scenarios/paper/fig04.toml").expect("the scenario is there");
+    on_one_thread();
+    let keys = KEYS.map(|key| key.parse::<Keys>().expect("a key"));
+    let text = std::fs::read_to_string("scenarios/paper/fig04.toml");
+    let text = text.expect("the scenario is there");
     let rods = ["leaf.rods=21".to_string(), "rest.bend_2=0.0".to_string()];
     let base = Base::of_text(text, "fig04.toml".into(), &rods).expect("it is valid");
     println!(
         "N = 21, ten numbers. Milliseconds, medians of {TURNS}; the last column is what one number costs, as a part of the relaxation\n"
     );
-    println!("| tolerance | modes | relaxation | with ten derivatives | one of them |");
-    println!("| --- | --- | --- | --- | --- |");
+    print_head("tolerance | modes | relaxation | with ten derivatives | one of them");
     for modes in [0, 3] {
         for tolerance in TOLERANCES {
             let options = Options {
-                tolerance: Some(tolerance),
                 modes,
-                ..Options::default()
+                ..to(tolerance)
             };
             let [alone, with] = medians([
                 &mut || {
-                    assert!(
-                        relax(base.scenario(), &options, &mut |_| {})
-                            .unwrap()
-                            .outcome
-                            .is_success()
-                    )
+                    let leaf = relax(base.scenario(), &options, &mut |_| {}).unwrap();
+                    assert!(leaf.outcome.is_success());
                 },
                 &mut || {
                     let leaf =
@@ -64,11 +56,8 @@ fn main() {
                 },
             ]);
             let part = (with - alone) / (keys.len() as f64 * alone);
-            println!(
-                "| {tolerance:e} | {modes} | {:.2} | {:.2} | {part:.3} |",
-                1e3 * alone,
-                1e3 * with
-            );
+            let [alone, with] = [1e3 * alone, 1e3 * with];
+            println!("| {tolerance:e} | {modes} | {alone:.2} | {with:.2} | {part:.3} |");
         }
     }
 }
@@ -83,8 +72,5 @@ fn medians(mut both: [&mut dyn FnMut(); 2]) -> [f64; 2] {
             times.push(clock.elapsed().as_secs_f64());
         }
     }
-    times.map(|mut times| {
-        times.sort_by(f64::total_cmp);
-        times[times.len() / 2]
-    })
+    times.map(|mut times| median(&mut times))
 }

@@ -2,11 +2,13 @@
 //! that grows with the number of veins: Fig. 4's leaf to 1e-10.
 //! `cargo bench --bench shooting`.
 
+mod shared;
+
 use leafdyn::internals::bvp::{self, Solution, Start};
-use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
-use std::path::Path;
+use shared::{figure, print_head, to};
 use std::time::Instant;
 
 const RODS: [usize; 7] = [1, 5, 10, 21, 35, 70, 140];
@@ -18,10 +20,7 @@ const RODS_IN_ALL: usize = 140;
 
 /// The fastest of several runs on so many threads, in milliseconds.
 fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solution) {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("threads can be started");
+    let pool = shared::threads(threads);
     let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
     let start = Start::Leaf { stations, rods };
     let options = bvp::Options::new(start, stations, bvp::Precision::Error(ACCURACY));
@@ -43,19 +42,12 @@ fn main() {
     );
     println!("differences in units of L and A/L^2.");
     println!();
-    println!(
-        "| N | unknowns | relaxed | shot, 1 thread | {threads} threads | linearisations | integration steps | position | force |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    print_head(&format!(
+        "N | unknowns | relaxed | shot, 1 thread | {threads} threads | linearisations | integration steps | position | force"
+    ));
     for rods in RODS {
-        let entry = [format!("leaf.rods={rods}")];
-        let leaf = Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &entry)
-            .expect("the scenario is valid");
-        let options = Options {
-            tolerance: Some(ACCURACY),
-            ..Options::default()
-        };
-        let relaxed = relax(&leaf, &options, &mut |_| {}).expect("a valid request");
+        let leaf = figure("fig04", rods);
+        let relaxed = relax(&leaf, &to(ACCURACY), &mut |_| {}).expect("a valid request");
         let (one, solution) = fastest(&leaf, &relaxed, 1);
         let (all, _) = fastest(&leaf, &relaxed, threads);
         let difference = Difference::between(&relaxed.shape.rods, &solution.rods);

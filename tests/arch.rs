@@ -6,8 +6,8 @@
 mod common;
 
 use common::branch::{changes_at, follow};
-use common::{parse, settle};
-use leafdyn::study::{Base, BoundaryRequest, TraceRequest, boundary};
+use common::plane;
+use common::*;
 
 /// Half of the opening angle.
 const ALPHA: f64 = 0.9;
@@ -28,26 +28,6 @@ fn arch(load: f64) -> String {
         -ALPHA,
         -load
     )
-}
-
-/// The state at s = `end` of y' = slope(s, y), by the classic Runge-Kutta rule.
-fn runge_kutta(
-    slope: impl Fn(f64, [f64; 4]) -> [f64; 4],
-    mut y: [f64; 4],
-    end: f64,
-    steps: u32,
-) -> [f64; 4] {
-    let h = end / f64::from(steps);
-    let ahead = |y: [f64; 4], k: [f64; 4], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
-    for step in 0..steps {
-        let s = h * f64::from(step);
-        let a = slope(s, y);
-        let b = slope(s + 0.5 * h, ahead(y, a, 0.5 * h));
-        let c = slope(s + 0.5 * h, ahead(y, b, 0.5 * h));
-        let d = slope(s + h, ahead(y, c, h));
-        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
-    }
-    y
 }
 
 /// Place, angle and moment at the crown of an arch that leaves its base with this moment
@@ -129,17 +109,10 @@ fn an_arch_sways_where_its_antisymmetric_half_does() {
         (load, base) = (load + step, next);
         assert!(load < 1000.0);
     }
-    let (mut low, mut high) = (load, load + step);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        match sways(middle, symmetric(middle, base)) * first < 0.0 {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
-    let vary = format!("load.gravity[1]=0..{:?}", -1.1 * low);
+    let critical = bisect(load, load + step, |load| sways(load, symmetric(load, base)));
+    let vary = format!("load.gravity[1]=0..{:?}", -1.1 * critical);
     let found = follow(&arch(0.0), "", &vary, false);
-    changes_at("arch", &found, &[(-low, 1)], 1e-6);
+    changes_at("arch", &found, &[(-critical, 1)], 1e-6);
 }
 
 /// Half of the opening angle of a shallow arch, of which one end is pinned.
@@ -234,7 +207,6 @@ fn folds_of_stiff_arches_are_within_what_is_told() {
             let wanted = extrapolated_fold(compliance, &mut near.clone());
             let off = (point.value - wanted).abs();
             let told = point.value_error.unwrap();
-            println!("{axial}: {} {off:.1e} off, {told:.1e} told", point.value);
             // What is left of the shooting.
             assert!(off < told + 3e-9, "{axial}: {} {wanted}", point.value);
             assert!(off < 1e-7 && told < 3e-6, "{axial}: {told}");
@@ -244,23 +216,9 @@ fn folds_of_stiff_arches_are_within_what_is_told() {
 
 #[test]
 fn boundaries_of_stiff_arches_are_within_what_is_told() {
-    let base = Base::of_text(pinned("1e5"), "test.toml".into(), &[]);
-    let stiffness = "stiffness.axial+stiffness.shear_2+stiffness.shear_3";
-    let request = BoundaryRequest {
-        trace: TraceRequest {
-            base: base.unwrap(),
-            vary: "load.gravity[1]=0..-60".parse().unwrap(),
-            switch: false,
-            keep_unstable: true,
-            segments: None,
-            tolerance: Some(1e-7),
-            most_points: 100,
-            cross_section: None,
-        },
-        across: format!("{stiffness}=2e4..1e6:8log").parse().unwrap(),
-        map: None,
-    };
-    let found = boundary(&request, &mut |_, _, _| {}).unwrap();
+    let load = "load.gravity[1]=0..-60";
+    let stiffness = "stiffness.axial+stiffness.shear_2+stiffness.shear_3=2e4..1e6:8log";
+    let found = plane::follow(&pinned("1e5"), "", load, stiffness);
     assert!(found.complete, "{:?}", found.remark);
     assert_eq!(found.curves.len(), NEAR.len());
     for (curve, mut near) in found.curves.iter().zip(NEAR) {
@@ -269,10 +227,6 @@ fn boundaries_of_stiff_arches_are_within_what_is_told() {
         for point in exact.rev() {
             let wanted = extrapolated_fold(point.values[1].recip(), &mut near);
             let (off, told) = ((point.values[0] - wanted).abs(), point.errors[0]);
-            println!(
-                "{:e}: {} {off:.1e} off, {told:.1e} told",
-                point.values[1], point.values[0]
-            );
             assert!(off < told + 3e-9, "{:?}: {wanted}", point.values);
             assert!(told < 1e-5, "{:?}: {told}", point.values);
         }

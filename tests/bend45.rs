@@ -3,8 +3,7 @@
 
 mod common;
 
-use common::{Both, scenario, set_stiffness, settle, table, tip};
-use glam::DVec3;
+use common::*;
 
 /// Positions are given to eight decimals; relative to the length: 8e-11.
 const DIGITS: f64 = 6e-9;

@@ -5,9 +5,9 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::branch::text;
-use common::plane::{follow, follow_to};
-use common::{RIGID, ROD, path};
+use common::branch::{text, weak_veins};
+use common::plane::{follow, followed};
+use common::*;
 use leafdyn::study::{Boundary, BoundaryCurve, BoundaryPoint};
 
 /// The only curve, which goes from one end of the second range to the other.
@@ -16,15 +16,21 @@ fn only(found: &Boundary) -> &BoundaryCurve {
     assert!(found.complete, "{:?}", found.remark);
     assert_eq!(found.curves.len(), 1);
     let curve = &found.curves[0];
-    for (end, point) in [curve.points.first(), curve.points.last()]
-        .iter()
-        .enumerate()
-    {
-        let point = point.unwrap();
-        assert_eq!(point.values[1], found.ranges[1][end], "{:?}", curve.ends);
+    for (point, end) in ends(curve).into_iter().zip(found.ranges[1]) {
+        assert_eq!(point.values[1], end, "{:?}", curve.ends);
         assert_eq!(point.errors[1], 0.0);
     }
     curve
+}
+
+/// The first point of a curve and the last.
+fn ends(curve: &BoundaryCurve) -> [&BoundaryPoint; 2] {
+    [curve.points.first(), curve.points.last()].map(Option::unwrap)
+}
+
+/// By what part the first number of a point is off.
+fn off(point: &BoundaryPoint, wanted: f64) -> f64 {
+    (point.values[0] / wanted - 1.0).abs()
 }
 
 /// That along the curve the first number is what it must be at the second, within this part
@@ -38,14 +44,10 @@ fn is(what: &str, curve: &BoundaryCurve, wanted: impl Fn(f64) -> f64, within: f6
         let off = (point.values[0] - wanted).abs();
         worst = worst.max(off / wanted.abs());
         let stated = point.errors[0] + 1e-11 * wanted.abs();
-        assert!(
-            off <= stated,
-            "{what}: off by {off:.1e}, {stated:.1e} stated: {point:?}"
-        );
+        assert!(off <= stated, "{what}: off by {off:.1e}: {point:?}");
         assert_eq!([point.index_before, point.index_behind], [0, 1], "{what}");
         assert_eq!(point.kind, "branch-point");
     }
-    println!("{what}: {} points, off by {worst:.1e}", curve.points.len());
     assert!(worst < within, "{what}: off by {worst:.1e}");
 }
 
@@ -86,17 +88,7 @@ fn greenhill_over_the_tip_load() {
         }
         a.iter().sum::<f64>()
     };
-    let weight = |p: f64| {
-        let (mut low, mut high) = (0.0, 20.0);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            match at_the_base(middle, p) > 0.0 {
-                true => low = middle,
-                false => high = middle,
-            }
-        }
-        low
-    };
+    let weight = |p: f64| bisect(0.0, 20.0, |q| at_the_base(q, p));
     // 9/4 of the square of the first zero of J_{-1/3}, without a tip load.
     assert!((weight(0.0) - 7.837347438943484).abs() < 1e-13);
     let strip = format!("{RIGID}; stiffness.bending_2=1000.0");
@@ -114,17 +106,15 @@ fn a_round_column_buckles_in_two_directions_all_along() {
     let curve = only(&found);
     assert_eq!(curve.multiplicity, 2);
     for point in &curve.points {
-        let wanted = -0.25 * PI * PI * point.values[1];
-        assert!((point.values[0] / wanted - 1.0).abs() < 1e-8, "{point:?}");
+        assert!(
+            off(point, -0.25 * PI * PI * point.values[1]) < 1e-8,
+            "{point:?}"
+        );
         assert_eq!([point.index_before, point.index_behind], [0, 2]);
     }
     // Not if one of the stiffnesses changes alone.
-    let found = follow(
-        ROD,
-        round,
-        "load.tip_force[0]=0..-5.5",
-        "stiffness.bending_3=0.5..2",
-    );
+    let (load, one) = ("load.tip_force[0]=0..-5.5", "stiffness.bending_3=0.5..2");
+    let found = follow(ROD, round, load, one);
     assert!(!found.complete);
     assert_eq!(found.curves[0].ends.map(|end| end.word()), ["parts"; 2]);
 }
@@ -136,15 +126,15 @@ fn lateral_buckling_over_the_strong_stiffness() {
     let across = "stiffness.bending_2=10..1000:20log";
     let found = follow(ROD, &strip, "load.tip_force[2]=0..-5", across);
     let curve = only(&found);
-    let ends = [curve.points.first(), curve.points.last()].map(|point| point.unwrap());
-    for (point, wanted) in ends.into_iter().zip([4.536899035739, 4.016676901240]) {
-        let off = -point.values[0] / 0.8_f64.sqrt() / wanted - 1.0;
-        println!("strong {}: {off:.1e}", point.values[1]);
-        assert!(off.abs() < 1e-8, "{off}");
-    }
+    let [weakest, strongest] = ends(curve);
     let begun = curve.points.iter().find(|point| point.values[1] == 100.0);
-    let off = -begun.unwrap().values[0] / 0.8_f64.sqrt() / 4.054222577948 - 1.0;
-    assert!(off.abs() < 1e-8, "{off}");
+    for (point, wanted) in [
+        (weakest, 4.536899035739),
+        (begun.unwrap(), 4.054222577948),
+        (strongest, 4.016676901240),
+    ] {
+        assert!(off(point, -wanted * 0.8_f64.sqrt()) < 1e-8, "{point:?}");
+    }
 }
 
 /// Nearly rigid against bending up and down, P = 4.0126 sqrt(EI GJ) over GJ.
@@ -156,49 +146,45 @@ fn lateral_buckling_over_the_torsional_stiffness() {
     // What is left of the bend is of the order of EI/EI_strong.
     let wanted = |torsion: f64| -4.012599343578901 * torsion.sqrt();
     for point in &only(&found).points {
-        let off = point.values[0] / wanted(point.values[1]) - 1.0;
-        assert!(off.abs() < 3e-6, "{off}");
+        assert!(off(point, wanted(point.values[1])) < 3e-6, "{point:?}");
     }
 }
+
+/// A lens with a midrib that is too short.
+const LENS: &str = "leaf.length=[1.0, 0.9, 1.0]; stiffness.axial=2500; \
+    stiffness.shear_2=1000; stiffness.shear_3=1000";
+
+/// The length of the midrib at which it leaves its plane.
+const CRITICAL: f64 = 0.93780575743;
 
 /// A lens whose midrib is too long leaves its plane; both stiffnesses of canonical lenses lie
 /// on the curve, the second one scaled from the first.
 #[test]
 fn a_lens_with_a_midrib_over_its_stiffness() {
-    let short = "leaf.length=[1.0, 0.9, 1.0]; stiffness.axial=2500; \
-                 stiffness.shear_2=1000; stiffness.shear_3=1000";
     let (along, across) = ("leaf.length[1]=0.9..0.942", "stiffness.axial=2500..3500");
-    let found = follow(&text("classic/lens_midrib"), short, along, across);
-    let curve = only(&found);
-    let off = curve.points[0].values[0] / 0.93780575743 - 1.0;
-    assert!(off.abs() < 1e-9, "{off}");
+    let found = follow(&text("classic/lens_midrib"), LENS, along, across);
+    assert!(off(&only(&found).points[0], CRITICAL) < 1e-9);
 }
 
 /// The same over the angle of the fan; traces of leaves of other angles find it where it is.
 #[test]
 fn a_lens_with_a_midrib_over_the_fan() {
-    let short = "leaf.length=[1.0, 0.9, 1.0]; stiffness.axial=2500; \
-                 stiffness.shear_2=1000; stiffness.shear_3=1000";
     let (along, across) = ("leaf.length[1]=0.9..0.98", "scale:leaf.fan=0.7..1");
-    let found = follow(&text("classic/lens_midrib"), short, along, across);
+    let found = follow(&text("classic/lens_midrib"), LENS, along, across);
     assert!(found.complete, "{:?}", found.remark);
     let curve = &found.curves[0];
-    let at = |point: &BoundaryPoint| (point.values[0] / 0.93780575743 - 1.0).abs();
     let known = curve.points.iter().find(|point| point.values[1] == 1.0);
-    assert!(at(known.unwrap()) < 1e-9);
+    assert!(off(known.unwrap(), CRITICAL) < 1e-9);
     for point in curve.points.iter().step_by(4) {
         let [length, scale] = point.values;
         let angle = PI / 3.0 * scale;
-        let bent = format!("{short}; leaf.fan=[{:?}, 0.0, {angle:?}]", -angle);
+        let bent = format!("{LENS}; leaf.fan=[{:?}, 0.0, {angle:?}]", -angle);
         let around = format!("leaf.length[1]={:?}..{:?}", length - 0.01, length + 0.003);
         let traced = common::branch::follow(&text("classic/lens_midrib"), &bent, &around, false);
         let (_, first) = traced.branches[0].critical().next().unwrap();
         let off = (first.value - length).abs();
         let stated = point.errors[0] + first.value_error.unwrap() + 1e-12;
-        assert!(
-            off <= stated,
-            "{scale}: off by {off:.1e}, {stated:.1e} stated"
-        );
+        assert!(off <= stated, "{scale}: off by {off:.1e} of {stated:.1e}");
     }
 }
 
@@ -215,38 +201,21 @@ fn a_curve_reaches_an_end_of_a_range_beyond_which_there_is_nothing() {
 #[test]
 fn a_hanging_curved_rod_over_its_curvature() {
     let across = format!("rest.bend_3=5.0..{:?}", 2.0 * PI);
-    let found = follow(
-        &text("classic/hanging_curved"),
-        "rest.bend_3=6.0",
-        "load.gravity[0]=8..20",
-        &across,
-    );
+    let (hanging, weight) = (text("classic/hanging_curved"), "load.gravity[0]=8..20");
+    let found = follow(&hanging, "rest.bend_3=6.0", weight, &across);
     assert!(found.complete, "{:?}", found.remark);
     let curve = &found.curves[0];
-    let at = |curvature: f64| {
-        let mut points = curve.points.iter();
-        points
-            .find(|point| (point.values[1] - curvature).abs() < 1e-9)
-            .unwrap()
-            .values[0]
-    };
     for (curvature, wanted) in [(6.0, 11.868750740620), (2.0 * PI, 12.187078750000)] {
-        let off = at(curvature) / wanted - 1.0;
-        println!("{curvature}: {off:.1e}");
-        assert!(off.abs() < 1e-8, "{curvature}: {off}");
+        let here = |point: &&BoundaryPoint| (point.values[1] - curvature).abs() < 1e-9;
+        let point = curve.points.iter().find(here).unwrap();
+        assert!(off(point, wanted) < 1e-8, "{point:?}");
     }
-    let least = curve
-        .points
-        .iter()
-        .map(|point| point.values[1])
-        .fold(f64::INFINITY, f64::min);
+    let curvatures = curve.points.iter().map(|point| point.values[1]);
+    let least = curvatures.fold(f64::INFINITY, f64::min);
     assert!((5.55..5.56).contains(&least), "{least}");
     // On the upper part a larger weight makes it stable again.
-    let ends = [curve.points.first(), curve.points.last()].map(|point| point.unwrap());
-    let upper = ends
-        .into_iter()
-        .find(|point| point.values[0] == 20.0)
-        .unwrap();
+    let mut ends = ends(curve).into_iter();
+    let upper = ends.find(|point| point.values[0] == 20.0).unwrap();
     assert_eq!([upper.index_before, upper.index_behind], [1, 0]);
 }
 
@@ -256,24 +225,15 @@ fn a_hanging_curved_rod_over_its_curvature() {
 fn folds_of_a_column_pushed_askew_meet_in_a_cusp() {
     let strip = "stiffness.bending_2=1000; stiffness.axial=1000; stiffness.shear_2=1000; \
                  stiffness.shear_3=1000; load.tip_force=[-2.8, 0, 0]";
-    let found = follow(
-        ROD,
-        strip,
-        "load.tip_force[1]=1..-1",
-        "load.tip_force[0]=-4..-2",
-    );
+    let (across, along) = ("load.tip_force[1]=1..-1", "load.tip_force[0]=-4..-2");
+    let found = follow(ROD, strip, across, along);
     assert!(found.complete, "{:?}", found.remark);
     assert_eq!(found.curves.len(), 1, "the other fold is on the same curve");
     let points = &found.curves[0].points;
-    assert!(
-        points
-            .iter()
-            .all(|point| matches!(point.kind, "fold" | "cusp"))
-    );
-    let cusps: Vec<_> = points.iter().filter(|point| point.kind == "cusp").collect();
+    let (cusps, folds): (Vec<_>, Vec<_>) = points.iter().partition(|point| point.kind == "cusp");
+    assert!(folds.iter().all(|point| point.kind == "fold"));
     assert_eq!(cusps.len(), 1);
     let [across, along] = cusps[0].values;
-    println!("cusp at {along} {across:e}, {:?}", cusps[0].errors);
     assert!(across.abs() < 1e-8, "{across}");
     assert!((along / (-0.25 * PI * PI) - 1.0).abs() < 1e-8, "{along}");
 }
@@ -293,11 +253,6 @@ fn crossings_are_where_their_errors_say() {
             let half_waves = 0.5 + (2 * k / count) as f64;
             let load = -(half_waves * PI).powi(2) * stiffness;
             let ([p, s], [pe, se]) = (point.values, point.errors);
-            println!(
-                "{:.1e} of {pe:.1e}, {:.1e} of {se:.1e}",
-                p - load,
-                s - stiffness
-            );
             assert!((p - load).abs() <= pe && pe < 2e-6, "{point:?}");
             assert!((s - stiffness).abs() <= se && se < 1e-9, "{point:?}");
         }
@@ -308,16 +263,10 @@ fn crossings_are_where_their_errors_say() {
 /// the first trace among them: work must not grow unnoticed.
 #[test]
 fn points_of_the_undulation_boundary_take_few_factorizations() {
-    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
-    let weak = (0..11).filter(|vein| *vein != 5);
-    let weak: Vec<String> = weak
-        .map(|vein| format!("stiffness.bending_2[{vein}]"))
-        .collect();
-    let along = format!("{}=1..0.4:50log", weak.join("+"));
-    let across = "stiffness.torsion=0.9..1:2log";
+    let (text, across) = (text("study/undulation"), "stiffness.torsion=0.9..1:2log");
+    let along = format!("{}=1..0.4:50log", weak_veins());
     let found = follow(&text, "load.gravity=[0,0,0]", &along, across);
     let points: usize = found.curves.iter().map(|curve| curve.points.len()).sum();
-    println!("{} for {points} points", found.factorizations);
     assert!(points >= 6, "{points}");
     assert!(found.factorizations <= 25 * points);
 }
@@ -326,14 +275,9 @@ fn points_of_the_undulation_boundary_take_few_factorizations() {
 /// first, a curve does not go back: from point to point it turns by less than a right angle.
 #[test]
 fn points_stand_in_order_where_the_given_number_changes() {
-    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
-    let weak = (0..11).filter(|vein| *vein != 5);
-    let weak: Vec<String> = weak
-        .map(|vein| format!("stiffness.bending_2[{vein}]"))
-        .collect();
-    let across = format!("{}=0.08..0.016:16log", weak.join("+"));
-    let along = "stiffness.torsion=10..0.9:50log";
-    let found = follow_to(1e-4, &text, "load.gravity=[0,0,0]", [along, &across]);
+    let (text, along) = (text("study/undulation"), "stiffness.torsion=10..0.9:50log");
+    let across = format!("{}=0.08..0.016:16log", weak_veins());
+    let found = followed(1e-4, &text, "load.gravity=[0,0,0]", [along, &across]).unwrap();
     assert!(!found.curves.is_empty());
     let fraction = |point: &BoundaryPoint| {
         [0, 1].map(|i| {

@@ -3,7 +3,7 @@
 
 mod workplace;
 
-use workplace::{Workplace, contains};
+use workplace::{Json, Workplace, contains};
 
 const COLUMNS: &str = "curve,point,kind,load.tip_force[0],stiffness.bending_3,error_1,error_2,\
     tip_x,tip_y,tip_z,error,index_before,index_behind";
@@ -14,7 +14,7 @@ const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0
 #[test]
 fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let place = Workplace::new();
-    let run = place.run(&format!(
+    let run = place.run(format!(
         "trace leaf.toml {COLUMN} --vary stiffness.bending_3=0.5..2"
     ));
     run.ends(0).says(&[
@@ -25,18 +25,13 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
         "the end of a range",
         "written",
     ]);
-    let files = [
-        "boundary.csv",
-        "boundary.json",
-        "boundary.png",
-        "boundary.svg",
-    ];
-    assert_eq!(place.names("out/small"), files);
-    let picture = place.picture("out/small/boundary");
-    contains(
-        &picture,
-        &["load.tip_force[0]", "stiffness.bending_3", "curve 1"],
+    place.holds(
+        "out/small",
+        "boundary.csv boundary.json boundary.png boundary.svg",
     );
+    let picture = place.picture("out/small/boundary");
+    let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
+    contains(&picture, &parts);
     let rows = place.table("out/small/boundary.csv", COLUMNS);
     assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);
     assert_eq!(rows[0][4], "0.5");
@@ -44,30 +39,23 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let json = place.json("out/small/boundary.json");
     assert_eq!(json["complete"], true);
     assert_eq!(json["curves"][0]["ends"][1], "reached");
-    assert_eq!(
-        json["curves"][0]["points"].as_array().unwrap().len(),
-        rows.len()
-    );
+    assert_eq!(json["curves"][0]["points"].list().len(), rows.len());
 }
 
 /// What ends early is said, with what was found until then.
 #[test]
 fn a_curve_that_goes_on_is_an_outcome() {
     let place = Workplace::new();
-    let more = "--vary stiffness.bending_3=0.5..2:100 --points 20 --json";
-    let json = place
-        .run(&format!("trace leaf.toml {COLUMN} {more}"))
-        .ends(1)
-        .json();
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let json = place.told(
+        1,
+        format!("trace leaf.toml {COLUMN} {bending}:100 --points 20"),
+    );
     assert_eq!(json["complete"], false);
     assert_eq!(json["curves"][0]["ends"][1], "most-points");
-    let none = "--vary stiffness.bending_3=0.5..2 --json";
     let short = COLUMN.replace("0..-6", "0..-1");
-    let json = place
-        .run(&format!("trace leaf.toml {short} {none}"))
-        .ends(1)
-        .json();
-    contains(json["remark"].as_str().unwrap(), &["changes nowhere"]);
+    let json = place.told(1, format!("trace leaf.toml {short} {bending}"));
+    contains(json["remark"].text(), &["changes nowhere"]);
 }
 
 #[test]

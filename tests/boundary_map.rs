@@ -4,34 +4,50 @@ mod workplace;
 
 use std::f64::consts::PI;
 
-use workplace::{Workplace, all_refused, contains};
+use serde_json::{Value, json};
+use workplace::{Json, Workplace, all_refused, contains, floats, timeless};
 
-const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
-    --set stiffness.bending_2=1000 --vary load.tip_force[0]=0..-6 --vary stiffness.bending_3=0.5..2";
+/// A column without weight.
+const COLUMN: &str =
+    "trace leaf.toml --set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0]";
+
+/// That buckles in one plane alone.
+const STRIP: &str = "--set stiffness.bending_2=1000";
+
+/// The map, in which no cell is other than the curves say.
+#[track_caller]
+fn map(found: &Value) -> &Value {
+    let map = &found["map"];
+    assert_eq!(map["disagreeing"], json!([]), "{map:#}");
+    map
+}
+
+/// The indices of the cells.
+fn indices(map: &Value) -> Vec<usize> {
+    let rows = map["index"].list().iter();
+    rows.flat_map(Json::list).map(Json::count).collect()
+}
 
 /// Cells on both sides of the load, which is nearly that of an inextensible column, and none
 /// that the curve contradicts.
 #[test]
 fn cells_are_stable_below_the_load_and_not_above() {
     let place = Workplace::new();
-    let run = place.run(&format!(
-        "trace leaf.toml {COLUMN} --map 6x4 --write json,svg,html"
+    let axes = "--vary load.tip_force[0]=0..-6 --vary stiffness.bending_3=0.5..2";
+    let run = place.run(format!(
+        "{COLUMN} {STRIP} {axes} --map 6x4 --write json,svg,html"
     ));
     run.ends(0).says(&["6 x 4 cells", "all as the curves say"]);
-    let map = &place.json("out/small/boundary.json")["map"];
-    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0);
-    let numbers = |key: &str| -> Vec<f64> {
-        let values = map[key].as_array().unwrap().iter();
-        values.map(|value| value.as_f64().unwrap()).collect()
-    };
-    let (first, second) = (numbers("first"), numbers("second"));
+    let found = place.json("out/small/boundary.json");
+    let map = map(&found);
+    let (first, second) = (floats(&map["first"]), floats(&map["second"]));
     assert_eq!([first.len(), second.len()], [6, 4]);
     let mut both = [0, 0];
     for (r, ei) in second.iter().enumerate() {
         for (c, load) in first.iter().enumerate() {
             let beyond = -load / (0.25 * PI * PI * ei);
             if (beyond - 1.0).abs() > 0.1 {
-                let index = map["index"][r][c].as_u64().unwrap() as usize;
+                let index = map["index"][r][c].count();
                 assert_eq!(index, usize::from(beyond > 1.0), "{load} at {ei}");
                 both[index] += 1;
             }
@@ -49,32 +65,25 @@ fn cells_are_stable_below_the_load_and_not_above() {
 #[test]
 fn curves_that_do_not_pass_the_first_trace_begin_at_rows_of_the_map() {
     let place = Workplace::new();
-    let column = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
-        --set stiffness.bending_2=1.2 --set stiffness.bending_3=1.5 \
+    let column = "--set stiffness.bending_2=1.2 --set stiffness.bending_3=1.5 \
         --set stiffness.axial=inf --set stiffness.shear_2=inf --set stiffness.shear_3=inf \
         --vary load.tip_force[0]=0..-3.3 --vary stiffness.bending_3=1.5..0.5";
     let curves = |threads: &str, more: &str| {
-        let run = place.run_on(
-            threads,
-            &format!("trace leaf.toml {column} --write json --json {more}"),
-        );
-        let mut found = run.ends(0).json();
-        found.as_object_mut().unwrap().remove("wall_seconds");
-        found
+        let asked = format!("{COLUMN} {column} --write json --json {more}");
+        timeless(place.run_on(threads, &asked).ends(0).json())
     };
-    assert_eq!(curves("2", "")["curves"].as_array().unwrap().len(), 1);
+    assert_eq!(curves("2", "")["curves"].list().len(), 1);
     let [one, two] = ["1", "2"].map(|threads| curves(threads, "--map 4x5"));
     assert_eq!(one, two);
-    let [other, new] = &one["curves"].as_array().unwrap()[..] else {
+    let [other, new] = one["curves"].list() else {
         panic!("{one:#}");
     };
     let euler = 0.25 * PI * PI;
     for (curve, own) in [(other, false), (new, true)] {
-        let points = curve["points"].as_array().unwrap();
-        assert_eq!(curve["ends"], serde_json::json!(["reached", "reached"]));
-        for point in points {
-            let [load, bending] = [0, 1].map(|k| point["values"][k].as_f64().unwrap());
-            let error = [0, 1].map(|k| point["errors"][k].as_f64().unwrap());
+        assert_eq!(curve["ends"], json!(["reached", "reached"]));
+        for point in curve["points"].list() {
+            let [load, bending] = [0, 1].map(|k| point["values"][k].number());
+            let error = floats(&point["errors"]);
             let right = -euler * if own { bending } else { 1.2 };
             let stated = error[0] + euler * error[1];
             assert!((load - right).abs() <= stated + 1e-11, "{point}: {right}");
@@ -83,84 +92,68 @@ fn curves_that_do_not_pass_the_first_trace_begin_at_rows_of_the_map() {
             assert!(stated < if own { 5e-6 } else { 1e-6 }, "{point}");
         }
     }
-    assert_eq!(one["map"]["disagreeing"].as_array().unwrap().len(), 0);
+    map(&one);
 }
 
 /// The curve turns back between two weights and meets every row above twice: it is found
 /// from a first trace that does not meet it, once.
 #[test]
 fn a_curve_that_rows_meet_twice_is_followed_once() {
-    let place = Workplace::new();
-    let run = place.run(
+    let found = Workplace::new().told(
+        0,
         "trace scenarios/classic/hanging_curved.toml --set rest.bend_3=5 --map 3x5 \
-        --vary load.gravity[0]=8..20 --vary rest.bend_3=5..6.4 --write json --json",
+        --vary load.gravity[0]=8..20 --vary rest.bend_3=5..6.4 --write json",
     );
-    let found = run.ends(0).json();
-    let [curve] = &found["curves"].as_array().unwrap()[..] else {
+    let [curve] = found["curves"].list() else {
         panic!("{found:#}");
     };
-    assert_eq!(curve["ends"], serde_json::json!(["reached", "reached"]));
-    let points = curve["points"].as_array().unwrap();
-    let rest = |k: usize| points[k]["values"][1].as_f64().unwrap();
+    assert_eq!(curve["ends"], json!(["reached", "reached"]));
+    let points = curve["points"].list();
+    let rest = |k: usize| points[k]["values"][1].number();
     let least = (0..points.len()).map(rest).fold(f64::INFINITY, f64::min);
     assert!((5.5..5.6).contains(&least) && rest(points.len() - 1) == 6.4);
-    assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
+    map(&found);
 }
 
 /// Both loads of a column meet where its bendings are the same, at the end of a range:
 /// a crossing and an end nearly coincide there. Rows beside them know the curves.
 #[test]
 fn curves_that_cross_at_the_end_of_a_range_are_followed_once() {
-    let run = Workplace::new().run(
+    let found = Workplace::new().told(
+        0,
         "trace scenarios/classic/elastica_buckled.toml --set stiffness.bending_2=0.55 --map 2x8 \
-        --vary load.tip_force[0]=-1..-30 --vary stiffness.bending_3=0.5..0.55 --write none --json",
+        --vary load.tip_force[0]=-1..-30 --vary stiffness.bending_3=0.5..0.55 --write none",
     );
-    let found = run.ends(0).json();
-    assert_eq!(found["curves"].as_array().unwrap().len(), 4);
-    assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
+    assert_eq!(found["curves"].list().len(), 4);
+    map(&found);
 }
 
 /// A column that is pushed askew: beyond its folds the branch from the left is gone, but
 /// others are reached round the cusp, where the sheet of equilibria is single.
 #[test]
 fn cells_behind_a_fold_are_reached_round_its_cusp() {
-    let run = Workplace::new().run(
-        "trace leaf.toml --set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
-        --set stiffness.bending_2=1000 --set load.tip_force=[-2.8,0,0] --map 6x6 \
-        --vary load.tip_force[1]=1..-1 --vary load.tip_force[0]=-4..-1 --write none --json",
-    );
-    let found = run.ends(0).json();
-    let map = &found["map"];
-    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0, "{map:#}");
-    let rows = map["index"].as_array().unwrap();
-    let stable = rows.iter().flat_map(|row| row.as_array().unwrap());
-    assert!(stable.clone().all(|index| index == 0), "{map:#}");
-    assert_eq!(stable.count(), 36);
+    let askew = "--set load.tip_force=[-2.8,0,0] --vary load.tip_force[1]=1..-1 \
+        --vary load.tip_force[0]=-4..-1 --map 6x6 --write none";
+    let found = Workplace::new().told(0, format!("{COLUMN} {STRIP} {askew}"));
+    assert_eq!(indices(map(&found)), [0; 36]);
 }
 
 /// Both modes of the flat undulating leaf become neutral along rows of cells, on a coarse grid
 /// elsewhere than on a fine one.
 #[test]
 fn rows_that_run_along_a_curve_stay_on_its_sheet() {
-    let (veins, weak) = ((0..11).filter(|vein| *vein != 5), 0.07);
-    let keys: Vec<String> = veins
+    let veins = (0..11).filter(|vein| *vein != 5);
+    let keys: Vec<_> = veins
         .map(|vein| format!("stiffness.bending_2[{vein}]"))
         .collect();
-    let keys = keys.join("+");
-    let half = vec![format!("{weak}"); 5].join(",");
-    let run = Workplace::new().run(&format!(
+    let (keys, half) = (keys.join("+"), ["0.07"; 5].join(","));
+    let asked = format!(
         "trace scenarios/study/undulation.toml --set load.gravity=[0,0,0] --tolerance 1e-4 \
-        --set stiffness.bending_2=[{half},1000,{half}] --map 2x3 --write none --json \
+        --set stiffness.bending_2=[{half},1000,{half}] --map 2x3 --write none \
         --vary stiffness.torsion=9..6 --vary {keys}=0.07..0.06"
-    ));
-    let found = run.ends(0).json();
-    let map = &found["map"];
-    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0, "{map:#}");
-    let cells = map["index"].as_array().unwrap().iter();
-    let cells: Vec<u64> = cells
-        .flat_map(|row| row.as_array().unwrap())
-        .map(|index| index.as_u64().unwrap())
-        .collect();
+    );
+    let found = Workplace::new().told(0, asked);
+    let cells = indices(map(&found));
     assert!(cells.contains(&0) && cells.contains(&2), "{cells:?}");
 }
 
@@ -168,17 +161,15 @@ fn rows_that_run_along_a_curve_stay_on_its_sheet() {
 #[test]
 fn a_cell_close_beyond_a_curve_is_counted_on_finer_grids() {
     let place = Workplace::new();
-    let column = "trace leaf.toml --set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
-        --set stiffness.bending_2=1000 --write none --json --vary load.tip_force[0]=0..";
-    let trace = place.run(&format!("{column}-6")).ends(0).json();
-    let load = &trace["branches"][0]["critical"][0]["value"];
-    let end = load.as_f64().unwrap() * (1.0 + 2e-5) / 0.75;
-    let run = place.run(&format!(
-        "{column}{end} --vary stiffness.torsion=1..2 --map 2x2"
-    ));
-    let map = &run.ends(0).json()["map"];
-    assert_eq!(map["index"], serde_json::json!([[0, 1], [0, 1]]), "{map:#}");
-    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0);
+    let column = format!("{COLUMN} {STRIP} --write none --vary load.tip_force[0]=0..");
+    let trace = place.told(0, format!("{column}-6"));
+    let load = trace["branches"][0]["critical"][0]["value"].number();
+    let end = load * (1.0 + 2e-5) / 0.75;
+    let found = place.told(
+        0,
+        format!("{column}{end} --vary stiffness.torsion=1..2 --map 2x2"),
+    );
+    assert_eq!(map(&found)["index"], json!([[0, 1], [0, 1]]));
 }
 
 #[test]

@@ -4,14 +4,14 @@
 
 mod common;
 
-use common::branch::text;
-use common::random::splitmix64;
-use common::{ROD, branch, entries};
-use leafdyn::study::{Base, Boundary, BoundaryRequest, TraceRequest, boundary};
+use common::branch::{follow, text};
+use common::plane::followed;
+use common::random::Draw;
+use common::*;
 use rayon::prelude::*;
 
 /// Leaves, unless the environment asks for more.
-const LEAVES: u64 = 6;
+const LEAVES: usize = 6;
 
 /// Places at which a curve is crossed.
 const PLACES: usize = 3;
@@ -19,137 +19,82 @@ const PLACES: usize = 3;
 struct Case {
     text: String,
     overrides: String,
-    along: String,
+    along: &'static str,
     across: String,
 }
 
 /// A random leaf that loses its stability along the first number, and the second.
-fn case(number: u64) -> Case {
-    let mut state = 1000 * number + 7;
-    let mut next = |low: f64, high: f64| low + (high - low) * splitmix64(&mut state);
+fn case(number: usize) -> Case {
+    let mut draw = Draw(1000 * number as u64 + 7);
     let stiffness = format!(
         "stiffness.torsion={:?}; stiffness.axial={:?}; stiffness.shear_2={:?}; stiffness.shear_3={:?}",
-        next(0.6, 1.5),
-        next(200.0, 3000.0),
-        next(200.0, 3000.0),
-        next(200.0, 3000.0),
+        draw.uniform(0.6, 1.5),
+        draw.uniform(200.0, 3000.0),
+        draw.uniform(200.0, 3000.0),
+        draw.uniform(200.0, 3000.0),
     );
-    let [low, high] = [next(0.6, 0.9), next(1.1, 1.6)];
-    let one_of = |keys: &[&str], which: f64| {
-        let key = keys[(which * keys.len() as f64) as usize];
-        format!("{key}={low:?}..{high:?}")
-    };
-    let (text, more, along, across) = match number % 4 {
-        // A column.
+    let [low, high] = [draw.uniform(0.6, 0.9), draw.uniform(1.1, 1.6)];
+    // A column, a strip on edge, a lens whose midrib grows, and a rod that hangs.
+    let (text, more, along, keys, part) = match number % 4 {
         0 => (
             ROD.into(),
-            format!("stiffness.bending_2={:?}", next(3.0, 30.0)),
-            "load.tip_force[0]=0..-6".into(),
-            one_of(
-                &[
-                    "stiffness.bending_3",
-                    "leaf.length",
-                    "scale:stiffness.axial",
-                    "load.gravity[0]",
-                ],
-                next(0.0, 1.0),
-            ),
+            format!("stiffness.bending_2={:?}", draw.uniform(3.0, 30.0)),
+            "load.tip_force[0]=0..-6",
+            "stiffness.bending_3 leaf.length scale:stiffness.axial load.gravity[0]",
+            1.0,
         ),
-        // A strip on edge.
         1 => (
             ROD.into(),
-            format!("stiffness.bending_2={:?}", next(10.0, 100.0)),
-            "load.tip_force[2]=0..-7".into(),
-            one_of(
-                &[
-                    "stiffness.bending_3",
-                    "stiffness.torsion",
-                    "leaf.length",
-                    "load.gravity[2]",
-                ],
-                next(0.0, 1.0),
-            ),
+            format!("stiffness.bending_2={:?}", draw.uniform(10.0, 100.0)),
+            "load.tip_force[2]=0..-7",
+            "stiffness.bending_3 stiffness.torsion leaf.length load.gravity[2]",
+            1.0,
         ),
-        // A lens whose midrib grows.
         2 => (
             text("classic/lens_midrib"),
             format!(
                 "leaf.length=[1.0, 0.9, 1.0]; coupling.z={:?}",
-                next(0.0, 2.0)
+                draw.uniform(0.0, 2.0)
             ),
-            "leaf.length[1]=0.88..0.97".into(),
-            one_of(
-                &[
-                    "stiffness.torsion",
-                    "stiffness.bending_3",
-                    "coupling.z",
-                    "scale:leaf.fan",
-                ],
-                next(0.0, 0.7),
-            ),
+            "leaf.length[1]=0.88..0.97",
+            "stiffness.torsion stiffness.bending_3 coupling.z scale:leaf.fan",
+            0.7,
         ),
-        // A rod that hangs.
-        _ => (
-            text("classic/hanging_curved"),
-            String::new(),
-            "load.gravity[0]=8..14".into(),
-            format!("rest.bend_3={:?}..{:?}", next(5.8, 5.95), next(6.05, 6.2)),
-        ),
+        _ => {
+            let [low, high] = [draw.uniform(5.8, 5.95), draw.uniform(6.05, 6.2)];
+            return Case {
+                text: text("classic/hanging_curved"),
+                overrides: "rest.bend_3=6.0".into(),
+                along: "load.gravity[0]=8..14",
+                across: format!("rest.bend_3={low:?}..{high:?}"),
+            };
+        }
     };
-    let overrides = match number % 4 {
-        3 => "rest.bend_3=6.0".into(),
-        _ => format!("{stiffness}; {more}"),
-    };
+    let keys: Vec<&str> = keys.split(' ').collect();
+    let key = keys[(draw.uniform(0.0, part) * keys.len() as f64) as usize];
     Case {
         text,
-        overrides,
+        overrides: format!("{stiffness}; {more}"),
         along,
-        across,
+        across: format!("{key}={low:?}..{high:?}"),
     }
 }
 
-fn follow(case: &Case) -> Result<Boundary, String> {
-    let base = Base::of_text(
-        case.text.clone(),
-        "test.toml".into(),
-        &entries(&case.overrides),
-    );
-    let request = BoundaryRequest {
-        trace: TraceRequest {
-            base: base.map_err(|error| error.to_string())?,
-            vary: case.along.parse().unwrap(),
-            switch: false,
-            keep_unstable: true,
-            segments: None,
-            tolerance: Some(1e-6),
-            most_points: 100,
-            cross_section: None,
-        },
-        across: case.across.parse().unwrap(),
-        map: None,
-    };
-    boundary(&request, &mut |_, _, _| {}).map_err(|error| error.to_string())
-}
-
 /// What is wrong with the curves of a leaf, and how many places were crossed.
-fn judged(number: u64) -> (usize, Vec<String>) {
+fn judged(number: usize) -> (usize, Vec<String>) {
     let case = case(number);
     let what = format!("{number}: {} over {}", case.along, case.across);
-    let found = match follow(&case) {
+    let numbers = [case.along, case.across.as_str()];
+    let found = match followed(1e-6, &case.text, &case.overrides, numbers) {
         Ok(found) => found,
         Err(error) => return (0, vec![format!("{what}: {error}")]),
     };
     // Some leaves stay stable all along, and say so.
     if found.curves.is_empty() {
         let remark = found.remark.unwrap_or_default();
-        let wrong = !remark.contains("the index changes nowhere");
-        return (
-            0,
-            wrong
-                .then(|| format!("{what}: {remark}"))
-                .into_iter()
-                .collect(),
-        );
+        let stays = remark.contains("the index changes nowhere");
+        let wrong = (!stays).then(|| format!("{what}: {remark}"));
+        return (0, wrong.into_iter().collect());
     }
     let key = case.across.split('=').next().unwrap();
     let (mut places, mut wrong) = (0, Vec::new());
@@ -160,20 +105,16 @@ fn judged(number: u64) -> (usize, Vec<String>) {
         for point in points.into_iter().step_by(stride).take(PLACES) {
             let [value, across] = point.values;
             let bent = format!("{}; {key}={across:?}", case.overrides);
-            let traced = branch::follow(&case.text, &bent, &case.along, false);
+            let traced = follow(&case.text, &bent, case.along, false);
             let critical = traced.branches.iter().flat_map(|branch| branch.critical());
-            let off = critical
-                .map(|(_, critical)| {
-                    let stated = point.errors[0] + critical.value_error.unwrap_or(0.0);
-                    (critical.value - value).abs() - stated - 1e-12 * value.abs()
-                })
-                .fold(f64::INFINITY, f64::min);
+            let beyond = critical.map(|(_, critical)| {
+                let stated = point.errors[0] + critical.value_error.unwrap_or(0.0);
+                (critical.value - value).abs() - stated - 1e-12 * value.abs()
+            });
+            let off = beyond.fold(f64::INFINITY, f64::min);
             places += 1;
-            if off > 0.0 {
-                wrong.push(format!(
-                    "{what}: at {across} not at {value}, off by {off:.1e}"
-                ));
-            }
+            let missed = format!("{what}: at {across} not at {value}, off by {off:.1e}");
+            wrong.extend((off > 0.0).then_some(missed));
         }
     }
     (places, wrong)
@@ -181,11 +122,10 @@ fn judged(number: u64) -> (usize, Vec<String>) {
 
 #[test]
 fn traces_cross_them_where_they_are() {
-    let count = std::env::var("LEAFDYN_BOUNDARIES").ok();
-    let count = count.map_or(LEAVES, |count| count.parse().unwrap());
+    let count = asked("LEAFDYN_BOUNDARIES", LEAVES);
     let all: Vec<_> = (0..count).into_par_iter().map(judged).collect();
     let places: usize = all.iter().map(|(places, _)| places).sum();
     let wrong: Vec<String> = all.into_iter().flat_map(|(_, wrong)| wrong).collect();
     println!("{places} places of {count} leaves");
-    assert!(places as u64 >= 2 * count && wrong.is_empty(), "{wrong:#?}");
+    assert!(places >= 2 * count && wrong.is_empty(), "{wrong:#?}");
 }

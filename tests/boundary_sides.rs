@@ -5,10 +5,10 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::plane::{follow, follow_to};
-use common::{RIGID, ROD, path, relaxed, to};
-use glam::DVec3;
-use leafdyn::study::{Base, LeafBeside};
+use common::branch::{text, weak_veins};
+use common::plane::{follow, followed};
+use common::*;
+use leafdyn::study::LeafBeside;
 
 /// Distance of its tip from the axis.
 fn off_axis(tip: DVec3) -> f64 {
@@ -17,9 +17,7 @@ fn off_axis(tip: DVec3) -> f64 {
 
 /// The tip of the leaf that a relaxation from arcs finds at both numbers.
 fn tip_at_rest(text: &str, entries: &str) -> DVec3 {
-    let base = Base::of_text(text.into(), "test.toml".into(), &common::entries(entries));
-    let leaf = relaxed(base.unwrap().scenario(), &to(1e-8));
-    leaf.tips[0]
+    tip(&relaxed(base(text, entries).scenario(), &to(1e-8)))
 }
 
 /// A column is straight on one side of Euler's load, buckled on the other; across the next
@@ -80,16 +78,9 @@ fn a_column_pushed_askew_snaps_beyond_its_fold() {
         });
         passed.next().unwrap()
     };
-    assert!(
-        low.values[0].abs() < edge(low.values[1]),
-        "{:?}",
-        low.values
-    );
-    assert!(
-        beyond.values[0].abs() > edge(beyond.values[1]),
-        "{:?}",
-        beyond.values
-    );
+    let [inside, outside] = [low, beyond].map(|leaf| leaf.values);
+    assert!(inside[0].abs() < edge(inside[1]), "{inside:?}");
+    assert!(outside[0].abs() > edge(outside[1]), "{outside:?}");
     assert!(low.tips[0].y * beyond.tips[0].y < 0.0);
     assert!(beyond.tips[0].y * beyond.values[0] > 0.0);
     let [side, load] = beyond.values;
@@ -102,22 +93,14 @@ fn a_column_pushed_askew_snaps_beyond_its_fold() {
 /// becomes unstable.
 #[test]
 fn a_flat_leaf_waves_beyond_the_undulation_boundary() {
-    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
-    let weak = (0..11).filter(|vein| *vein != 5);
-    let weak: Vec<String> = weak
-        .map(|vein| format!("stiffness.bending_2[{vein}]"))
-        .collect();
-    let along = format!("{}=1..0.4:50log", weak.join("+"));
-    let across = "stiffness.torsion=0.9..1:2log";
-    let found = follow_to(1e-4, &text, "load.gravity=[0,0,0]", [&along, across]);
+    let (text, across) = (text("study/undulation"), "stiffness.torsion=0.9..1:2log");
+    let along = format!("{}=1..0.4:50log", weak_veins());
+    let found = followed(1e-4, &text, "load.gravity=[0,0,0]", [&along, across]).unwrap();
     let curve = &found.curves[0];
     let [flat, waving] = curve.beside.as_slice() else {
         panic!("no leaves");
     };
-    let height = |leaf: &LeafBeside| {
-        let nodes = leaf.curves.iter().flatten();
-        nodes.map(|x| x.z.abs()).fold(0.0, f64::max)
-    };
+    let height = |leaf: &LeafBeside| largest(leaf.curves.iter().flatten().map(|x| x.z.abs()));
     assert_eq!([flat.index, waving.index], [0, 0]);
     assert!(flat.values[0] > waving.values[0]);
     assert!(height(flat) < 1e-9, "{:e}", height(flat));

@@ -7,20 +7,13 @@ mod common;
 use std::f64::consts::PI;
 
 use common::branch::{changes_at, follow};
-use common::{
-    NEUTRAL, RIGID, ROD, close, critical, critical_of_rigid, rod, set_stiffness, settle_on, table,
-    tip,
-};
-use leafdyn::scenario::Scenario;
+use common::*;
 
 /// A straight column, clamped at the base, EI = 1 sideways and `other` up and
 /// down.
 fn column(other: f64, [axial, shear]: [f64; 2], tip_force: f64, gravity: f64) -> Scenario {
-    let stiffness = set_stiffness(axial, shear);
-    let loads = format!(
-        "load.tip_force=[{}, 0, 0]; load.gravity=[{}, 0, 0]",
-        -tip_force, -gravity
-    );
+    let (stiffness, force, weight) = (set_stiffness(axial, shear), -tip_force, -gravity);
+    let loads = format!("load.tip_force=[{force}, 0, 0]; load.gravity=[{weight}, 0, 0]");
     rod(&format!(
         "{stiffness}; stiffness.bending_2={other:?}; {loads}"
     ))
@@ -94,10 +87,8 @@ fn reissner_stretch_and_shear_move_the_critical_load() {
             index(&column(STRIP, [axial, shear], load, 0.0), segments) > 0
         });
         close("P", found / exact, 1.0, NEUTRAL);
-        let strip = format!(
-            "{}; stiffness.bending_2={STRIP}",
-            set_stiffness(axial, shear)
-        );
+        let stiffness = set_stiffness(axial, shear);
+        let strip = format!("{stiffness}; stiffness.bending_2={STRIP}");
         let found = follow(ROD, &strip, "load.tip_force[0]=0..-5", false);
         changes_at("Reissner", &found, &[(-exact, 1)], 1e-8);
     }

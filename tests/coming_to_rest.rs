@@ -5,26 +5,14 @@
 
 mod common;
 
+use std::cell::Cell;
 use std::fmt::{Display, Write};
 use std::time::Instant;
 
-use common::random::splitmix64;
-use common::{parse, relaxed, scenario, settled};
-use leafdyn::relax::Options;
-
-/// A generator of random numbers, the same everywhere.
-struct Draw(u64);
+use common::random::Draw;
+use common::*;
 
 impl Draw {
-    fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        let unit = splitmix64(&mut self.0);
-        low + (high - low) * unit
-    }
-
-    fn log(&mut self, low: f64, high: f64) -> f64 {
-        self.uniform(low.ln(), high.ln()).exp()
-    }
-
     fn chance(&mut self, part: f64) -> bool {
         self.uniform(0.0, 1.0) < part
     }
@@ -40,12 +28,9 @@ impl Draw {
 
     /// A quantity: alike in all rods, each rod's own, or profiles.
     fn quantity(&mut self, rods: usize, next: impl Fn(&mut Self) -> f64) -> String {
-        let some = |draw: &mut Self, count: usize| -> Vec<f64> {
-            (0..count).map(|_| next(draw)).collect()
-        };
         match self.uniform(0.0, 1.0) {
-            kind if kind < 0.4 => some(self, 1)[0].to_string(),
-            kind if kind < 0.8 => list(some(self, rods)),
+            kind if kind < 0.4 => next(self).to_string(),
+            kind if kind < 0.8 => list((0..rods).map(|_| next(self)).collect()),
             _ => {
                 let (value, knot) = (next(self), self.uniform(0.1, 0.9));
                 let values: Vec<f64> = (0..3).map(|_| value * self.uniform(0.3, 1.0)).collect();
@@ -131,39 +116,29 @@ fn loads(draw: &mut Draw, kind: &Kind, rods: usize, softest: f64) -> [Option<Vec
 fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
     let rods = draw.uniform(1.0, 9.0) as usize;
     let mut text = format!("name = \"{name}\"\n[leaf]\nrods = {rods}\n");
+    let [shortest, longest] = kind.lengths;
     let lengths = match draw.chance(0.5) {
         true => "1.0".into(),
-        false => list(
-            (0..rods)
-                .map(|_| draw.uniform(kind.lengths[0], kind.lengths[1]))
-                .collect(),
-        ),
+        false => list(draw.list(rods, shortest, longest)),
     };
     let fan = match draw.uniform(0.0, 1.0) {
         which if which < 0.25 => "\"paper\"".into(),
         which if which < 0.5 => "\"symmetric\"".into(),
-        _ => list((0..rods).map(|_| draw.uniform(-1.6, 1.6)).collect()),
+        _ => list(draw.list(rods, -1.6, 1.6)),
     };
-    writeln!(
-        text,
-        "length = {lengths}\nfan = {fan}\njoined = {}",
-        draw.chance(0.85)
-    )
-    .unwrap();
-    text += "[stiffness]\n";
-    let mut softest = f64::INFINITY;
+    let joined = draw.chance(0.85);
+    text += &format!("length = {lengths}\nfan = {fan}\njoined = {joined}\n[stiffness]\n");
+    let softest = Cell::new(f64::INFINITY);
     for key in ["torsion", "bending_2", "bending_3"] {
         let [low, high] = kind.couple;
-        let seen = std::cell::Cell::new(softest);
         let value = draw.quantity(rods, |draw| {
             let value = draw.log(low, high);
-            seen.set(seen.get().min(value));
+            softest.set(softest.get().min(value));
             value
         });
-        softest = seen.get();
         writeln!(text, "{key} = {value}").unwrap();
     }
-    let loads = loads(draw, kind, rods, softest);
+    let loads = loads(draw, kind, rods, softest.get());
     let size = |v: &Vec<f64>| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let load: f64 = loads.iter().flatten().map(size).sum();
     let all_rigid = draw.chance(0.1);
@@ -205,24 +180,15 @@ fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
     text
 }
 
-/// Number of leaves as the environment says it, and the seed.
-fn asked(least: u64) -> [u64; 2] {
-    [("LEAVES", least), ("SEED", 1)].map(|(name, otherwise)| {
-        std::env::var(name).map_or(otherwise, |text| text.parse().unwrap())
-    })
-}
-
 /// Relaxes so many leaves; returns how many of them did not come to rest, and the
 /// number of all.
-fn failures(kind: &Kind, least: u64) -> (u64, u64) {
-    let [count, seed] = asked(least);
+fn failures(kind: &Kind, least: usize) -> (usize, usize) {
+    let (count, seed) = (asked("LEAVES", least), asked("SEED", 1) as u64);
     let mut failed = 0;
     let (mut slowest, mut total) = (0.0_f64, 0.0);
     for k in 0..count {
-        let mut draw = Draw(
-            seed.wrapping_mul(0x1234_5678_9abc_def1)
-                .wrapping_add(k << 20),
-        );
+        let begin = seed.wrapping_mul(0x1234_5678_9abc_def1);
+        let mut draw = Draw(begin.wrapping_add((k as u64) << 20));
         let name = format!("{}-{seed}-{k}", kind.name);
         let text = leaf(&mut draw, kind, &name);
         let scenario = parse(&text);
@@ -233,21 +199,17 @@ fn failures(kind: &Kind, least: u64) -> (u64, u64) {
         total += seconds;
         if !found.outcome.is_success() {
             failed += 1;
-            let outcome = found.outcome.word();
+            let (outcome, work) = (found.outcome.word(), found.work);
             let remark = found.remark.unwrap_or_default();
-            println!(
-                "{name}: {outcome} after {seconds:.1} s, {:?}: {remark}",
-                found.work
-            );
+            println!("{name}: {outcome} after {seconds:.1} s, {work:?}: {remark}");
             if let Ok(folder) = std::env::var("FAILED") {
                 std::fs::write(format!("{folder}/{name}.toml"), text).unwrap();
             }
         }
     }
+    let (name, each) = (kind.name, 1e3 * total / count as f64);
     println!(
-        "{}: {failed} of {count} did not come to rest; {:.1} ms each, {slowest:.2} s at most",
-        kind.name,
-        1e3 * total / count as f64
+        "{name}: {failed} of {count} did not come to rest; {each:.1} ms each, {slowest:.2} s at most"
     );
     (failed, count)
 }

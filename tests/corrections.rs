@@ -3,16 +3,15 @@
 
 mod common;
 
-use common::{scenario, to};
-use leafdyn::relax::{Equilibrium, Method, Options, relax};
-use leafdyn::scenario::Scenario;
-use leafdyn::shape::{Difference, NodeState, RodShape};
+use common::*;
+use leafdyn::relax::Method;
+use leafdyn::shape::Difference;
 
 /// To the first two the errors on a grid of 4 or 8 segments alone are taken off.
 const TOLERANCES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 
 fn found(leaf: &Scenario, options: &Options) -> Equilibrium {
-    let found = relax(leaf, options, &mut |_| {}).unwrap();
+    let found = relaxed(leaf, options);
     assert!(
         found.outcome.is_at_rest(),
         "{}: {:?}",
@@ -44,34 +43,28 @@ fn one_coarse_grid_or_two_tell_what_shooting_does() {
             ..to(1e-11)
         };
         let shot = found(&leaf, &shot);
-        let uncertain = shot.accuracy.error_estimate.unwrap();
         for tolerance in TOLERANCES {
             let corrected = found(&leaf, &to(tolerance));
             let segments = &corrected.accuracy.segments;
             assert!(*segments.last().unwrap() <= 16, "{what}: {segments:?}");
             alone += usize::from(segments.len() == 1);
-            let bar = corrected.accuracy.error_estimate.unwrap();
-            let off = common::distance(&corrected, &shot);
-            println!("{what}: {segments:?}, off {off:.1e}, bar {bar:.1e}");
+            let (bar, uncertain) = (estimate(&corrected), estimate(&shot));
+            let off = distance(&corrected, &shot);
             assert!(off <= bar + uncertain, "{what}: {off:e} for {bar:e}");
             for (a, b) in corrected.shape.rods.iter().zip(&shot.shape.rods) {
-                for (a, b) in [(&a.nodes[0], &b.nodes[0]), (tip(a), tip(b))] {
-                    let apart = Difference::of(a, b);
-                    let others = apart.rotation.max(apart.force).max(apart.moment);
+                let ends = [
+                    a.nodes.first().zip(b.nodes.first()),
+                    a.nodes.last().zip(b.nodes.last()),
+                ];
+                for (a, b) in ends.into_iter().flatten() {
+                    let off = Difference::of(a, b);
+                    let others = largest([off.rotation, off.force, off.moment]);
                     assert!(others <= 50.0 * tolerance, "{what}: {others:e}");
                 }
             }
             let [a, b] = [&corrected, &shot].map(|leaf| leaf.energy.unwrap());
-            println!("energy off by {:.1e}", a - b);
-            assert!(
-                (a - b).abs() <= 0.1 * tolerance * a.abs().max(1.0),
-                "{what}: {a} for {b}"
-            );
+            close(&what, a, b, 0.1 * tolerance * a.abs().max(1.0));
         }
     }
     assert!(alone >= 8, "{alone}");
-}
-
-fn tip(rod: &RodShape) -> &NodeState {
-    &rod.nodes[rod.nodes.len() - 1]
 }

@@ -3,7 +3,8 @@
 
 mod common;
 
-use glam::{DMat3, DQuat, DVec3};
+use common::*;
+use glam::{DMat3, DQuat};
 use leafdyn::internals::rod::{Ends, Section, Segment};
 use leafdyn::internals::rotation;
 use nalgebra::{SMatrix, SVector};
@@ -12,10 +13,12 @@ use proptest::prelude::*;
 
 type Quaternion<D> = [D; 4]; // w, x, y, z
 
-fn multiply<D: DualNum<Primitive = f64> + Copy>(
-    a: Quaternion<D>,
-    b: Quaternion<D>,
-) -> Quaternion<D> {
+/// A number with its derivatives.
+trait Number: DualNum<Primitive = f64> + Copy {}
+
+impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
+
+fn multiply<D: Number>(a: Quaternion<D>, b: Quaternion<D>) -> Quaternion<D> {
     [
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -24,12 +27,12 @@ fn multiply<D: DualNum<Primitive = f64> + Copy>(
     ]
 }
 
-fn conjugate<D: DualNum<Primitive = f64> + Copy>(q: Quaternion<D>) -> Quaternion<D> {
+fn conjugate<D: Number>(q: Quaternion<D>) -> Quaternion<D> {
     [q[0], -q[1], -q[2], -q[3]]
 }
 
 /// Components of R(q)^T a.
-fn to_directors<D: DualNum<Primitive = f64> + Copy>(q: Quaternion<D>, a: [D; 3]) -> [D; 3] {
+fn to_directors<D: Number>(q: Quaternion<D>, a: [D; 3]) -> [D; 3] {
     let zero = a[0] * 0.0;
     let r = multiply(multiply(conjugate(q), [zero, a[0], a[1], a[2]]), q);
     [r[1], r[2], r[3]]
@@ -37,20 +40,14 @@ fn to_directors<D: DualNum<Primitive = f64> + Copy>(q: Quaternion<D>, a: [D; 3])
 
 /// Pi of the element. Variables: x0, a, x1, b, n, with rotation increments a, b
 /// applied as exp(a) q0, exp(b) q1 to second order about zero.
-fn functional<D: DualNum<Primitive = f64> + Copy>(
+fn functional<D: Number>(
     z: SVector<D, 15>,
     section: &Section,
     ends: &Ends,
     x: &[DVec3; 2],
     n0: DVec3,
 ) -> D {
-    let vector = |offset: usize, base: DVec3| -> [D; 3] {
-        [
-            z[offset] + base.x,
-            z[offset + 1] + base.y,
-            z[offset + 2] + base.z,
-        ]
-    };
+    let vector = |at: usize, base: DVec3| [0, 1, 2].map(|k| z[at + k] + base[k]);
     let rotated = |offset: usize, q: DQuat| -> Quaternion<D> {
         let t = [z[offset], z[offset + 1], z[offset + 2]];
         let square = t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
@@ -63,13 +60,13 @@ fn functional<D: DualNum<Primitive = f64> + Copy>(
     if ends.q[0].dot(ends.q[1]) < 0.0 {
         q1 = q1.map(|c| -c);
     }
-    let sum = [q0[0] + q1[0], q0[1] + q1[1], q0[2] + q1[2], q0[3] + q1[3]];
+    let sum = [0, 1, 2, 3].map(|k| q0[k] + q1[k]);
     let length = (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3]).sqrt();
     let middle = sum.map(|c| c / length);
     let p = multiply(conjugate(q0), q1);
     let sin = (p[1] * p[1] + p[2] * p[2] + p[3] * p[3]).sqrt();
     let factor = sin.atan2(p[0]) * 2.0 / sin;
-    let dx = [x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]];
+    let dx = [0, 1, 2].map(|k| x1[k] - x0[k]);
     let (xi, nu) = (to_directors(middle, dx), to_directors(middle, n));
     let mut pi = nu[0] * 0.0;
     for k in 0..3 {

@@ -60,12 +60,14 @@ fn read(path: &Path) -> Page {
     }
 }
 
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let entries = fs::read_dir(folder).unwrap();
+    entries.map(|entry| entry.unwrap().path())
+}
+
 fn pages() -> Vec<Page> {
-    let mut paths: Vec<_> = fs::read_dir(top().join("docs"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "md"))
-        .collect();
+    let mut paths: Vec<_> = entries(&top().join("docs")).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
     paths.push(top().join("README.md"));
     paths.sort();
     paths.iter().map(|path| read(path)).collect()
@@ -75,9 +77,9 @@ fn pages() -> Vec<Page> {
 /// single spaces, without comments.
 fn commands<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<String> {
     let joined = lines.collect::<Vec<_>>().join("\n").replace("\\\n", " ");
-    joined
-        .lines()
-        .map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "))
+    let spaced = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+    let lines = joined.lines().map(spaced);
+    lines
         .filter(|line| !line.is_empty() && !line.starts_with('#'))
         .collect()
 }
@@ -87,9 +89,9 @@ fn of_block(block: &Block) -> Vec<String> {
 }
 
 fn of_scripts() -> HashSet<String> {
-    SCRIPTS
+    let texts = SCRIPTS.map(|script| fs::read_to_string(top().join(script)).unwrap());
+    texts
         .iter()
-        .map(|script| fs::read_to_string(top().join(script)).unwrap())
         .flat_map(|text| commands(text.lines()))
         .collect()
 }
@@ -104,16 +106,11 @@ fn with_program(command: &str) -> Option<String> {
 /// A folder with the scenarios that come with the program and those of a page.
 fn workplace(page: &Page) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let kinds = fs::read_dir(top().join("scenarios")).unwrap();
-    let kinds = kinds.map(|kind| kind.unwrap().path());
-    for kind in kinds.filter(|kind| kind.is_dir()) {
-        let copies = folder
-            .path()
-            .join("scenarios")
-            .join(kind.file_name().unwrap());
+    let scenarios = folder.path().join("scenarios");
+    for kind in entries(&top().join("scenarios")).filter(|kind| kind.is_dir()) {
+        let copies = scenarios.join(kind.file_name().unwrap());
         fs::create_dir_all(&copies).unwrap();
-        for file in fs::read_dir(kind).unwrap() {
-            let file = file.unwrap().path();
+        for file in entries(&kind) {
             fs::copy(&file, copies.join(file.file_name().unwrap())).unwrap();
         }
     }
@@ -156,31 +153,22 @@ fn agree(shown: &str, printed: &str) -> bool {
 fn words(line: &str) -> Vec<&str> {
     let mut words = Vec::new();
     for word in line.split_whitespace() {
-        if ["s", "ms", "µs"].contains(&word) {
-            words.pop();
-        } else {
-            words.push(word);
+        match word {
+            "s" | "ms" | "µs" => drop(words.pop()),
+            word => words.push(word),
         }
     }
     words
 }
 
 fn assert_same_report(shown: &[String], printed: &str, command: &str) {
-    let printed: Vec<_> = printed.lines().collect();
-    assert_eq!(
-        shown.len(),
-        printed.len(),
-        "{command}\n{}",
-        printed.join("\n")
-    );
-    for (shown, printed) in shown.iter().zip(printed) {
+    assert_eq!(shown.len(), printed.lines().count(), "{command}\n{printed}");
+    for (shown, printed) in shown.iter().zip(printed.lines()) {
         let (a, b) = (words(shown), words(printed));
         let timed = TIMES.contains(&a[0]) && a[0] == b[0];
         let same = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| agree(a, b));
-        assert!(
-            timed || same,
-            "{command}\nshown   {shown}\nprinted {printed}"
-        );
+        let both = format!("shown   {shown}\nprinted {printed}");
+        assert!(timed || same, "{command}\n{both}");
     }
 }
 
@@ -191,28 +179,19 @@ fn every_command_runs_here_or_in_a_script() {
         let place = page.path.display();
         for block in &page.blocks {
             let known = ["sh", "text", "toml", "python", "rust"];
-            assert!(
-                known.contains(&block.language.as_str()),
-                "{place}: {}",
-                block.lines[0]
-            );
-            if block.language != "sh" {
-                continue;
-            }
+            let language = block.language.as_str();
+            assert!(known.contains(&language), "{place}: {}", block.lines[0]);
             for command in of_block(block) {
-                let runs = scripts.contains(&command)
-                    || command == TESTS
-                    || with_program(&command).is_some();
-                assert!(runs, "{place}: {command} runs nowhere");
+                let here = command == TESTS || with_program(&command).is_some();
+                let runs = here || scripts.contains(&command);
+                assert!(runs || language != "sh", "{place}: {command} runs nowhere");
             }
         }
-        let hidden = page
-            .prose
-            .iter()
-            .find(|line| line.contains("`leafdyn") && line.contains(".toml"));
+        let mut prose = page.prose.iter();
+        let hidden = prose.find(|line| line.contains("`leafdyn") && line.contains(".toml"));
         assert_eq!(
             hidden, None,
-            "{place}: a command that is not in a block of its own"
+            "{place}: a command without a block of its own"
         );
     }
 }
@@ -228,17 +207,13 @@ fn quick_commands_print_what_the_pages_show() {
                 continue;
             }
             let commands = of_block(block);
-            let shown = page
-                .blocks
-                .get(i + 1)
-                .filter(|next| next.language == "text" && commands.len() == 1);
+            let next = page.blocks.get(i + 1);
+            let shown = next.filter(|next| next.language == "text" && commands.len() == 1);
             for command in &commands {
-                let Some(runnable) = with_program(command) else {
+                let elsewhere = shown.is_none() && scripts.contains(command);
+                let Some(runnable) = with_program(command).filter(|_| !elsewhere) else {
                     continue;
                 };
-                if shown.is_none() && scripts.contains(command) {
-                    continue;
-                }
                 let printed = run(&runnable, folder.path());
                 if let Some(shown) = shown {
                     assert_same_report(&shown.lines, &printed, command);
@@ -276,10 +251,8 @@ fn links_lead_to_files_and_headings() {
             let place = page.path.display();
             assert!(target.exists(), "{place}: {link}");
             if !heading.is_empty() {
-                let headings = read(&target).prose;
-                let found = headings
-                    .iter()
-                    .any(|line| line.starts_with('#') && anchor(line) == heading);
+                let mut lines = read(&target).prose.into_iter();
+                let found = lines.any(|line| line.starts_with('#') && anchor(&line) == heading);
                 assert!(found, "{place}: {link}");
             }
         }

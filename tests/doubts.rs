@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{files, read, rod, settle};
+use common::*;
 
 /// What is said about the rod with these entries.
 fn said(entries: &str) -> Vec<String> {
@@ -11,10 +11,8 @@ fn said(entries: &str) -> Vec<String> {
 
 fn only(entries: &str, part: &str) {
     let said = said(entries);
-    assert!(
-        said.len() == 1 && said[0].contains(part),
-        "{entries}: {said:?}"
-    );
+    let named = said.len() == 1 && said[0].contains(part);
+    assert!(named, "{entries}: {said:?}");
 }
 
 #[test]
@@ -31,10 +29,8 @@ fn a_vein_that_is_stretched_far_is_named() {
 fn a_vein_turned_through_itself_is_named() {
     let soft =
         "stiffness.axial=1; stiffness.bending_2=50; stiffness.bending_3=50; stiffness.torsion=50";
-    only(
-        &format!("{soft}; load.tip_force=[-1.2, 0, 0]"),
-        "turned through itself",
-    );
+    let pushed = format!("{soft}; load.tip_force=[-1.2, 0, 0]");
+    only(&pushed, "turned through itself");
 }
 
 /// A leaf of a tenth of a metre, of 1e-4 N m^2, with the acceleration in place of its weight.
@@ -42,14 +38,12 @@ fn a_vein_turned_through_itself_is_named() {
 fn an_acceleration_in_place_of_a_weight_is_named() {
     let stiff = "stiffness.torsion=1e-6; stiffness.bending_2=1e-6; stiffness.bending_3=1e-6; leaf.length=0.1; \
                  stiffness.axial=1e3; stiffness.shear_2=1e3; stiffness.shear_3=1e3";
-    only(
-        &format!("{stiff}; load.gravity=[0, 0, -9.81]"),
-        "not the acceleration",
-    );
-    assert!(said(&format!("{stiff}; load.gravity=[0, 0, -9.81e-3]")).is_empty());
+    let weight = |weight: &str| format!("{stiff}; load.gravity=[0, 0, -{weight}]");
+    only(&weight("9.81"), "not the acceleration");
+    assert!(said(&weight("9.81e-3")).is_empty());
     // Another weight that no leaf of this length can carry.
-    only(&format!("{stiff}; load.gravity=[0, 0, -30.0]"), "check it");
-    assert!(said(&format!("{stiff}; load.gravity=[0, 0, -20.0]")).is_empty());
+    only(&weight("30.0"), "check it");
+    assert!(said(&weight("20.0")).is_empty());
 }
 
 /// Nothing is said about the leaves that come with the program, whose numbers are meant.
@@ -58,13 +52,8 @@ fn nothing_is_said_about_other_leaves() {
     for folder in ["paper", "classic", "motion", "study", "measured"] {
         let all = files(folder).into_iter();
         for file in all.filter(|file| file.extension().is_some_and(|it| it == "toml")) {
-            let leaf = settle(&read(&file, ""), 1e-4);
-            assert!(
-                leaf.doubts.is_empty(),
-                "{}: {:?}",
-                file.display(),
-                leaf.doubts
-            );
+            let doubts = settle(&read(&file, ""), 1e-4).doubts;
+            assert!(doubts.is_empty(), "{}: {doubts:?}", file.display());
         }
     }
 }

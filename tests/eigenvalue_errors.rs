@@ -3,8 +3,8 @@
 mod common;
 
 use common::random::{drawn, leaves};
-use leafdyn::relax::{Equilibrium, Mode, Options};
-use leafdyn::scenario::Scenario;
+use common::*;
+use leafdyn::relax::Mode;
 
 /// Random leaves, unless LEAFDYN_LEAVES asks for others.
 const LEAVES: usize = 30;
@@ -25,10 +25,9 @@ fn modes(leaf: &Equilibrium) -> &[Mode] {
 /// Against the same leaf to 1e-10, with and without more grids for the modes' shapes.
 #[test]
 fn stated_errors_of_eigenvalues_are_bounds() {
-    let leaves_asked = std::env::var("LEAFDYN_LEAVES").ok();
-    let count = leaves_asked.and_then(|text| text.parse().ok());
+    let count = asked("LEAFDYN_LEAVES", LEAVES);
     let mut compared = 0;
-    for (k, leaf) in drawn(leaves(), count.unwrap_or(LEAVES)).iter().enumerate() {
+    for (k, leaf) in drawn(leaves(), count).iter().enumerate() {
         let best = relaxed(leaf, 1e-10, true);
         for (tolerance, shapes) in [(1e-3, false), (1e-3, true), (1e-5, false), (1e-6, true)] {
             let found = relaxed(leaf, tolerance, shapes);
@@ -36,19 +35,12 @@ fn stated_errors_of_eigenvalues_are_bounds() {
                 continue;
             }
             for (mode, best) in modes(&found).iter().zip(modes(&best)) {
-                let (Some(error), Some(left)) = (mode.error, best.error) else {
-                    panic!("leaf {k} to {tolerance:e}: no error");
-                };
-                let off = (mode.eigenvalue - best.eigenvalue).abs();
-                assert!(
-                    off <= error + left,
-                    "leaf {k} to {tolerance:e}, shapes {shapes}: {} for {}, {off:e} > {error:e}",
-                    mode.eigenvalue,
-                    best.eigenvalue,
-                );
+                let (error, left) = (mode.error.unwrap(), best.error.unwrap());
+                let what = format!("leaf {k} to {tolerance:e}, shapes {shapes}");
+                close(&what, mode.eigenvalue, best.eigenvalue, error + left);
                 compared += 1;
             }
         }
     }
-    assert!(compared > 10 * count.unwrap_or(LEAVES), "{compared}");
+    assert!(compared > 10 * count, "{compared}");
 }

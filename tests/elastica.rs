@@ -6,11 +6,7 @@ mod common;
 use std::f64::consts::PI;
 
 use common::branch::follow;
-use common::{
-    Both, RIGID, ROD, TIGHT, close, scenario, set_stiffness, settle, shot_near, solve, table, tip,
-    tip_angle, tip_is, tip_node,
-};
-use glam::DVec3;
+use common::*;
 use leafdyn::study::PointKind;
 
 fn load(alpha: f64) -> String {
@@ -124,9 +120,8 @@ fn so_it_does_along_the_branches_that_leave_the_straight_one() {
         for end in ends {
             assert_eq!(end.index, 0);
             assert!((end.value - load).abs() < 1e-12);
-            let tip = end.tips[0];
-            let off = (tip.x - x).abs().max((tip.y.abs() - y).abs());
-            assert!(off < 1e-8, "{ratio}: {off:e}");
+            close("x", end.tips[0].x, *x, 1e-8);
+            close("y", end.tips[0].y.abs(), *y, 1e-8);
         }
         let sum = ends[0].tips[0].y + ends[1].tips[0].y;
         assert!(sum.abs() < 1e-8, "mirror images");

@@ -6,19 +6,9 @@ mod common;
 use std::time::Duration;
 
 use common::random::{drawn, leaves, uneven_leaves};
-use common::{apart, distance, files, kept, paper_leaf, read, relaxed, scenario, shot_near, to};
-use leafdyn::relax::Options;
-use leafdyn::scenario::Scenario;
+use common::*;
 
 const TOLERANCES: [f64; 6] = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9];
-
-/// How many random leaves are tried: `LEAFDYN_LEAVES`, if it is set.
-fn leaves_or(default: usize) -> usize {
-    let count = std::env::var("LEAFDYN_LEAVES").ok();
-    count
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(default)
-}
 
 /// Farther from the truth, in lengths, is another equilibrium, where there are several: its
 /// truth is the boundary-value solution there.
@@ -38,10 +28,6 @@ impl Verdict {
     /// itself uncertain by its own estimate: with an eigenvalue, for which grids are
     /// extrapolated and nothing is taken off.
     fn judge(&mut self, name: &str, scenario: &Scenario) {
-        let at_every_node = |tolerance| Options {
-            every_node: true,
-            ..to(tolerance)
-        };
         let truth = Options {
             modes: 1,
             ..at_every_node(1e-10)
@@ -51,9 +37,8 @@ impl Verdict {
             let outcome = truth.outcome;
             return self.wrong.push(format!("{name} at 1e-10: {outcome:?}"));
         }
-        let lengths = scenario.rods.iter().map(|rod| rod.length);
-        let length = lengths.fold(0.0, f64::max);
-        let uncertain = truth.accuracy.error_estimate.unwrap();
+        let length = largest(scenario.rods.iter().map(|rod| rod.length));
+        let uncertain = estimate(&truth);
         for tolerance in TOLERANCES {
             let leaf = relaxed(scenario, &at_every_node(tolerance));
             if !leaf.outcome.is_success() {
@@ -61,7 +46,7 @@ impl Verdict {
                 self.wrong.push(wrong);
                 continue;
             }
-            let estimate = leaf.accuracy.error_estimate.unwrap();
+            let estimate = estimate(&leaf);
             let mut error = distance(&leaf, &truth);
             if error > ANOTHER * length {
                 let shot = shot_near(scenario, &leaf);
@@ -69,9 +54,10 @@ impl Verdict {
                 self.others += 1;
             }
             if error > estimate + uncertain || estimate > tolerance * length {
+                let found = format!("error {error:.1e}, estimate {estimate:.3e}");
+                let grids = leaf.accuracy.segments;
                 self.wrong.push(format!(
-                    "{name} at {tolerance:e}, length {length:.3}: error {error:.1e}, estimate {estimate:.3e} on {:?}",
-                    leaf.accuracy.segments
+                    "{name} at {tolerance:e}, length {length:.3}: {found} on {grids:?}"
                 ));
             }
             if error > 10.0 * uncertain {
@@ -90,13 +76,7 @@ impl Verdict {
         let others = self.others;
         println!("{what}: {count} estimates / errors: {quantiles:.2?}; {sharp} within 12");
         println!("{others} of other equilibria");
-        let wrong = self.wrong;
-        assert!(
-            wrong.is_empty(),
-            "{} wrong:\n{}",
-            wrong.len(),
-            wrong.join("\n")
-        );
+        assert!(self.wrong.is_empty(), "{:#?}", self.wrong);
         assert!(count > 10 && 10 * sharp >= 9 * count, "{sharp} of {count}");
         assert!(100 * others <= count, "{others} of {count}");
     }
@@ -105,11 +85,9 @@ impl Verdict {
 #[test]
 fn of_the_papers_leaves_with_five_veins() {
     let mut verdict = Verdict::default();
-    for figure in [
-        "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
-    ] {
+    for figure in [4, 5, 6, 8, 9, 10, 13].map(|figure| format!("fig{figure:02}")) {
         let scenario = scenario(&format!("paper/{figure}"), "leaf.rods=5");
-        verdict.judge(figure, &scenario);
+        verdict.judge(&figure, &scenario);
     }
     // Its bend near the base is between the nodes of the coarsest grid.
     verdict.judge("undulation", &scenario("study/undulation", ""));
@@ -139,11 +117,8 @@ fn of_boundary_layers() {
         }
     }
     for load in [10.0, 100.0, 1000.0] {
-        for force in [
-            [load, 0.0, 0.1 * load],
-            [0.0, 0.0, load],
-            [-load, 0.0, 0.5 * load],
-        ] {
+        for force in [[1.0, 0.0, 0.1], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.5]] {
+            let force = force.map(|part| part * load);
             for rods in [1, 3] {
                 let mut leaf = paper_leaf(rods, [1.0; 3], [f64::INFINITY; 3], 0.0);
                 leaf.tip_force = force;
@@ -160,7 +135,8 @@ fn of_boundary_layers() {
 #[test]
 fn of_random_leaves() {
     let mut verdict = Verdict::default();
-    for (case, leaf) in drawn(leaves(), leaves_or(200)).iter().enumerate() {
+    let count = asked("LEAFDYN_LEAVES", 200);
+    for (case, leaf) in drawn(leaves(), count).iter().enumerate() {
         verdict.judge(&format!("leaf {case}"), leaf);
     }
     verdict.assert("random");
@@ -175,11 +151,12 @@ fn of_a_saddle_that_is_kept() {
         let [truth, saddle] = [1e-10, tolerance].map(|tolerance| kept(&pushed, tolerance));
         let grids = &saddle.accuracy.segments;
         assert!(grids.is_sorted(), "{k}, {tolerance:e}: {grids:?}");
-        let [estimate, uncertain] =
-            [&saddle, &truth].map(|leaf| leaf.accuracy.error_estimate.unwrap());
+        let (told, uncertain) = (estimate(&saddle), estimate(&truth));
         let error = distance(&saddle, &truth);
-        let what = format!("{k}, {tolerance:e}: {error:e}, {estimate:e}");
-        assert!(error <= estimate + uncertain, "{what}");
+        assert!(
+            error <= told + uncertain,
+            "{k}, {tolerance:e}: {error:e}, {told:e}"
+        );
     }
 }
 
@@ -194,10 +171,10 @@ fn at_the_edge(leaf: &Scenario) -> Option<(f64, f64, Vec<usize>)> {
         found.outcome.is_success().then_some(found)
     };
     let (found, truth) = (to((1e-6, 0))?, to((1e-10, 1))?);
-    let [estimate, uncertain] = [&found, &truth].map(|leaf| leaf.accuracy.error_estimate.unwrap());
+    let (told, uncertain) = (estimate(&found), estimate(&truth));
     let error = distance(&found, &truth);
     // Where there are several equilibria, each is one.
-    (error < 0.01).then_some((error - uncertain, estimate, found.accuracy.segments))
+    (error < 0.01).then_some((error - uncertain, told, found.accuracy.segments))
 }
 
 /// Leaves at the edge of what could be one, of which some do not come to rest: in
@@ -205,7 +182,7 @@ fn at_the_edge(leaf: &Scenario) -> Option<(f64, f64, Vec<usize>)> {
 /// error shows.
 #[test]
 fn of_leaves_of_uneven_stiffness() {
-    let count = leaves_or(40);
+    let count = asked("LEAFDYN_LEAVES", 40);
     let (mut judged, mut wrong) = (0, Vec::new());
     for (case, leaf) in drawn(uneven_leaves(), count).iter().enumerate() {
         if let Some((error, estimate, grids)) = at_the_edge(leaf) {
@@ -215,10 +192,8 @@ fn of_leaves_of_uneven_stiffness() {
         }
     }
     println!("{} of {judged} estimates too low", wrong.len());
-    assert!(
-        2 * judged > count && wrong.is_empty(),
-        "{judged}: {wrong:#?}"
-    );
+    let enough = 2 * judged > count;
+    assert!(enough && wrong.is_empty(), "{judged}: {wrong:#?}");
 }
 
 /// Between the nodes of the coarsest grid its error is thirty times that at the nodes.

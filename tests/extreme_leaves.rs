@@ -6,12 +6,15 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
-use common::{close, fig04, linear, paper_leaf, settle, tip};
-use glam::DVec3;
-use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Profile, Scenario};
+use common::*;
 
 const RIGID: [f64; 3] = [f64::INFINITY; 3];
+
+/// Under other loads than its own.
+fn loaded(mut leaf: Scenario, gravity: [f64; 3], tip_force: [f64; 3]) -> Scenario {
+    (leaf.gravity, leaf.tip_force) = (gravity, tip_force);
+    leaf
+}
 
 fn fan(angles: &[f64], force_stiffness: [f64; 3], weight: f64) -> Scenario {
     let mut leaf = paper_leaf(angles.len(), [1.0; 3], force_stiffness, weight);
@@ -48,12 +51,8 @@ fn a_fan_that_is_closed() {
         single.tip_force = [0.1, 0.2, 0.4];
         let (all, one) = (stable(&closed, 1e-10), stable(&single, 1e-10));
         assert!((tip(&all) - tip(&one)).length() < 1e-10);
-        close(
-            "energy",
-            all.energy.unwrap(),
-            5.0 * one.energy.unwrap(),
-            1e-9,
-        );
+        let [all, one] = [all, one].map(|leaf| leaf.energy.unwrap());
+        close("energy", all, 5.0 * one, 1e-9);
     }
 }
 
@@ -93,12 +92,8 @@ fn opposite_rods_and_stars() {
         assert!(tip(&upright).y.abs() < 1e-8);
         let [one, other] = [&upright, &pair].map(|leaf| tip(leaf).length());
         close("the same pair", one, other, 1e-7);
-        close(
-            "the same pair",
-            upright.energy.unwrap(),
-            pair.energy.unwrap(),
-            1e-6,
-        );
+        let [one, other] = [&upright, &pair].map(|leaf| leaf.energy.unwrap());
+        close("the same pair", one, other, 1e-6);
 
         let six: Vec<f64> = (0..6).map(|k| k as f64 * FRAC_PI_3).collect();
         let star = stable(&fan(&six, stiffness, 1.0), 1e-8);
@@ -125,9 +120,8 @@ fn angles_that_go_round_more_than_once() {
 #[test]
 fn round_columns() {
     let both = |force: f64, weight: f64| {
-        let mut round = fan(&[0.0], RIGID, 0.0);
-        round.tip_force = [-force, 0.0, 0.0];
-        round.gravity = [-weight, 0.0, 0.0];
+        let [gravity, tip_force] = [weight, force].map(|load| [-load, 0.0, 0.0]);
+        let round = loaded(fan(&[0.0], RIGID, 0.0), gravity, tip_force);
         let mut strip = round.clone();
         strip.rods[0].couple_stiffness[1] = Profile::Constant(2.0);
         let both = [round, strip].map(|rod| stable(&rod, 1e-8));
@@ -227,20 +221,22 @@ fn veins_wound_up_at_rest() {
 
 #[test]
 fn loads_from_all_sides() {
-    let loaded = |gravity, tip_force| {
-        let mut leaf = fig04(5);
-        leaf.gravity = gravity;
-        leaf.tip_force = tip_force;
-        stable(&leaf, 1e-6);
-    };
-    loaded([0.0, 0.0, 10.0], [0.0; 3]);
-    loaded([-50.0, 0.0, 0.0], [0.0; 3]);
-    loaded([0.0, 0.0, -1000.0], [0.0; 3]);
-    loaded([1000.0, 0.0, 0.0], [0.0; 3]);
-    loaded([0.0; 3], [-100.0, 0.0, 0.0]);
-    loaded([0.0; 3], [-1000.0, 0.0, 0.0]);
-    loaded([0.0; 3], [1e5, 0.0, 1.0]);
-    loaded([0.0; 3], [0.0, 100.0, 0.0]);
+    for weight in [
+        [0.0, 0.0, 10.0],
+        [-50.0, 0.0, 0.0],
+        [0.0, 0.0, -1e3],
+        [1e3, 0.0, 0.0],
+    ] {
+        stable(&loaded(fig04(5), weight, [0.0; 3]), 1e-6);
+    }
+    for force in [
+        [-100.0, 0.0, 0.0],
+        [-1e3, 0.0, 0.0],
+        [1e5, 0.0, 1.0],
+        [0.0, 100.0, 0.0],
+    ] {
+        stable(&loaded(fig04(5), [0.0; 3], force), 1e-6);
+    }
     // Inextensible rods, pulled: they point where the force does.
     for force in [1e3, 1e4, 1e5] {
         let mut rod = fan(&[0.0], RIGID, 0.0);

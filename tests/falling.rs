@@ -2,22 +2,17 @@
 
 mod common;
 
-use common::{entries, path};
+use common::branch::{text, weightless};
+use common::*;
 use leafdyn::internals::branch::{Equations, Family};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
 use leafdyn::internals::relax::{settle_from, start};
 use leafdyn::relax::Limit;
-use leafdyn::study::Base;
 
 /// The flat leaf of the study of undulation, far beyond its boundary, to rounding.
 #[test]
 fn a_leaf_falls_off_a_saddle_that_it_stands_on_exactly() {
-    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
-    let weak = [0.146; 5].map(|ei| format!("{ei}")).join(",");
-    let set = format!(
-        "load.gravity=[0,0,0]; stiffness.torsion=1.59; stiffness.bending_2=[{weak},1000,{weak}]"
-    );
-    let base = Base::of_text(text, "test.toml".into(), &entries(&set)).unwrap();
+    let base = base(&text("study/undulation"), &weightless(0.146, 1.59));
     let scenario = base.scenario();
     let make = |_| Ok(scenario.clone());
     let family = Family::new(&make, (0.0, 1.0), false).unwrap();

@@ -1,22 +1,17 @@
 //! The figure of a trace: what can be chosen, what is left out, and that nothing in it
 //! covers or leaves anything else.
 
-use std::fs;
-use std::process::Command;
+mod workplace;
 
-use assert_cmd::cargo::cargo_bin;
-use tempfile::TempDir;
+use workplace::{Workplace, contains};
 
 /// The figure of a trace of these arguments.
-fn figure(arguments: &[&str]) -> String {
-    let folder = TempDir::new().unwrap();
-    let mut command = Command::new(cargo_bin!("leafdyn"));
-    command.arg("trace").args(arguments);
-    command.args(["--write", "svg", "--out"]).arg(folder.path());
-    let done = command.output().unwrap();
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{arguments:?}: {said}");
-    fs::read_to_string(folder.path().join("trace.svg")).unwrap()
+fn figure(arguments: &str) -> String {
+    let place = Workplace::new();
+    place
+        .run(format!("trace {arguments} --write svg --out out"))
+        .ends(0);
+    place.read("out/trace.svg")
 }
 
 /// What the groups of a name hold.
@@ -38,28 +33,22 @@ fn texts(group: &str) -> Vec<(String, [f64; 2])> {
     let tags = group.split("<text").skip(1);
     let placed = tags.filter_map(|tag| {
         let text = tag.split('>').nth(1)?.split('<').next()?;
-        Some((
-            text.to_string(),
-            [attribute(tag, " x")?, attribute(tag, " y")?],
-        ))
+        let at = [attribute(tag, " x")?, attribute(tag, " y")?];
+        Some((text.to_string(), at))
     });
     placed.collect()
 }
 
 /// Pitchforks: a leaf of two veins that is pushed in its plane.
-const PITCHFORK: [&str; 4] = [
-    "scenarios/classic/lens_coupled.toml",
-    "--vary",
-    "load.tip_force[0]=0..-5",
-    "--switch",
-];
+const PITCHFORK: &str =
+    "scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-5 --switch";
 
 #[test]
 fn the_quantity_is_chosen_and_each_has_a_panel() {
-    let svg = figure(&PITCHFORK);
+    let svg = figure(PITCHFORK);
     assert_eq!(groups(&svg, "branches").len(), 1);
     assert!(svg.contains(">z of the tip<"));
-    let svg = figure(&[&PITCHFORK[..], &["--show", "x,energy,twist"]].concat());
+    let svg = figure(&format!("{PITCHFORK} --show x,energy,twist"));
     let panels = groups(&svg, "branches");
     assert_eq!(panels.len(), 3);
     // A twist that is rounding is drawn as none: its axis is wider.
@@ -71,47 +60,37 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
 
 #[test]
 fn the_key_and_the_title_name_what_there_is() {
-    let svg = figure(&PITCHFORK);
-    assert!(svg.contains("stable drawn solid, unstable dashed") && svg.contains("branches cross"));
-    assert!(!svg.contains(">fold<"));
-    let plain = [
-        "scenarios/classic/lens_coupled.toml",
-        "--vary",
-        "load.tip_force[0]=0..-1",
-    ];
-    let svg = figure(&plain);
-    assert!(svg.contains(">stable equilibria<"));
-    assert!(
-        !svg.contains("unstable")
-            && !svg.contains("branches cross")
-            && !svg.contains("stroke-dasharray")
+    let svg = figure(PITCHFORK);
+    contains(
+        &svg,
+        &["stable drawn solid, unstable dashed", "branches cross"],
     );
+    assert!(!svg.contains(">fold<"));
+    let svg = figure("scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-1");
+    assert!(svg.contains(">stable equilibria<"));
+    for absent in ["unstable", "branches cross", "stroke-dasharray"] {
+        assert!(!svg.contains(absent), "{absent}");
+    }
 }
 
 #[test]
 fn leaves_that_look_the_same_are_drawn_once() {
     // From where the branches cross the flat leaf does not change any more.
-    let svg = figure(&PITCHFORK);
+    let svg = figure(PITCHFORK);
     let [leaves] = groups(&svg, "leaves")[..] else {
         panic!()
     };
-    let captions: Vec<String> = (texts(leaves).into_iter())
-        .map(|(text, _)| text)
-        .filter(|text| text.starts_with("at "))
-        .collect();
-    let alike = captions
-        .iter()
-        .filter(|caption| caption.contains("index 1"));
-    assert_eq!(alike.count(), 0, "{captions:?}");
-    let bent = captions
-        .iter()
-        .filter(|caption| caption.contains("\u{2212}5, stable"));
-    assert_eq!(bent.count(), 2, "{captions:?}");
+    let all = texts(leaves).into_iter().map(|(text, _)| text);
+    let captions: Vec<String> = all.filter(|text| text.starts_with("at ")).collect();
+    for (part, count) in [("index 1", 0), ("\u{2212}5, stable", 2)] {
+        let with = captions.iter().filter(|caption| caption.contains(part));
+        assert_eq!(with.count(), count, "{captions:?}");
+    }
 }
 
 #[test]
 fn numbers_beside_points_do_not_touch() {
-    let svg = figure(&PITCHFORK);
+    let svg = figure(PITCHFORK);
     let panel = groups(&svg, "branches")[0];
     let digits = |text: &str| text.chars().all(|c| c.is_ascii_digit() || ", ".contains(c));
     let numbers: Vec<(String, [f64; 2])> = (texts(panel).into_iter())
@@ -128,14 +107,12 @@ fn numbers_beside_points_do_not_touch() {
 
 #[test]
 fn what_varies_by_its_logarithm_has_a_logarithmic_axis() {
-    let leaf = ["scenarios/paper/fig04.toml", "--set", "leaf.rods=3"];
-    let svg = figure(&[&leaf[..], &["--vary", "load.gravity[2]=-0.1..-10log"]].concat());
-    let decades: Vec<f64> = ["\u{2212}10⁻¹", "\u{2212}10⁰", "\u{2212}10¹"]
-        .map(|decade| {
-            let found = texts(&svg).into_iter().find(|(text, _)| text == decade);
-            found.unwrap_or_else(|| panic!("{decade}")).1[0]
-        })
-        .into();
+    let leaf = "scenarios/paper/fig04.toml --set leaf.rods=3";
+    let svg = figure(&format!("{leaf} --vary load.gravity[2]=-0.1..-10log"));
+    let decades = ["\u{2212}10⁻¹", "\u{2212}10⁰", "\u{2212}10¹"].map(|decade| {
+        let found = texts(&svg).into_iter().find(|(text, _)| text == decade);
+        found.unwrap_or_else(|| panic!("{decade}")).1[0]
+    });
     let [first, second] = [decades[1] - decades[0], decades[2] - decades[1]];
     assert!((first - second).abs() < 0.1 && first > 100.0, "{decades:?}");
 }
@@ -150,46 +127,28 @@ fn numbers(path: &str) -> Vec<f64> {
 
 #[test]
 fn the_line_of_a_force_law_ends_within_its_frame() {
-    let svg = figure(&PITCHFORK);
+    let svg = figure(PITCHFORK);
     let [law] = groups(&svg, "law")[..] else {
         panic!()
     };
-    let line = law
-        .lines()
-        .find(|line| line.contains("stroke=\"#d55e00\""))
-        .unwrap();
-    let ends = numbers(line);
+    let path = |part: &str| numbers(law.lines().find(|line| line.contains(part)).unwrap());
+    let ends = path("stroke=\"#d55e00\"");
+    assert_eq!(ends.len(), 4);
     // The frame is the rectangle, the only closed path without a fill.
-    let frame = law
-        .lines()
-        .find(|line| line.contains("Z\" stroke"))
-        .unwrap();
-    let corners = numbers(frame);
-    let [left, top, right, _, _, bottom] = corners[..6] else {
-        panic!()
-    };
-    let [x0, y0, x1, y1] = ends[..] else {
-        panic!("{ends:?}")
-    };
+    let corners = path("Z\" stroke");
     // Not cut off at the frame, but ending inside.
-    for (x, y) in [(x0, y0), (x1, y1)] {
-        assert!(
-            x > left + 2.0 && x < right - 2.0,
-            "{x} in {left} to {right}"
-        );
-        assert!(
-            y > top + 2.0 && y < bottom - 2.0,
-            "{y} in {top} to {bottom}"
-        );
+    for end in ends.chunks(2) {
+        for (at, low, high) in [
+            (end[0], corners[0], corners[2]),
+            (end[1], corners[1], corners[5]),
+        ] {
+            assert!(at > low + 2.0 && at < high - 2.0, "{at} in {low} to {high}");
+        }
     }
 }
 
 #[test]
 fn a_force_that_moves_nothing_has_no_law() {
-    let svg = figure(&[
-        "scenarios/classic/elastica_buckled.toml",
-        "--vary",
-        "load.tip_force[0]=0..-2",
-    ]);
+    let svg = figure("scenarios/classic/elastica_buckled.toml --vary load.tip_force[0]=0..-2");
     assert!(groups(&svg, "law").is_empty());
 }

@@ -1,32 +1,22 @@
 //! A scenario of one's own, help from editor and shell, and what is offered where
 //! something is missing.
 
+mod workplace;
+
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use leafdyn::scenario::{Scenario, schema};
 use serde_json::Value;
-use tempfile::TempDir;
-
-fn leafdyn(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"));
-    command.current_dir(folder.path()).args(arguments).assert()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use workplace::{Workplace, contains};
 
 #[test]
 fn every_example_does_what_its_last_line_says() {
-    let folder = TempDir::new().unwrap();
+    let place = Workplace::empty();
     for example in ["leaf", "rod", "pull-test", "motion"] {
-        let said = leafdyn(&folder, &["new", example]).success();
-        let said = text(&said.get_output().stdout);
-        let next = said.lines().last().unwrap().trim().to_string();
-        let arguments: Vec<&str> = next.split(' ').skip(1).collect();
-        leafdyn(&folder, &arguments).success();
+        let said = place.run(format!("new {example}")).ends(0).out;
+        let next = said.lines().last().unwrap().trim();
+        place.run(next.strip_prefix("leafdyn ").unwrap()).ends(0);
     }
 }
 
@@ -45,61 +35,42 @@ fn the_way_of_a_newcomer_is_short_and_leads_to_a_page() {
     assert!(2 + commands.len() <= 5, "{commands:?}");
     let (install, own) = commands.split_first().unwrap();
     assert_eq!(*install, "cargo install --path .");
-    let folder = TempDir::new().unwrap();
+    let place = Workplace::empty();
     for command in own {
-        let mut words = command.split(' ');
-        assert_eq!(words.next(), Some("leafdyn"));
-        leafdyn(&folder, &words.collect::<Vec<_>>()).success();
+        place.run(command.strip_prefix("leafdyn ").unwrap()).ends(0);
     }
-    let page = "out/leaf/view.html";
-    assert!(way.contains(&format!("Open `{page}` in a browser")));
-    let page = fs::read_to_string(folder.path().join(page)).unwrap();
+    contains(way, &["Open `out/leaf/view.html` in a browser"]);
+    let page = place.read("out/leaf/view.html");
     assert!(page.contains("<canvas id=\"space\"") && page.ends_with("</html>\n"));
 }
 
 #[test]
 fn what_is_there_is_not_replaced() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("mine.toml");
-    fs::write(&file, "mine").unwrap();
-    let said = leafdyn(&folder, &["new", "rod", "mine.toml"]).code(2);
-    assert!(text(&said.get_output().stderr).contains("mine.toml: is there already"));
-    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+    let place = Workplace::empty();
+    place.write("mine.toml", "mine");
+    place.refuses("new rod mine.toml", "mine.toml: is there already");
+    assert_eq!(place.read("mine.toml"), "mine");
 }
 
 #[test]
 fn without_a_scenario_one_is_offered() {
-    let folder = TempDir::new().unwrap();
     for verb in ["relax", "simulate", "check"] {
-        let said = leafdyn(&folder, &[verb]).code(2);
-        let said = text(&said.get_output().stderr);
-        assert!(
-            said.contains("<SCENARIO>") && said.contains("leafdyn new leaf"),
-            "{said}"
-        );
+        let run = Workplace::empty().run(verb).ends(2);
+        contains(&run.err, &["<SCENARIO>", "leafdyn new leaf"]);
     }
 }
 
 #[test]
 fn shells_and_manuals_know_every_verb() {
-    let folder = TempDir::new().unwrap();
+    let place = Workplace::empty();
     for shell in ["bash", "zsh", "fish"] {
-        let said = leafdyn(&folder, &["completions", shell]).success();
-        let said = text(&said.get_output().stdout);
-        assert!(
-            said.contains("relax") && said.contains("keep-unstable"),
-            "{shell}"
-        );
+        let run = place.run(format!("completions {shell}")).ends(0);
+        run.says(&["relax", "keep-unstable"]);
     }
-    let said = leafdyn(&folder, &["man"]).success();
-    assert!(text(&said.get_output().stdout).contains("simulate"));
-    let said = leafdyn(&folder, &["man", "relax"]).success();
-    let said = text(&said.get_output().stdout);
-    assert!(
-        said.contains(".TH leafdyn\\-relax") || said.contains(".TH leafdyn-relax"),
-        "{said}"
-    );
-    leafdyn(&folder, &["man", "dance"]).code(2);
+    place.run("man").ends(0).says(&["simulate"]);
+    let manual = place.run("man relax").ends(0).out;
+    contains(&manual.replace("\\-", "-"), &[".TH leafdyn-relax"]);
+    place.run("man dance").ends(2);
 }
 
 /// What the schema refuses of a scenario: unknown keys and wrong types.
@@ -152,12 +123,10 @@ fn json(value: toml::Value) -> Value {
     match value {
         toml::Value::Float(number) => Value::from(if number.is_finite() { number } else { 1e300 }),
         toml::Value::Array(list) => list.into_iter().map(json).collect(),
-        toml::Value::Table(table) => Value::Object(
-            table
-                .into_iter()
-                .map(|(key, value)| (key, json(value)))
-                .collect(),
-        ),
+        toml::Value::Table(table) => {
+            let entries = table.into_iter().map(|(key, value)| (key, json(value)));
+            Value::Object(entries.collect())
+        }
         other => serde_json::to_value(other).unwrap(),
     }
 }
@@ -182,11 +151,8 @@ fn the_schema_fits_every_scenario_and_no_slip() {
     scenarios(&top.join("src/cli/examples"), &mut texts);
     assert!(texts.len() > 30);
     let judge = |text: &str| {
-        refused(
-            &schema,
-            &json(toml::Value::Table(text.parse().unwrap())),
-            "",
-        )
+        let scenario = json(toml::Value::Table(text.parse().unwrap()));
+        refused(&schema, &scenario, "")
     };
     for text in &texts {
         assert_eq!(judge(text), Vec::<String>::new(), "{text}");

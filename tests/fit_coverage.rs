@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::fit::{Noise, PULLS, VEIN, base, fitted, pulls, request};
+use common::fit::{PULLS, VEIN, fitted, pulls, request};
+use common::random::Draw;
+use common::*;
 use leafdyn::study::FitOutcome;
 use rayon::prelude::*;
 
@@ -32,32 +34,26 @@ const MANY: [[f64; 3]; 12] = [
 /// say so.
 fn covered(names: &[(&str, f64)], forces: &[[f64; 3]], otherwise: usize) -> [usize; 4] {
     let sd = 3e-3;
-    let leaves = std::env::var("LEAFDYN_LEAVES").ok();
-    let leaves = leaves
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(otherwise);
-    let one = |number: usize| -> [usize; 4] {
-        let mut noise = Noise(1_000_000 * number as u64 + 77);
-        let values = names
+    let leaves = asked("LEAFDYN_LEAVES", otherwise);
+    let (free, middles): (Vec<&str>, Vec<f64>) = names.iter().copied().unzip();
+    let set = |values: &[f64]| {
+        let entries = free
             .iter()
-            .map(|(_, middle)| middle * (1.6 * (noise.even() - 0.5)).exp());
-        let values: Vec<f64> = values.collect();
-        let entry = |((name, _), value): (&(&str, f64), &f64)| format!("{name}={value:?}");
-        let truth: Vec<String> = names.iter().zip(&values).map(entry).collect();
-        let truth: Vec<&str> = truth.iter().map(String::as_str).collect();
-        let mut data = pulls(VEIN, &truth, forces, sd, &mut noise);
+            .zip(values)
+            .map(|(name, value)| format!("{name}={value:?}"));
+        entries.collect::<Vec<_>>().join("; ")
+    };
+    let one = |number: usize| -> [usize; 4] {
+        let mut noise = Draw(1_000_000 * number as u64 + 77);
+        let mut drawn = |middle: f64| middle * (1.6 * (noise.even() - 0.5)).exp();
+        let values: Vec<f64> = middles.iter().map(|middle| drawn(*middle)).collect();
+        let mut data = pulls(VEIN, &set(&values), forces, sd, &mut noise);
         if number % 2 == 1 {
             // The same without their deviations.
             let line = |line: &str| line.split(',').take(6).collect::<Vec<_>>().join(",");
             data = data.lines().map(line).collect::<Vec<_>>().join("\n");
         }
-        let start: Vec<String> = names
-            .iter()
-            .map(|(name, middle)| format!("{name}={middle:?}"))
-            .collect();
-        let start: Vec<&str> = start.iter().map(String::as_str).collect();
-        let free: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-        let found = fitted(&request(base(VEIN, &start), &[&data], &free));
+        let found = fitted(&request(base(VEIN, &set(&middles)), &[&data], &free));
         let mut counts = [0; 4];
         if found.outcome == FitOutcome::NotConverged {
             println!("{number}: {:?}", found.remarks);
@@ -65,13 +61,11 @@ fn covered(names: &[(&str, f64)], forces: &[[f64; 3]], otherwise: usize) -> [usi
         }
         for (parameter, truth) in found.parameters.iter().zip(values) {
             counts[2] += 1;
-            let (Some(low), Some(high), true) =
-                (parameter.low, parameter.high, parameter.determined)
-            else {
-                continue;
-            };
-            counts[1] += 1;
-            counts[0] += usize::from((low..=high).contains(&truth));
+            let ends = parameter.low.zip(parameter.high);
+            if let Some((low, high)) = ends.filter(|_| parameter.determined) {
+                counts[1] += 1;
+                counts[0] += usize::from((low..=high).contains(&truth));
+            }
         }
         counts
     };

@@ -4,13 +4,10 @@
 
 mod common;
 
-use common::motion::run;
-use common::{
-    ROD, TIGHT, agree, apart, in_full, parse, relaxed, settle, shot_alone, shot_near, to,
-};
-use leafdyn::relax::{Method, Options};
-use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{self, Scheme};
+use common::motion::{BOTH, run};
+use common::*;
+use leafdyn::relax::Method;
+use leafdyn::simulate;
 
 /// A rod of length two.
 fn rod(overrides: &str) -> Scenario {
@@ -23,8 +20,8 @@ fn leaf(g: f64, in_stretch: bool) -> Scenario {
     let (long, stretch) = if in_stretch { (1.0, g) } else { (g, 1.0) };
     let (per, times) = (1.0 / long, long);
     let list = |values: &[f64], factor: f64| {
-        let values: Vec<String> = values.iter().map(|v| format!("{:?}", v * factor)).collect();
-        format!("[{}]", values.join(", "))
+        let values: Vec<f64> = values.iter().map(|v| v * factor).collect();
+        format!("{values:?}")
     };
     parse(&format!(
         r#"
@@ -81,10 +78,8 @@ fn a_rigid_vein_keeps_its_stretch_under_load() {
 
 #[test]
 fn tension_adds_to_growth() {
-    let leaf = settle(
-        &rod("rest.stretch=1.4; load.tip_force=[5.0, 0.0, 0.0]"),
-        TIGHT,
-    );
+    let pulled = rod("rest.stretch=1.4; load.tip_force=[5.0, 0.0, 0.0]");
+    let leaf = settle(&pulled, TIGHT);
     assert!((leaf.tips[0].x - 2.0 * (1.4 + 0.05)).abs() < 1e-13);
     let mut nodes = leaf.shape.rods[0].nodes.iter();
     assert!(nodes.all(|node| (node.n.x - 5.0).abs() < 1e-12));
@@ -101,10 +96,8 @@ fn it_is_a_longer_and_stiffer_leaf() {
         let tips = a.tips[0] - b.tips[0];
         assert!(tips.length() < 1e-9, "{g}: {tips}");
         assert!((a.energy.unwrap() - b.energy.unwrap()).abs() < 1e-9, "{g}");
-        assert_eq!(
-            a.stability.negative_eigenvalues,
-            b.stability.negative_eigenvalues
-        );
+        let [one, other] = [&a, &b].map(|leaf| leaf.stability.negative_eigenvalues);
+        assert_eq!(one, other);
         for (a, b) in a.shape.rods.iter().zip(&b.shape.rods) {
             for (a, b) in a.nodes.iter().zip(&b.nodes) {
                 assert!((a.position - b.position).length() < 1e-9);
@@ -119,7 +112,7 @@ fn it_is_a_longer_and_stiffer_leaf() {
 /// The same while it moves, with friction inside and out.
 #[test]
 fn and_moves_like_it() {
-    for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
+    for scheme in BOTH {
         let [a, b] = [true, false].map(|in_stretch| {
             let scenario = leaf(1.2, in_stretch);
             let options = simulate::Options {
@@ -172,18 +165,13 @@ fn relaxation_and_shooting_agree_on_lists_and_profiles() {
 fn explicit_motion_agrees() {
     for entry in GROWN {
         let scenario = fan(entry);
-        let rest = |method: Method| {
-            let options = Options {
-                method: method.on_grid(Some(16)),
-                ..Options::default()
-            };
-            relaxed(&scenario, &options)
+        let explicit = Options {
+            method: Method::Explicit { segments: Some(16) },
+            ..Options::default()
         };
-        let (explicit, implicit) = (
-            rest(Method::Explicit { segments: None }),
-            rest(Method::default()),
-        );
-        let apart = apart(&scenario, &explicit.shape.rods, &implicit.shape.rods).position;
+        let [explicit, implicit] =
+            [explicit, on(16)].map(|how| relaxed(&scenario, &how).shape.rods);
+        let apart = apart(&scenario, &explicit, &implicit).position;
         assert!(apart < 1e-8, "{entry}: {apart:.1e}");
     }
 }
@@ -200,19 +188,17 @@ fn a_mirrored_leaf_is_solved_by_half() {
 
 #[test]
 fn impossible_growth_is_refused() {
-    for (value, part) in [
-        ("0.0", "must be greater than 0"),
-        ("-1.0", "must be greater than 0"),
-        ("inf", "rest.stretch"),
-        ("2e3", "v0 = 2.000e3, the limit is 1e3"),
-        ("1e-4", "v0 = 1.000e-4, the limit is 1e-3"),
-        ("[1.0, 1.0]", "rest.stretch"),
-        ("'long'", "rest.stretch"),
-        (
-            "{ at = [0.0, 1.0], value = [1.0, 0.0] }",
-            "must be greater than 0",
-        ),
-    ] {
+    let table = "
+        0.0 => must be greater than 0
+        -1.0 => must be greater than 0
+        inf => rest.stretch
+        2e3 => v0 = 2.000e3, the limit is 1e3
+        1e-4 => v0 = 1.000e-4, the limit is 1e-3
+        [1.0, 1.0] => rest.stretch
+        'long' => rest.stretch
+        { at = [0.0, 1.0], value = [1.0, 0.0] } => must be greater than 0
+    ";
+    for (value, part) in pairs(table) {
         let entry = format!("rest.stretch={value}");
         let refused = Scenario::from_toml_with(ROD, "rod", &[entry]).unwrap_err();
         let message = refused.to_string();

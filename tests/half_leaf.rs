@@ -5,9 +5,8 @@
 mod common;
 
 use common::random::{cases, leaves};
-use common::{on, relaxed, rest, same, scale, scenario, set_stiffness};
+use common::*;
 use leafdyn::relax::Outcome;
-use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
 use proptest::prelude::*;
 
@@ -48,8 +47,7 @@ proptest! {
     #[test]
     fn half_a_leaf_is_the_leaf(leaf in leaves(), odd in prop::bool::ANY) {
         let leaf = mirrored(leaf, odd);
-        let segments = Some(20);
-        let (half, whole) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+        let [half, whole] = reduced_and_full(&leaf, Some(20));
         prop_assert_eq!(half.outcome, whole.outcome);
         prop_assert_eq!(whole.model.rods, leaf.rods.len());
         prop_assert_eq!(half.stability.negative_eigenvalues, whole.stability.negative_eigenvalues);
@@ -67,23 +65,21 @@ fn the_paper_s_firm_leaves_are_found_by_half() {
         for (rods, solved) in [(2, 1), (4, 2), (5, 3), (21, 11)] {
             let (figure, rods_are) = (format!("paper/{figure}"), format!("leaf.rods={rods}"));
             let leaf = scenario(&figure, &format!("{rods_are}; leaf.fan='symmetric'"));
-            let half = rest(&leaf, false, None);
+            let [half, whole] = reduced_and_full(&leaf, None);
             assert_eq!(half.model.rods, solved, "{figure}, {rods}");
             assert_eq!(half.outcome, Outcome::Converged);
             assert_eq!(half.stability.negative_eigenvalues, Some(0));
             assert_eq!(half.shape.rods.len(), rods);
-            let whole = rest(&leaf, true, None);
             let apart = Difference::between(&half.shape.rods, &whole.shape.rods);
-            let [a, b] = [&half, &whole].map(|leaf| leaf.accuracy.error_estimate.unwrap());
             let bound = match half.accuracy.segments == whole.accuracy.segments {
                 // Both end their iterations five thousandths of the tolerance away.
                 true => 1e-8,
-                false => a + b,
+                false => estimate(&half) + estimate(&whole),
             };
             assert!(apart.position < bound, "{figure}, {rods}: {apart:?}");
             // The fan of the paper is not symmetric: nothing is left out there.
-            let own = scenario(&figure, &rods_are);
-            assert_eq!(rest(&own, false, None).model.rods, rods);
+            let own = relaxed(&scenario(&figure, &rods_are), &Options::default());
+            assert_eq!(own.model.rods, rods);
         }
     }
 }
@@ -95,16 +91,14 @@ fn a_leaf_that_breaks_its_mirror_is_followed() {
     for rods in [2, 3, 4] {
         let soft = "leaf.fan='symmetric'; stiffness.bending_3=0.05; load.tip_force=[-2.0, 0, 0]";
         let leaf = scenario("paper/fig04", &format!("leaf.rods={rods}; {soft}"));
-        let (found, whole) = (rest(&leaf, false, None), rest(&leaf, true, None));
+        let [found, whole] = reduced_and_full(&leaf, None);
         assert!(found.outcome.is_success(), "{rods}: {:?}", found.outcome);
         assert_eq!(found.stability.negative_eigenvalues, Some(0), "{rods}");
         assert_eq!(found.model.rods, rods);
         assert!(found.tips[0].y.abs() > 0.1, "{rods}: {}", found.tips[0]);
         // To one side or to the other.
-        assert!(
-            (found.energy.unwrap() - whole.energy.unwrap()).abs() < 1e-6,
-            "{rods}"
-        );
+        let [found, whole] = [found, whole].map(|leaf| leaf.energy.unwrap());
+        close(&format!("{rods} rods"), found, whole, 1e-6);
     }
 }
 
@@ -124,10 +118,9 @@ fn what_shear_and_stretch_matter_is_told() {
             (leaf.model.stretch_effect, with(f64::INFINITY, 1e4)),
         ] {
             let effect = effect.unwrap();
-            let apart = (leaf.shape.rods.iter().zip(&other.shape.rods))
-                .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
-                .map(|(a, b)| (a.position - b.position).abs().max_element())
-                .fold(0.0, f64::max);
+            let pairs = nodes(&leaf.shape.rods).zip(nodes(&other.shape.rods));
+            let apart = pairs.map(|(a, b)| (a.position - b.position).abs().max_element());
+            let apart = largest(apart);
             let ratio = effect / apart;
             assert!((ratio - 1.0).abs() < 0.03, "{figure}: {effect} {apart}");
         }

@@ -6,8 +6,7 @@ mod common;
 use std::f64::consts::PI;
 
 use common::branch::{changes_at, follow, text};
-use common::{NEUTRAL, close, critical_of_rigid, scenario, set_stiffness, settle, settle_on, tip};
-use leafdyn::scenario::Scenario;
+use common::*;
 
 fn hanging(curvature: f64, weight: f64, stiffness: f64) -> Scenario {
     let stiffness = set_stiffness(stiffness, stiffness);

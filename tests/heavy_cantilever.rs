@@ -3,8 +3,7 @@
 
 mod common;
 
-use common::{Both, TIGHT, close, set_stiffness, solve, table, tip, tip_angle};
-use glam::DVec3;
+use common::*;
 
 /// Gamma = w L^3/EI; x, y of the tip and their ratio. Collocation on the
 /// boundary-value problem, two meshes.

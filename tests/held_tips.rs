@@ -6,15 +6,12 @@ mod common;
 use std::f64::consts::{PI, TAU};
 
 use common::branch::{changes_at, follow};
+use common::motion::{BOTH, moving};
 use common::random::{drawn, leaves};
-use common::{
-    ROD, TIGHT, agree, close, entries, relaxed, scale, set_stiffness, settle, settled, shot_near,
-    to,
-};
-use glam::DVec3;
-use leafdyn::relax::{Method, Options};
-use leafdyn::scenario::{Clamp, HeldTip, Scenario};
-use leafdyn::simulate::{self, Frame, Scheme, Simulation};
+use common::*;
+use leafdyn::relax::Method;
+use leafdyn::scenario::{Clamp, HeldTip};
+use leafdyn::simulate::{Frame, Simulation};
 
 /// The text of a rod whose tip is held where it is at rest.
 fn held(how: &str) -> String {
@@ -25,33 +22,37 @@ fn held_rod(how: &str, overrides: &str) -> Scenario {
     Scenario::from_toml_with(&held(how), "held", &entries(overrides)).unwrap()
 }
 
+/// How a column is held, and Euler's load of it.
+const EULER: [(&str, f64); 2] = [
+    ("clamped", 39.47841760435743),
+    ("pinned", 20.19072855642663),
+];
+
+/// What the holder feels.
+fn held_by(leaf: &Equilibrium) -> DVec3 {
+    leaf.reaction.as_ref().unwrap().force
+}
+
+/// And of moments, of a clamp.
+fn moment_held(leaf: &Equilibrium) -> DVec3 {
+    leaf.reaction.as_ref().unwrap().moments.as_ref().unwrap()[0]
+}
+
 /// Euler's loads P_E of the clamped-clamped and the clamped-pinned column, as the
 /// grip's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
 #[test]
 fn columns_buckle_at_eulers_loads() {
-    for (how, load) in [
-        ("clamped", 39.47841760435743),
-        ("pinned", 20.19072855642663),
-    ] {
-        let stiff = format!(
-            "{}; stiffness.bending_2=3.0",
-            set_stiffness(1e3, f64::INFINITY)
-        );
+    for (how, load) in EULER {
+        let stiffness = set_stiffness(1e3, f64::INFINITY);
+        let stiff = format!("{stiffness}; stiffness.bending_2=3.0");
         let load = 500.0 * (1.0 - (1.0_f64 - 4e-3 * load).sqrt());
         let buckled = 1.0 - load / 1e3;
-        let to = 1.0 - 1.4 * load / 1e3;
-        let found = follow(
-            &held(how),
-            &stiff,
-            &format!("tip.position[0]=1.0..{to}"),
-            false,
-        );
-        let critical = [(buckled, 1)];
-        changes_at(how, &found, &critical, 1e-10);
+        let travel = format!("tip.position[0]=1.0..{}", 1.0 - 1.4 * load / 1e3);
+        let found = follow(&held(how), &stiff, &travel, false);
+        changes_at(how, &found, &[(buckled, 1)], 1e-10);
         // Just before, the holder bears it.
         let before = format!("{stiff}; tip.position=[{}, 0, 0]", buckled + 1e-9);
-        let leaf = settle(&held_rod(how, &before), TIGHT);
-        let force = leaf.reaction.unwrap().force;
+        let force = held_by(&settle(&held_rod(how, &before), TIGHT));
         assert!((force - DVec3::X * load).length() < 1e-5, "{force}");
     }
 }
@@ -60,21 +61,15 @@ fn columns_buckle_at_eulers_loads() {
 /// when the moment M that twists it has tan(M L/2B) = M L/2B.
 #[test]
 fn a_twisted_rod_becomes_unstable_in_two_directions() {
-    let torsion = 0.8;
-    let stiff = format!(
-        "{}; stiffness.torsion={torsion}",
-        set_stiffness(1e8, f64::INFINITY)
-    );
+    let (torsion, stiffness) = (0.8, set_stiffness(1e8, f64::INFINITY));
+    let stiff = format!("{stiffness}; stiffness.torsion={torsion}");
     let found = follow(&held("clamped"), &stiff, "tip.twist=0..14", false);
     let twist = 8.986818915818128 / torsion;
     changes_at("twist", &found, &[(twist, 2)], 1e-8);
     // More than a turn counts, and the clamp feels the moment.
-    let leaf = settle(
-        &held_rod("clamped", &format!("{stiff}; tip.twist=11")),
-        1e-9,
-    );
-    let moments = leaf.reaction.unwrap().moments.unwrap();
-    assert!((moments[0] + DVec3::X * (11.0 * torsion)).length() < 1e-6);
+    let twisted = held_rod("clamped", &format!("{stiff}; tip.twist=11"));
+    let moment = moment_held(&settle(&twisted, 1e-9));
+    assert!((moment + DVec3::X * (11.0 * torsion)).length() < 1e-6);
 }
 
 /// Frequencies beta^2 of beams that are clamped at the base, with the first roots
@@ -85,14 +80,15 @@ fn held_beams_vibrate_at_their_frequencies() {
         ("clamped", 4.730040744862704_f64),
         ("pinned", 3.926602312047919),
     ] {
-        let stiff = format!(
-            "{}; dynamics.density=1; dynamics.rotary_inertia=1e-9; stiffness.bending_3=2.0",
-            set_stiffness(1e7, f64::INFINITY)
+        let stiffness = set_stiffness(1e7, f64::INFINITY);
+        let mass = "dynamics.density=1; dynamics.rotary_inertia=1e-9";
+        let beam = held_rod(
+            how,
+            &format!("{stiffness}; {mass}; stiffness.bending_3=2.0"),
         );
         let mut options = to(1e-9);
         (options.modes, options.mode_shapes) = (2, true);
-        let leaf = relaxed(&held_rod(how, &stiff), &options);
-        let modes = leaf.stability.modes.unwrap();
+        let modes = relaxed(&beam, &options).stability.modes.unwrap();
         let beta = beta * beta;
         for (mode, exact) in modes.iter().zip([beta, 2.0_f64.sqrt() * beta]) {
             close(how, mode.frequency().unwrap() / exact, 1.0, 1e-6);
@@ -106,27 +102,17 @@ fn held_beams_vibrate_at_their_frequencies() {
 #[test]
 fn a_soft_cable_hangs_in_a_catenary() {
     // Of length L = 1.2 between points 1 apart: 2 a sinh(1/(2a)) = L.
-    let (mut low, mut high) = (0.1_f64, 10.0_f64);
-    for _ in 0..200 {
-        let a = 0.5 * (low + high);
-        match 2.0 * a * (0.5 / a).sinh() > 1.2 {
-            true => low = a,
-            false => high = a,
-        }
-    }
-    let sag = low * ((0.5 / low).cosh() - 1.0);
+    let a = bisect(0.1, 10.0, |a| 2.0 * a * (0.5 / a).sinh() - 1.2);
+    let sag = a * ((0.5 / a).cosh() - 1.0);
     let off = [4e-4, 1e-4, 2.5e-5].map(|stiffness: f64| {
         let soft = format!(
             "leaf.length=1.2; load.gravity=[0, 0, -1]; stiffness.torsion={stiffness}; \
              stiffness.bending_2={stiffness}; stiffness.bending_3={stiffness}; {}",
             set_stiffness(1e4, 1e4)
         );
-        let rod = held_rod("clamped", &soft);
-        let leaf = settle(&rod, 1e-7);
-        let lowest = leaf.shape.curves[0].iter().map(|x| -x.z);
-        (lowest.fold(0.0, f64::max) - sag).abs()
+        let leaf = settle(&held_rod("clamped", &soft), 1e-7);
+        (largest(leaf.shape.curves[0].iter().map(|x| -x.z)) - sag).abs()
     });
-    println!("{off:?}");
     for pair in off.windows(2) {
         assert!(pair[1] < 0.62 * pair[0], "{off:?}");
     }
@@ -140,15 +126,16 @@ fn a_ring_closes_on_itself() {
     let ring = format!("stiffness.torsion=2.0; tip.position=[0, 0, 0]; tip.angles={TAU}");
     let leaf = settle(&held_rod("clamped", &ring), 1e-9);
     close("energy", leaf.energy.unwrap(), 2.0 * PI * PI, 1e-7);
-    let reaction = leaf.reaction.unwrap();
-    let moment = reaction.moments.unwrap()[0];
+    let moment = moment_held(&leaf);
     assert!((moment + DVec3::Z * TAU).length() < 1e-6, "{moment}");
-    assert!(reaction.force.length() < 1e-6);
+    assert!(held_by(&leaf).length() < 1e-6);
 }
 
 /// A rod that neither stretches nor shears, and bends easily in the plane alone.
-const STRIP: &str = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.shear_3=inf; \
-     stiffness.torsion=10.0; stiffness.bending_2=10.0";
+fn strip(how: &str, overrides: &str) -> Scenario {
+    let stiff = "stiffness.torsion=10.0; stiffness.bending_2=10.0";
+    held_rod(how, &format!("{RIGID}; {stiff}; {overrides}"))
+}
 
 /// Between clamps such a rod is four times that of a quarter of its length with a free
 /// end, as bent: P/P_cr and x/L of the elastica at end slopes of 20 and 60 degrees (closed
@@ -159,12 +146,8 @@ fn a_rod_pushed_together_between_clamps_is_the_elastica() {
         (1.0153968655397, 0.96973090736352),
         (1.1517196204691, 0.74101960607633),
     ] {
-        let leaf = settle(
-            &held_rod("clamped", &format!("{STRIP}; tip.position=[{place}, 0, 0]")),
-            1e-9,
-        );
-        let force = leaf.reaction.unwrap().force;
-        let euler = 4.0 * PI * PI;
+        let pushed = strip("clamped", &format!("tip.position=[{place}, 0, 0]"));
+        let (force, euler) = (held_by(&settle(&pushed, 1e-9)), 4.0 * PI * PI);
         close("force", force.x, load * euler, 1e-8 * euler);
         assert!(force.with_x(0.0).length() < 1e-7, "{force}");
     }
@@ -200,8 +183,7 @@ fn the_travel_of_a_grip_is_followed() {
             // If its middle is off by the error, forces of some hundred bear it.
             let off = (point.energy - leaf.energy.unwrap()).abs();
             assert!(off < 1e3 * error, "{travel}, {}: {off:e}", point.value);
-            let force = leaf.reaction.unwrap().force;
-            let off = point.reaction.unwrap().distance(force);
+            let off = point.reaction.unwrap().distance(held_by(&leaf));
             assert!(off < 1e3 * error, "{travel}, {}: {off:e}", point.value);
         }
     }
@@ -212,13 +194,13 @@ fn the_travel_of_a_grip_is_followed() {
 #[test]
 fn pinned_ends_meet() {
     let angle = 130.7099107079_f64.to_radians();
-    let rod = format!("{STRIP}; leaf.fan=[{angle}]; tip.position=[0, 0, 0]");
-    let leaf = settle(&held_rod("pinned", &rod), 1e-9);
-    let force = leaf.reaction.as_ref().unwrap().force;
-    assert!(
-        (force - DVec3::X * 21.54908744351816).length() < 1e-7,
-        "{force}"
+    let rod = strip(
+        "pinned",
+        &format!("leaf.fan=[{angle}]; tip.position=[0, 0, 0]"),
     );
+    let leaf = settle(&rod, 1e-9);
+    let off = held_by(&leaf) - DVec3::X * 21.54908744351816;
+    assert!(off.length() < 1e-7, "{off}");
     let base = leaf.shape.rods[0].nodes[0].m;
     assert!(base.length() < 1e-7, "{base}");
 }
@@ -228,21 +210,17 @@ fn pinned_ends_meet() {
 /// as the load rises.
 #[test]
 fn rods_that_do_not_stretch_keep_their_length() {
-    for (how, euler) in [
-        ("clamped", 39.47841760435743),
-        ("pinned", 20.19072855642663),
-    ] {
+    for (how, euler) in EULER {
+        let placed = |place: f64| strip(how, &format!("tip.position=[{place}, 0, 0]"));
         for short in [1e-6, 1e-4, 1e-2, 0.1] {
-            let place = format!("{STRIP}; tip.position=[{}, 0, 0]", 1.0 - short);
-            let leaf = settle(&held_rod(how, &place), 1e-9);
+            let leaf = settle(&placed(1.0 - short), 1e-9);
             let ratio = leaf.energy.unwrap() / (euler * short);
             let rounded = 1e-6;
             assert!(ratio > 1.0 - rounded, "{how}, {short}: {ratio}");
             assert!(ratio < 1.0 + short + rounded, "{how}, {short}: {ratio}");
         }
         for place in [0.5, 0.3, 0.1, -0.3] {
-            let place = format!("{STRIP}; tip.position=[{place}, 0, 0]");
-            settle(&held_rod(how, &place), 1e-6);
+            settle(&placed(place), 1e-6);
         }
     }
 }
@@ -283,11 +261,9 @@ fn relaxation_and_shooting_find_the_same_held_leaf() {
             }
         }
         // What the holder feels is what the rods bear, and the load on the tip.
-        let borne: DVec3 = (shot.rods.iter().filter_map(|rod| rod.nodes.last()))
-            .map(|tip| tip.rotation * tip.n)
-            .sum();
-        let felt = leaf.reaction.unwrap().force;
-        let off = felt - (DVec3::from_array(scenario.tip_force) - borne);
+        let tips = (0..shot.rods.len()).map(|rod| tip_node(&shot.rods, rod));
+        let borne: DVec3 = tips.map(|tip| in_lab(&tip).0).sum();
+        let off = held_by(&leaf) - (DVec3::from_array(scenario.tip_force) - borne);
         let unit = scale(scenario).force();
         assert!(off.length() / unit < 1e-6, "{what}: {off}");
     }
@@ -302,14 +278,9 @@ fn held_leaves_move_between_their_holders() {
         let pushed = "dynamics.duration=12; dynamics.output_interval=0.5; \
              dynamics.gravity={at=[2.0, 2.5, 3.0], value=[[0, 0, -20], [0, 60, -20], [0, 0, -20]]}";
         let scenario = held_rod(how, &format!("{loads}; {pushed}"));
-        let [explicit, semi_implicit] = [Scheme::Explicit, Scheme::SemiImplicit].map(|scheme| {
-            let options = simulate::Options {
-                scheme: Some(scheme),
-                ..simulate::Options::default()
-            };
-            let mut simulation = Simulation::new(&scenario, &options).unwrap();
-            let first = simulation.frame();
-            let mut frames = vec![first];
+        let [explicit, semi_implicit] = BOTH.map(|scheme| {
+            let mut simulation = Simulation::new(&scenario, &moving(scheme, None)).unwrap();
+            let mut frames = vec![simulation.frame()];
             while !simulation.done() {
                 frames.push(simulation.next_frame().unwrap());
             }
@@ -317,7 +288,7 @@ fn held_leaves_move_between_their_holders() {
         });
         let apart = |a: &Frame, b: &Frame| {
             let pairs = a.positions.iter().zip(&b.positions);
-            pairs.fold(0.0_f64, |most, (a, b)| most.max(a.distance(*b)))
+            largest(pairs.map(|(a, b)| a.distance(*b)))
         };
         for frames in [&explicit, &semi_implicit] {
             for frame in frames {
@@ -341,26 +312,18 @@ fn held_leaves_move_between_their_holders() {
 
 #[test]
 fn what_cannot_be_held_is_refused() {
-    for (entry, problem) in [
-        ("tip.held='loose'", "must be \"free\", \"pinned\""),
-        ("tip.held='free'", "belongs to a tip that is held"),
-        (
-            "tip.held='pinned'; tip.twist=1.0",
-            "belongs to a clamped tip",
-        ),
-        (
-            "leaf.rods=3; leaf.fan='paper'; leaf.joined=false",
-            "needs leaf.joined = true",
-        ),
-        ("tip.position=[30, 0, 0]", "more than 10 times"),
-        (
-            "stiffness.axial=inf; tip.position=[1.5, 0, 0]",
-            "inextensible",
-        ),
-        ("load.tip_moment=[0, 0, 1]", "needs a free tip"),
-        ("tip.twist=1e4", "at most 100 turns"),
-        ("dynamics.clamped=false", "needs a base that is clamped"),
-    ] {
+    let table = "
+        tip.held='loose' => must be \"free\", \"pinned\"
+        tip.held='free' => belongs to a tip that is held
+        tip.held='pinned'; tip.twist=1.0 => belongs to a clamped tip
+        leaf.rods=3; leaf.fan='paper'; leaf.joined=false => needs leaf.joined = true
+        tip.position=[30, 0, 0] => more than 10 times
+        stiffness.axial=inf; tip.position=[1.5, 0, 0] => inextensible
+        load.tip_moment=[0, 0, 1] => needs a free tip
+        tip.twist=1e4 => at most 100 turns
+        dynamics.clamped=false => needs a base that is clamped
+    ";
+    for (entry, problem) in pairs(table) {
         let refused = Scenario::from_toml_with(&held("clamped"), "held", &entries(entry));
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(problem), "{message}");

@@ -9,8 +9,7 @@
 
 mod common;
 
-use common::{Both, RIGID, close, in_lab, rod, set_vector};
-use glam::DVec3;
+use common::*;
 
 const BENDING: f64 = 1.0;
 const TORSION: f64 = 0.8;

@@ -39,8 +39,7 @@ fn assert_whole(file: &Path) {
 
 #[test]
 fn killed_at_any_time_no_file_is_half_written() {
-    let kills = std::env::var("LEAFDYN_KILLS").ok();
-    let kills: u32 = kills.and_then(|kills| kills.parse().ok()).unwrap_or(6);
+    let kills: u32 = std::env::var("LEAFDYN_KILLS").map_or(6, |kills| kills.parse().unwrap());
     for run in RUNS {
         let place = Workplace::new();
         let clock = Instant::now();
@@ -58,7 +57,6 @@ fn killed_at_any_time_no_file_is_half_written() {
             }
         }
         // And what they left is in nobody's way.
-        let run = place.run(run);
-        assert_eq!(run.status, Some(0), "{}", run.err);
+        place.run(run).ends(0);
     }
 }

@@ -4,19 +4,13 @@
 mod common;
 
 use common::valid::{VALID, holds, with};
-use leafdyn::scenario::{Key, Place, Scenario};
+use common::*;
+use leafdyn::scenario::{Key, Place};
 
 /// The message for VALID with an override goes on so.
 #[track_caller]
 fn overridden(given: &str, problem: &[&str]) {
     holds(with(&[given]), &[&format!("--set {given}: {}", problem[0])]);
-}
-
-/// A table of `what is given => parts of the message`.
-macro_rules! each {
-    ($refused:expr; $($given:expr => $($part:expr),+;)+) => {
-        $($refused($given, &[$($part),+]);)+
-    };
 }
 
 #[test]
@@ -35,14 +29,14 @@ fn overrides() {
     // A missing or wrong entry of the file can be made good.
     let text = VALID
         .replace("torsion = 1.0", "")
-        .replace("length = 2.0", "length = -2.0");
+        .replace("= 2.0", "= -2.0");
     let mended = ["stiffness.torsion=1", "leaf.length=2"].map(String::from);
     assert!(Scenario::from_toml_with(&text, "leaf.toml", &mended).is_ok());
 }
 
 #[test]
 fn refused_overrides_say_that_they_are_overrides() {
-    each! { overridden;
+    refused! { overridden;
         "leaf.rods=0" => "leaf.rods = 0: must be a whole number";
         "leaf.rods=five" => "leaf.rods = five: must be a whole number";
         "stiffness.torsion=-1" => "stiffness.torsion = -1: must be greater than 0";
@@ -73,8 +67,6 @@ fn errors_carry_values() {
     let given = "leaf.rods=0".to_string();
     let error = with(&[&given]).unwrap_err();
     assert_eq!(error.place, Place::Set { given });
-    assert_eq!(
-        error.to_string(),
-        format!("{}: {}", error.place, error.problem)
-    );
+    let both = format!("{}: {}", error.place, error.problem);
+    assert_eq!(error.to_string(), both);
 }

@@ -3,14 +3,11 @@
 //! rest end in an outcome, soon.
 
 mod common;
+mod workplace;
 
-use std::fs;
-use std::process::{Command, Output};
-
-use leafdyn::relax::{Options, Outcome, RelaxError, SemiImplicit, relax};
-use leafdyn::scenario::Scenario;
-use serde_json::Value;
-use tempfile::TempDir;
+use common::*;
+use leafdyn::relax::{Outcome, RelaxError, relax};
+use workplace::{Json, Workplace, contains};
 
 /// A leaf of five veins of length two, with a kink in a stiffness.
 const LEAF: &str = r#"
@@ -27,37 +24,20 @@ shear_2 = 100.0
 shear_3 = 100.0
 "#;
 
-struct Run {
-    place: TempDir,
-    output: Output,
-}
-
-/// Arguments are separated by blanks.
-fn run(arguments: &str) -> Run {
-    let place = tempfile::tempdir().unwrap();
-    fs::write(place.path().join("leaf.toml"), LEAF).unwrap();
-    let output = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"))
-        .current_dir(place.path())
-        .args(["relax", "leaf.toml"])
-        .args(arguments.split_whitespace())
-        .output()
-        .unwrap();
-    Run { place, output }
+/// A folder with it.
+fn place() -> Workplace {
+    let place = Workplace::new();
+    place.write("leaf.toml", LEAF);
+    place
 }
 
 #[track_caller]
 fn refused(arguments: &str, parts: &[&str]) {
-    let run = run(arguments);
-    let message = String::from_utf8(run.output.stderr).unwrap();
-    let status = run.output.status.code();
-    assert_eq!(status, Some(2), "{arguments}: {message}");
-    assert!(run.output.stdout.is_empty());
-    for part in parts {
-        assert!(message.contains(part), "no '{part}' in: {message}");
-    }
+    let message = place()
+        .refuses(format!("relax leaf.toml {arguments}"), parts[0])
+        .err;
+    contains(&message, parts);
     assert!(message.trim().lines().count() <= 8, "too long: {message}");
-    let left = fs::read_dir(run.place.path()).unwrap().count();
-    assert_eq!(left, 1, "{arguments} has left something behind");
 }
 
 #[test]
@@ -82,7 +62,7 @@ fn segments_that_no_grid_can_have_are_refused() {
     refused("--segments 1000000", &["5000000 nodes", nodes]);
     refused("--segments 18446744073709551615", &["nodes", nodes]);
     refused("--segments 18446744073709551616", &["--segments"]);
-    assert_eq!(run("--segments 3").output.status.code(), Some(0));
+    place().run("relax leaf.toml --segments 3").ends(0);
 }
 
 #[test]
@@ -93,120 +73,74 @@ fn leaves_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn loads_beyond_reason_are_refused_by_what_they_amount_to() {
-    for force in ["[1e300,0,0]", "[0,0,-1e300]", "[1e308,1e308,1e308]"] {
-        for (key, formula) in [("tip_force", "|F| L^2/A"), ("gravity", "|g| L^3/A")] {
-            let key = format!("load.{key}");
-            refused(&format!("--set {key}={force}"), &[&key, formula, "limit"]);
-        }
-    }
-    for force in ["[1e309,0,0]", "[nan,0,0]"] {
-        refused(
-            &format!("--set load.tip_force={force}"),
-            &["load.tip_force"],
-        );
-    }
-}
-
-#[test]
 fn the_library_refuses_alike() {
     let leaf = Scenario::from_toml(LEAF).unwrap();
-    let ask = |segments, tolerance| {
-        let options = Options {
-            method: SemiImplicit {
-                segments,
-                ..SemiImplicit::default()
-            }
-            .into(),
-            tolerance,
-            ..Options::default()
-        };
+    let ask = |options: Options| {
         relax(&leaf, &options, &mut |_| panic!("nothing is computed")).unwrap_err()
     };
-    for tolerance in [0.0, -1e-6, 1e-20, 1.0, f64::INFINITY, f64::NEG_INFINITY] {
-        let error = ask(None, Some(tolerance));
-        assert_eq!(error, RelaxError::Tolerance { found: tolerance });
+    for found in [0.0, -1e-6, 1e-20, 1.0, f64::INFINITY, f64::NEG_INFINITY] {
+        assert_eq!(ask(to(found)), RelaxError::Tolerance { found });
     }
-    assert!(matches!(
-        ask(None, Some(f64::NAN)),
-        RelaxError::Tolerance { found } if found.is_nan()
-    ));
-    let error = ask(Some(2), None);
-    assert_eq!(error, RelaxError::TooFewSegments { found: 2, least: 3 });
-    assert!(matches!(
-        ask(Some(usize::MAX), None),
-        RelaxError::TooManyNodes { rods: 5, .. }
-    ));
+    let nan = ask(to(f64::NAN));
+    assert!(matches!(nan, RelaxError::Tolerance { found } if found.is_nan()));
+    assert_eq!(
+        ask(on(2)),
+        RelaxError::TooFewSegments { found: 2, least: 3 }
+    );
+    let many = ask(on(usize::MAX));
+    assert!(matches!(many, RelaxError::TooManyNodes { rods: 5, .. }));
 }
 
 /// Scenes at the edge of what a scenario may state, some of which have no
 /// stable equilibrium that any grid allowed could resolve. None may run on.
-const HARD: [(&str, &str); 8] = [
-    ("pushed back", "load.tip_force=[-1e5,0,0]"),
-    (
-        "pushed back by the strongest force",
-        "load.tip_force=[-5e6,0,0]",
-    ),
-    ("hung on its tip", "load.tip_force=[0,0,5e6]"),
-    ("as heavy as allowed", "load.gravity=[0,0,-2e6]"),
-    ("heavy and upside down", "load.gravity=[-1e5,0,0]"),
-    (
-        "glued together",
-        "coupling.x=1e10 coupling.y=1e10 coupling.z=1e10",
-    ),
-    ("wound up at rest", "rest.bend_2=100.0 rest.twist=100.0"),
-    (
-        "soft as a thread",
-        "stiffness.bending_3=1e-6 stiffness.torsion=1e-6 load.gravity=[0,0,-0.1]",
-    ),
-];
+const HARD: &str = "
+    pushed back => load.tip_force=[-1e5,0,0]
+    pushed back by the strongest force => load.tip_force=[-5e6,0,0]
+    hung on its tip => load.tip_force=[0,0,5e6]
+    as heavy as allowed => load.gravity=[0,0,-2e6]
+    heavy and upside down => load.gravity=[-1e5,0,0]
+    glued together => coupling.x=1e10; coupling.y=1e10; coupling.z=1e10
+    wound up at rest => rest.bend_2=100.0; rest.twist=100.0
+    soft as a thread => stiffness.bending_3=1e-6; stiffness.torsion=1e-6; load.gravity=[0,0,-0.1]
+";
 
 #[test]
 fn hard_scenes_end_in_an_outcome_after_bounded_work() {
-    for (what, overrides) in HARD {
-        let overrides: Vec<String> = overrides.split(' ').map(String::from).collect();
-        let leaf = Scenario::from_toml_with(LEAF, what, &overrides).unwrap();
-        let leaf = relax(&leaf, &Options::default(), &mut |_| {}).unwrap();
+    for (what, overrides) in pairs(HARD) {
+        let leaf = relaxed(base(LEAF, overrides).scenario(), &Options::default());
         let work = leaf.work.force_evaluations;
         // Some seconds, whatever the machine; the heaviest needs half of this.
         let finest = leaf.accuracy.segments.last().unwrap();
         assert!(work * finest < 5_000_000, "{what}: {work} on {finest}");
         if leaf.outcome.is_success() {
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
-            let error = leaf.accuracy.error_estimate.unwrap();
-            assert!(error <= 2.0 * leaf.accuracy.tolerance, "{what}");
+            assert!(estimate(&leaf) <= 2.0 * leaf.accuracy.tolerance, "{what}");
         } else {
             assert_ne!(leaf.outcome, Outcome::Saddle);
             assert!(leaf.remark.is_some(), "{what}: no remark");
         }
         // Whatever it is, it is numbers.
-        for node in leaf.shape.rods.iter().flat_map(|rod| &rod.nodes) {
-            let finite = node.position.is_finite() && node.rotation.is_finite();
-            assert!(finite, "{what}");
-        }
+        let finite = |node: &NodeState| node.position.is_finite() && node.rotation.is_finite();
+        assert!(nodes(&leaf.shape.rods).all(finite), "{what}");
     }
 }
 
 /// A failed run says so in its exit status, and how far it came in its files.
 #[test]
 fn a_run_that_fails_is_written_down_and_has_status_one() {
-    let run = run("--json --set load.tip_force=[-5e6,0,0]");
-    assert_eq!(run.output.status.code(), Some(1));
-    let summary: Value = serde_json::from_slice(&run.output.stdout).unwrap();
-    let outcome = summary["outcome"].as_str().unwrap();
+    let place = place();
+    let run = place
+        .run("relax leaf.toml --json --set load.tip_force=[-5e6,0,0]")
+        .ends(1);
+    let summary = run.json();
+    let outcome = summary["outcome"].text();
     let failures = ["tolerance-not-reached", "not-at-rest", "diverged"];
     assert!(failures.contains(&outcome), "{outcome}");
-    let remark = summary["remark"].as_str().unwrap();
+    let remark = summary["remark"].text();
     assert!(remark.len() > 20);
-    let message = String::from_utf8(run.output.stderr).unwrap();
-    assert!(message.contains(remark), "{message}");
-    let folder = run.place.path().join("out/leaf");
-    for file in [
-        "summary.json",
-        "centerlines.csv",
-        "figure.svg",
-        "figure.png",
-    ] {
-        assert!(folder.join(file).exists(), "{file}");
-    }
+    contains(&run.err, &[remark]);
+    place.holds(
+        "out/leaf",
+        "centerlines.csv figure.png figure.svg summary.json",
+    );
 }

@@ -3,13 +3,11 @@
 
 mod workplace;
 
-use std::fs;
 use std::time::Instant;
 
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
-use serde_json::Value;
-use workplace::{Workplace, leaf};
+use workplace::{Json, Workplace, leaf};
 
 #[test]
 fn what_takes_more_memory_than_is_allowed_is_refused() {
@@ -42,27 +40,22 @@ fn what_takes_more_memory_than_is_allowed_is_refused() {
 #[test]
 fn as_much_as_is_allowed_is_used_and_no_more() {
     let place = Workplace::new();
-    place
-        .run("relax leaf.toml --segments 100 --memory 10MB")
-        .ok();
+    place.ok("relax leaf.toml --segments 100 --memory 10MB");
     // Refinement ends where memory does, and says so by its outcome.
-    let run = place.run("relax leaf.toml --tolerance 1e-11 --memory 600kB --json");
-    let summary = run.ends(1).json();
+    let summary = place.told(1, "relax leaf.toml --tolerance 1e-11 --memory 600kB");
     assert_eq!(summary["outcome"], "tolerance-not-reached");
-    let grids = summary["segments"].as_array().unwrap();
-    assert!(grids.iter().all(|n| n.as_u64().unwrap() <= 32), "{grids:?}");
+    let grids = summary["segments"].list();
+    assert!(grids.iter().all(|n| n.count() <= 32), "{grids:?}");
 }
 
 #[test]
 fn a_large_scenario_is_weighed_before_it_is_parsed() {
     let place = Workplace::new();
     let comments = "# nothing but words, again and again\n".repeat(100_000);
-    fs::write(place.path("large.toml"), leaf("large", 2) + &comments).unwrap();
-    place.refuses(
-        "relax large.toml --memory 100MB",
-        "would take about 277.5 MB",
-    );
-    place.run("relax large.toml --memory 1GB").ok();
+    place.write("large.toml", leaf("large", 2) + &comments);
+    let limited = "relax large.toml --memory 100MB";
+    place.refuses(limited, "would take about 277.5 MB");
+    place.ok("relax large.toml --memory 1GB");
 }
 
 /// Numbers of rods that no scenario has, and sizes beyond all powers of ten.
@@ -71,8 +64,8 @@ fn maps_over_numbers_of_any_size_are_drawn_or_refused() {
     for rods in ["-5..3:2", "1..1e9:2", "0..5:2", "-9e18..9e18:2"] {
         let place = Workplace::new();
         let vary = format!("--vary leaf.rods={rods} --vary coupling.y[0]=0..1:2");
-        let run = place.run(&format!("map leaf.toml {vary} --methods semi-implicit"));
-        run.ok().says(&["refused"]);
+        let run = place.ok(format!("map leaf.toml {vary} --methods semi-implicit"));
+        run.says(&["refused"]);
         place.picture("out/small/map");
     }
     workplace::all_refused(
@@ -85,18 +78,11 @@ fn maps_over_numbers_of_any_size_are_drawn_or_refused() {
         ",
     );
     let place = Workplace::new();
-    for (vary, rows) in [
-        ("1e99..1e100:3", 3),
-        ("-1e100..1e100:2", 2),
-        ("1e-100..1e100:3log", 3),
-    ] {
-        let folder = format!("out/{rows}{}", vary.len());
-        let asked = format!("map leaf.toml --vary load.gravity[2]={vary} --out {folder}");
-        place.run(&format!("{asked} --methods semi-implicit")).ok();
-        assert!(
-            !place.picture(&format!("{folder}/map")).contains("inf"),
-            "{vary}"
-        );
+    for vary in ["1e99..1e100:3", "-1e100..1e100:2", "1e-100..1e100:3log"] {
+        let asked = format!("map leaf.toml --vary load.gravity[2]={vary} --out out/{vary}");
+        place.ok(format!("{asked} --methods semi-implicit"));
+        let picture = place.picture(&format!("out/{vary}/map"));
+        assert!(!picture.contains("inf"), "{vary}");
     }
 }
 
@@ -105,15 +91,12 @@ fn a_cell_keeps_its_time_whatever_its_grid() {
     let clock = Instant::now();
     let place = Workplace::new();
     let one = "map leaf.toml --set leaf.rods=1 --set coupling.y=0 --set coupling.z=0";
-    let run = place.run(&format!(
-        "{one} --vary method.segments=8..1e6:2log --cell-seconds 0.5"
-    ));
-    run.ok().says(&["out-of-time"]);
-    let fixed = "--set method.segments=4000000 --vary load.gravity[2]=-1..0:2 --cell-seconds 1";
-    place
-        .run(&format!("{one} {fixed} --out out/fixed"))
-        .ok()
-        .says(&["out-of-time"]);
+    for slow in [
+        "--vary method.segments=8..1e6:2log --cell-seconds 0.5",
+        "--set method.segments=4000000 --vary load.gravity[2]=-1..0:2 --cell-seconds 1 --out fixed",
+    ] {
+        place.ok(format!("{one} {slow}")).says(&["out-of-time"]);
+    }
     let seconds = clock.elapsed().as_secs();
     assert!(seconds < 60, "{seconds} s");
 }
@@ -122,15 +105,15 @@ fn a_cell_keeps_its_time_whatever_its_grid() {
 fn a_simulation_of_weeks_is_refused_before_it_starts() {
     let place = Workplace::new();
     for method in ["explicit", "semi-implicit"] {
-        let asked = format!("simulate leaf.toml --method {method} --step 1e-12");
+        let steps = "the time step of 1.000e-12 makes 1.0e13 steps, which take some";
         place.refuses(
-            &asked,
-            "the time step of 1.000e-12 makes 1.0e13 steps, which take some",
+            format!("simulate leaf.toml --method {method} --step 1e-12"),
+            steps,
         );
     }
     let stiff = "--set stiffness.torsion=1e12 --set dynamics.section_radius=1e-6";
     place.refuses(
-        &format!("simulate leaf.toml {stiff}"),
+        format!("simulate leaf.toml {stiff}"),
         "at most 3 are allowed",
     );
 }
@@ -140,23 +123,20 @@ fn a_simulation_of_weeks_is_refused_before_it_starts() {
 #[test]
 fn stations_of_a_profile_with_knots_are_compared_by_place() {
     let place = Workplace::new();
+    let knots = "{ at = [0.0, 0.3404, 1.0], value = [1.0, 2.0, 0.2] }";
     let text = leaf("knots", 1)
-        .replace(
-            "bending_2 = 1.0",
-            "bending_2 = { at = [0.0, 0.3404, 1.0], value = [1.0, 2.0, 0.2] }",
-        )
-        .replace(
-            "gravity = [0.0, 0.0, -1.0]",
-            "gravity = [0.0, 0.0, -3000.0]",
-        );
-    fs::write(place.path("knots.toml"), text).unwrap();
-    let check = place.run("check knots.toml --json").ok().json();
+        .replace("bending_2 = 1.0", &format!("bending_2 = {knots}"))
+        .replace("-1.0]", "-3000.0]");
+    place.write("knots.toml", text);
+    let check = place.ok("check knots.toml --json").json();
     assert_eq!(check["verdict"], "agree");
     assert_eq!(check["within_estimates"], true);
-    let list = |key: &str| check[key].as_array().map(Vec::len);
-    assert_eq!(list("stations"), list("differences"));
-    let trace = place.run("trace knots.toml --vary load.gravity[2]=-3000..-2900:2 --json");
-    assert_eq!(trace.json()["complete"], Value::Bool(true), "{}", trace.err);
+    assert_eq!(
+        check["stations"].list().len(),
+        check["differences"].list().len()
+    );
+    let trace = "trace knots.toml --vary load.gravity[2]=-3000..-2900:2";
+    assert_eq!(place.told(0, trace)["complete"], true);
 }
 
 #[test]

@@ -5,11 +5,7 @@
 mod common;
 
 use common::branch::{changes_at, follow};
-use common::{
-    NEUTRAL, RIGID, ROD, close, critical_of_rigid, rod, set_stiffness, settle, settle_on, table,
-    tip,
-};
-use leafdyn::scenario::Scenario;
+use common::*;
 
 const TIP: &str = "load.tip_force";
 const WEIGHT: &str = "load.gravity";
@@ -42,11 +38,8 @@ fn section(torsion: f64, strong: f64) -> String {
 
 /// The strip of a section with `stiffness` in stretch and shear.
 fn strip(section: &str, stiffness: f64, key: &str, load: f64) -> Scenario {
-    let stiffness = set_stiffness(stiffness, stiffness);
-    rod(&format!(
-        "{section}; {stiffness}; {key}=[0, 0, {:?}]",
-        -load
-    ))
+    let (stiffness, load) = (set_stiffness(stiffness, stiffness), -load);
+    rod(&format!("{section}; {stiffness}; {key}=[0, 0, {load:?}]"))
 }
 
 #[test]

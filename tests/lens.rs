@@ -5,13 +5,7 @@
 mod common;
 
 use common::branch::{changes_at, follow, text};
-use common::{
-    Both, TIGHT, close, critical, in_lab, kept, scenario, set_stiffness, settle, settle_on, table,
-    tip, tip_angle, tip_node,
-};
-use glam::DVec3;
-use leafdyn::relax::RodShape;
-use leafdyn::scenario::Scenario;
+use common::*;
 
 /// Force along e1 at the tip of a rod.
 fn thrust(rods: &[RodShape], rod: usize) -> f64 {
@@ -53,10 +47,8 @@ fn unloaded_lenses_follow_the_elastica_and_coupling_draws_rods_together() {
 fn a_force_on_the_tip_closes_or_opens_the_lens() {
     for (force, x) in [(-2.0, 0.8908401673153), (10.0, 0.9174586260365)] {
         let what = format!("F = {force}");
-        let leaf = Both::solve(
-            "classic/lens_60",
-            &format!("load.tip_force=[{force:?}, 0, 0]"),
-        );
+        let pulled = format!("load.tip_force=[{force:?}, 0, 0]");
+        let leaf = Both::solve("classic/lens_60", &pulled);
         leaf.tip_is(&what, DVec3::new(x, 0.0, 0.0), 2e-13, TIGHT);
         for rods in leaf.shapes() {
             for rod in [0, 1] {

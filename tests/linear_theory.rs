@@ -7,8 +7,7 @@
 
 mod common;
 
-use common::{RIGID, kept, rod};
-use leafdyn::relax::Equilibrium;
+use common::*;
 
 const LENGTH: f64 = 1.5;
 const A2: f64 = 0.8;

@@ -5,9 +5,9 @@ mod workplace;
 
 use std::fs;
 
-use workplace::{Workplace, all_refused, contains, help_names};
+use workplace::{Workplace, all_refused, contains};
 
-const FILES: [&str; 4] = ["map.csv", "map.json", "map.png", "map.svg"];
+const FILES: &str = "map.csv map.json map.png map.svg";
 
 /// Twelve cells, one of which the format refuses.
 const CELLS: &str =
@@ -40,25 +40,6 @@ fn timeless(place: &Workplace, name: &str) -> Vec<String> {
 }
 
 #[test]
-fn help_names_every_option_and_exit_status() {
-    help_names(
-        "map",
-        "--vary
-        --methods
-        --cell-seconds
-        --shard
-        --draw
-        --show
-        --tolerance
-        --set
-        --out
-        --json
-        0 the map is made
-        2 the request was refused",
-    );
-}
-
-#[test]
 fn a_map_is_a_table_a_summary_and_a_figure() {
     let place = Workplace::new();
     let report = run(&place, "", "2");
@@ -73,7 +54,7 @@ fn a_map_is_a_table_a_summary_and_a_figure() {
         "out: map.json, map.csv, map.svg, map.png",
     ];
     contains(&report, &parts);
-    assert_eq!(place.names("out"), FILES);
+    place.holds("out", FILES);
     let svg = place.picture("out/map");
     assert!(svg.contains("where methods fail") && !svg.contains("no waves"));
 
@@ -119,17 +100,10 @@ fn a_table_without_its_summary_is_refused() {
     run(&place, "", "2");
     fs::remove_file(place.path("out/map.json")).unwrap();
     let before = place.read("out/map.csv");
-    let again = small("--out out");
-    let refused = place.run(&again).ends(2);
-    contains(
-        &refused.err,
-        &[
-            "out/map.csv is of another map",
-            "name another folder with --out DIR",
-        ],
-    );
+    let refused = place.refuses(small("--out out"), "out/map.csv is of another map");
+    contains(&refused.err, &["name another folder with --out DIR"]);
     assert_eq!(place.read("out/map.csv"), before);
-    assert_eq!(place.names("out"), ["map.csv", "map.png", "map.svg"]);
+    place.holds("out", "map.csv map.png map.svg");
 }
 
 #[test]
@@ -140,7 +114,7 @@ fn a_run_goes_on_where_one_was_stopped() {
     let (whole, without) = (lines(&place, "out/map.csv"), timeless());
     // Five rows, and a sixth half written, as a kill leaves them.
     let half = format!("{}\n{}", whole[..6].join("\n"), &whole[6][..20]);
-    fs::write(place.path("out/map.csv"), half).unwrap();
+    place.write("out/map.csv", half);
     contains(&run(&place, "", "2"), &["5 were there, 31 computed"]);
     assert_eq!(timeless(), without);
     let again = lines(&place, "out/map.csv");
@@ -157,7 +131,7 @@ fn a_run_goes_on_where_one_was_stopped() {
 fn more_methods_are_added_to_a_map() {
     let place = Workplace::new();
     run(&place, "", "2");
-    let more = place.run(&format!("{CELLS} --out out --methods single-shooting"));
+    let more = place.run(format!("{CELLS} --out out --methods single-shooting"));
     more.ends(0).says(&["36 were there, 12 computed"]);
     assert_eq!(lines(&place, "out/map.csv").len(), 1 + 48);
 }
@@ -174,12 +148,12 @@ fn shards_joined_equal_the_whole() {
             contains(&run(&shared, shard, "1"), &[said]);
         }
     }
+    // No shard draws.
     let parts = ["map-1-of-3.csv", "map-2-of-3.csv", "map-3-of-3.csv"];
-    let files = [&parts[..], &["map.json"]].concat();
-    assert_eq!(shared.names("out"), files, "no shard draws");
+    shared.holds("out", &format!("{} map.json", parts.join(" ")));
     // Joined, they have the rows of the whole.
     let joined = parts.map(|part| shared.read(&format!("out/{part}")));
-    fs::write(shared.path("joined.csv"), joined.concat()).unwrap();
+    shared.write("joined.csv", joined.concat());
     let mut rows = timeless(&shared, "joined.csv");
     rows.sort();
     rows.dedup();
@@ -195,10 +169,11 @@ fn shards_joined_equal_the_whole() {
     // and so does one elsewhere that is given the joined file, or all.
     let all = parts.map(|part| format!("out/{part}")).join(" ");
     for files in ["out/../joined.csv", &all] {
-        let elsewhere = small(&format!("--out drawn --draw {files}"));
-        shared.run(&elsewhere).ends(0);
+        shared
+            .run(small(&format!("--out drawn --draw {files}")))
+            .ends(0);
         assert_eq!(timeless(&shared, "drawn/map.csv"), whole);
-        assert_eq!(shared.names("drawn"), FILES);
+        shared.holds("drawn", FILES);
         fs::remove_dir_all(shared.path("drawn")).unwrap();
     }
 }
@@ -222,11 +197,11 @@ fn maps_are_not_mixed() {
         ("--cell-seconds 3", "cell_seconds"),
     ] {
         let message = format!("its {what} is not the same");
-        place.refuses(&small(&format!("--out out {more}")), &message);
+        place.refuses(small(&format!("--out out {more}")), &message);
     }
     let leaf = place.read("leaf.toml").replace("y = 1.0", "y = 2.0");
-    fs::write(place.path("leaf.toml"), leaf).unwrap();
-    place.refuses(&small("--out out"), "scenario_digest");
+    place.write("leaf.toml", leaf);
+    place.refuses(small("--out out"), "scenario_digest");
 }
 
 #[test]
@@ -262,8 +237,8 @@ fn bad_requests_are_refused_before_anything_is_written() {
 #[test]
 fn files_that_are_not_of_this_map_are_refused() {
     let place = Workplace::new();
-    fs::write(place.path("other.csv"), "a,b\n1,2\n").unwrap();
+    place.write("other.csv", "a,b\n1,2\n");
     let message = "other.csv:1: is no row of this map";
-    place.refuses(&small("--draw other.csv"), message);
-    place.refuses(&small("--draw absent.csv"), "absent.csv");
+    place.refuses(small("--draw other.csv"), message);
+    place.refuses(small("--draw absent.csv"), "absent.csv");
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::branch::follow;
-use common::{entries, path};
+use common::*;
 use leafdyn::study::{Base, Map, MapMethod, MapRequest};
 
 /// An arch between clamps, shallow enough to snap through under a load along it.
@@ -31,8 +31,7 @@ fn mapped(base: Base, axes: &[&str]) -> Map {
 
 #[test]
 fn an_arch_snaps_where_its_branch_loses_its_stability() {
-    let base = Base::of_text(ARCH.into(), "arch.toml".into(), &[]).unwrap();
-    let map = mapped(base, &["load.gravity[1]=-1..-150:7"]);
+    let map = mapped(base(ARCH, ""), &["load.gravity[1]=-1..-150:7"]);
     let branch = &follow(ARCH, "", "load.gravity[1]=-1..-150", false).branches[0];
     let critical: Vec<_> = branch.critical().collect();
     // It comes back stable far below: between them there are two equilibria.
@@ -41,53 +40,41 @@ fn an_arch_snaps_where_its_branch_loses_its_stability() {
     let [jump] = map.jumps.as_deref().unwrap() else {
         panic!("{:?}", map.jumps);
     };
-    println!("{jump:?} {lost}");
     let [a, b] = jump.between;
     assert!(b < lost && lost < a + (a - b), "{lost} {jump:?}");
     assert!((a - b) < 1e-2);
     assert!(jump.distance > 0.1);
     assert_eq!(
-        [&jump.from[0][..], &jump.to[0][..]],
-        ["-75.5", "-100.333333333"]
+        (&jump.from[0][..], &jump.to[0][..]),
+        ("-75.5", "-100.333333333")
     );
 }
 
 /// The same along either axis of a map of two, and only there.
 #[test]
 fn both_axes_are_looked_along() {
-    let base = Base::of_text(ARCH.into(), "arch.toml".into(), &[]).unwrap();
+    let (load, bending) = ("load.gravity[1]", "scale:stiffness.bending_3");
     let axes = [
-        "load.gravity[1]=-60..-100:2",
-        "scale:stiffness.bending_3=1..1.5:2",
+        &format!("{load}=-60..-100:2")[..],
+        &format!("{bending}=1..1.5:2"),
     ];
-    let map = mapped(base, &axes);
-    let jumps = map.jumps.unwrap();
+    let jumps = mapped(base(ARCH, ""), &axes).jumps.unwrap();
     // A stiffer arch snaps later, at -80.6 times 1.5 if it did not stretch.
     let keys: Vec<&str> = jumps.iter().map(|jump| jump.key.as_str()).collect();
-    assert_eq!(
-        keys,
-        ["load.gravity[1]", "scale:stiffness.bending_3"],
-        "{jumps:?}"
-    );
+    assert_eq!(keys, [load, bending], "{jumps:?}");
 }
 
 /// Branches that are stable throughout, and one that forks without a jump.
 #[test]
 fn what_is_continuous_does_not_jump() {
-    for (name, set, vary) in [
-        ("classic/lens_midrib", "", "leaf.length[1]=0.9..1.0:6"),
-        (
-            "classic/cantilever_heavy",
-            "",
-            "scale:load.gravity=0.5..2.0:5",
-        ),
-        ("paper/fig04", "leaf.rods=3", "load.gravity[2]=-0.1..-2:5"),
-        (
-            "paper/fig05",
-            "leaf.rods=3",
-            "scale:stiffness.bending_2=1..2:4",
-        ),
-    ] {
+    let table = "
+        classic/lens_midrib; => leaf.length[1]=0.9..1.0:6
+        classic/cantilever_heavy; => scale:load.gravity=0.5..2.0:5
+        paper/fig04; leaf.rods=3 => load.gravity[2]=-0.1..-2:5
+        paper/fig05; leaf.rods=3 => scale:stiffness.bending_2=1..2:4
+    ";
+    for (leaf, vary) in pairs(table) {
+        let (name, set) = leaf.split_once(';').unwrap();
         let base = Base::read(&path(name), &entries(set)).unwrap();
         let map = mapped(base, &[vary]);
         assert_eq!(map.jumps, Some(Vec::new()), "{name}");

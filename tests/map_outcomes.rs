@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{entries, path};
+use common::*;
 use leafdyn::relax::Method;
 use leafdyn::study::{Base, Confidence, MapMethod, MapOutcome, MapRequest, MapRow};
 
@@ -77,13 +77,7 @@ fn soft(bending: &str, load: &str, methods: &[MapMethod], seconds: f64) -> Vec<M
 /// Map (b): soft veins under load.
 #[test]
 fn all_methods_are_right_on_a_stiff_leaf() {
-    let methods = [
-        SEMI_IMPLICIT,
-        EXPLICIT,
-        SINGLE_SHOOTING,
-        SHOOTING,
-        SHOOTING_FROM_REST,
-    ];
+    let methods = Method::ALL.map(MapMethod::ToRest);
     let rows = soft("1", "-1", &methods, LONG);
     expect(&rows, &[Right; 5]);
     for row in &rows {
@@ -118,13 +112,8 @@ fn single_shooting_loses_a_soft_heavy_leaf() {
 #[test]
 fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
     let set = "leaf.rods=3; method.step=1e-3";
-    let methods = [
-        SEMI_IMPLICIT,
-        EXPLICIT_MOTION,
-        SINGLE_SHOOTING,
-        SHOOTING,
-        SHOOTING_FROM_REST,
-    ];
+    let mut methods = Method::ALL.map(MapMethod::ToRest);
+    methods[1] = EXPLICIT_MOTION;
     let rows = cell("fig04", set, &[(H, "1e10")], &methods, LONG);
     expect(&rows, &[Right, Diverged, Right, Right, Right]);
     let rows = cell("fig04", set, &[(H, "1e10")], &[EXPLICIT], SHORT);

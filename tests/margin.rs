@@ -7,18 +7,13 @@ mod workplace;
 use std::f64::consts::PI;
 
 use common::branch::follow;
-use common::{RIGID, parse, relaxed, rod};
-use leafdyn::relax::{Equilibrium, Fate, Loss, Margin, Options, Push};
-use leafdyn::scenario::Scenario;
+use common::*;
+use leafdyn::relax::{Fate, Loss, Margin, Push};
 use leafdyn::study::relax_with_margin;
-use workplace::Workplace;
+use workplace::{Json, Workplace, timeless};
 
 fn found(scenario: &Scenario, tolerance: f64) -> (Equilibrium, Margin) {
-    let options = Options {
-        tolerance: Some(tolerance),
-        every_node: true,
-        ..Options::default()
-    };
+    let options = at_every_node(tolerance);
     let leaf = relax_with_margin(scenario, &options, &mut |_| {}).unwrap();
     let margin = leaf.margin.clone().unwrap();
     (leaf, margin)
@@ -34,15 +29,7 @@ fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
 #[track_caller]
 fn is_at(push: &Push, right: f64) {
     let (force, error) = (push.force.unwrap(), push.error.unwrap());
-    println!(
-        "{}: {force} within {error:.1e}, off by {:.1e}",
-        push.direction,
-        force - right
-    );
-    assert!(
-        (force - right).abs() <= error.max(1e-11),
-        "{push:?}: {right}"
-    );
+    close(&format!("{push:?}"), force, right, error.max(1e-11));
     assert!(error < 1e-5 * right, "{push:?}");
 }
 
@@ -51,43 +38,17 @@ fn is_at(push: &Push, right: f64) {
 /// Runge and Kutta from the base.
 fn standing(weight: f64) -> f64 {
     let slope_at_tip = |load: f64| {
-        let steps = 2000;
-        let h = 1.0 / f64::from(steps);
         let rate = |s: f64, [y, v]: [f64; 2]| [v, -(load + weight * (1.0 - s)) * y];
-        let mut y = [0.0, 1.0];
-        for step in 0..steps {
-            let s = h * f64::from(step);
-            let ahead = |k: [f64; 2], by: f64| [y[0] + by * k[0], y[1] + by * k[1]];
-            let a = rate(s, y);
-            let b = rate(s + 0.5 * h, ahead(a, 0.5 * h));
-            let c = rate(s + 0.5 * h, ahead(b, 0.5 * h));
-            let d = rate(s + h, ahead(c, h));
-            y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
-        }
-        y[1]
+        runge_kutta(rate, [0.0, 1.0], 1.0, 2000)[1]
     };
     bisect(0.0, 3.0, slope_at_tip)
-}
-
-fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let sign = f(low).signum();
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        match f(middle) * sign > 0.0 {
-            true => low = middle,
-            false => high = middle,
-        }
-    }
-    0.5 * (low + high)
 }
 
 #[test]
 fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
     for weight in [0.0, 2.0, 5.0] {
-        let column = rod(&format!(
-            "{RIGID}; stiffness.bending_2=2.0; load.gravity=[{:?}, 0, 0]",
-            -weight
-        ));
+        let load = format!("load.gravity=[{:?}, 0, 0]", -weight);
+        let column = rod(&format!("{RIGID}; stiffness.bending_2=2.0; {load}"));
         let right = match weight {
             0.0 => 0.25 * PI * PI,
             weight => standing(weight),
@@ -95,14 +56,10 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
         let (_, margin) = found(&column, 1e-8);
         let down = push(&margin, "-x");
         is_at(down, right);
-        assert_eq!(
-            (down.kind, down.then),
-            (Loss::BranchPoint, Some(Fate::BendsAside))
-        );
-        assert_eq!(
-            margin.pushes[0].direction, down.direction,
-            "the least comes first"
-        );
+        let lost = (down.kind, down.then);
+        assert_eq!(lost, (Loss::BranchPoint, Some(Fate::BendsAside)));
+        // The least comes first.
+        assert_eq!(margin.pushes[0].direction, down.direction);
     }
 }
 
@@ -110,9 +67,8 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
 /// P (1 - P/H) is Euler's load.
 #[test]
 fn an_extensible_column_gives_way_at_the_load_of_reissner() {
-    let column = rod(
-        "stiffness.axial=50; stiffness.shear_2=inf; stiffness.shear_3=inf; stiffness.bending_2=2",
-    );
+    let stiffness = set_stiffness(50.0, f64::INFINITY);
+    let column = rod(&format!("{stiffness}; stiffness.bending_2=2"));
     let right = 25.0 * (1.0 - (1.0 - 4.0 * 0.25 * PI * PI / 50.0).sqrt());
     is_at(push(&found(&column, 1e-8).1, "-x"), right);
 }
@@ -123,23 +79,13 @@ const LOAD: f64 = 3.0;
 /// At the base of an elastica under the load along it and a force across, from its tip at
 /// this angle: its angle, and its energy: of bending, and of both loads.
 fn elastica(tip: f64, across: f64) -> [f64; 2] {
-    let rate = |[theta, m, _]: [f64; 3]| {
+    let rate = |_, [theta, m, _]: [f64; 3]| {
         let (sin, cos) = theta.sin_cos();
         let energy = 0.5 * m * m + LOAD * cos - across * sin;
         [-m, LOAD * sin + across * cos, energy]
     };
-    let steps = 1000;
-    let h = 1.0 / f64::from(steps);
-    let mut y = [tip, 0.0, 0.0];
-    for _ in 0..steps {
-        let ahead = |k: [f64; 3], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
-        let a = rate(y);
-        let b = rate(ahead(a, 0.5 * h));
-        let c = rate(ahead(b, 0.5 * h));
-        let d = rate(ahead(c, h));
-        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
-    }
-    [y[0], y[2]]
+    let [theta, _, energy] = runge_kutta(rate, [tip, 0.0, 0.0], 1.0, 1000);
+    [theta, energy]
 }
 
 /// The force across that bends the elastica to this angle of its tip.
@@ -164,12 +110,7 @@ fn a_buckled_column_snaps_as_the_elastica() {
     let right = LOAD - elastica(buckled, 0.0)[1];
     let barrier = margin.barrier.unwrap();
     let error = barrier.error.unwrap();
-    println!(
-        "{} within {error:.1e}, off by {:.1e}",
-        barrier.energy,
-        barrier.energy - right
-    );
-    assert!((barrier.energy - right).abs() <= error.max(1e-11));
+    close("barrier", barrier.energy, right, error.max(1e-11));
     assert!(error < 1e-5 * right);
     assert!((barrier.saddle.tip.x - 1.0).abs() < 1e-9);
     assert!((barrier.neighbour.tip.y + leaf.tips[0].y).abs() < 1e-2);
@@ -202,7 +143,6 @@ fn vanish_as_at_a_fold(energies: [f64; 4]) {
     let beyond = [0, 1, 2].map(|k| {
         let (part, next) = (PARTS[k], PARTS[k + 1]);
         let exponent = (energies[k] / energies[k + 1]).ln() / (part / next).ln();
-        println!("{part}..{next}: exponent {exponent}");
         (exponent - 1.5) / (part * next).sqrt()
     });
     for pair in beyond.windows(2) {
@@ -221,8 +161,7 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
     let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
     let bent = |force: f64| {
         rod(&format!(
-            "{strip}; load.tip_force=[{:?}, {force:?}, 0]",
-            -LOAD
+            "{strip}; load.tip_force=[-{LOAD:?}, {force:?}, 0]"
         ))
     };
     let beyond = relaxed(&bent(-1.000001 * most), &Options::default());
@@ -236,11 +175,7 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
         };
         let (saddle, behind) = (right(0.01, angle), right(angle, 1.4));
         let back = barrier.saddle.energy - barrier.neighbour.energy;
-        println!(
-            "{part}: {back} behind, off by {:.1e}",
-            back - (saddle - behind)
-        );
-        assert!((back - (saddle - behind)).abs() < 1e-8);
+        close("the way back", back, saddle - behind, 1e-8);
         assert!(leaf.tips[0].y > 0.0 && barrier.neighbour.tip.y < 0.0);
         let back_over = push(&margin, "-y");
         is_at(back_over, force + most);
@@ -255,28 +190,20 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
 /// found, though on coarse grids the fold is elsewhere.
 #[test]
 fn the_barrier_of_a_clamped_arch_vanishes_at_its_fold() {
-    let arch = |load: f64| {
-        format!(
-            r#"
-        name = "arch"
-        leaf = {{ rods = 1, length = 1.0, fan = [0.3] }}
-        stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = 1e4, shear_2 = inf, shear_3 = inf }}
-        rest = {{ bend_3 = -0.6 }}
-        tip = {{ held = "clamped", position = [{:?}, 0.0, 0.0], angles = -0.3 }}
-        load = {{ gravity = [0.0, {:?}, 0.0] }}
-        "#,
-            0.3_f64.sin() / 0.3,
-            -load
-        )
-    };
-    let trace = follow(&arch(0.0), "", "load.gravity[1]=0..-40", false);
+    let span = 0.3_f64.sin() / 0.3;
+    let arch = format!(
+        "leaf.fan=[0.3]; stiffness.torsion=50; stiffness.bending_2=50; {}; rest.bend_3=-0.6; \
+         tip.held='clamped'; tip.position=[{span:?}, 0, 0]; tip.angles=-0.3; load.gravity=[0, 0, 0]",
+        set_stiffness(1e4, f64::INFINITY)
+    );
+    let trace = follow(ROD, &arch, "load.gravity[1]=0..-40", false);
     let fold = -trace.branches[0].critical().next().unwrap().1.value;
     vanish_as_at_a_fold(PARTS.map(|part| {
-        let (leaf, margin) = found(&parse(&arch((1.0 - part) * fold)), 1e-8);
+        let load = format!("load.gravity=[0, {:?}, 0]", (part - 1.0) * fold);
+        let (leaf, margin) = found(&rod(&format!("{arch}; {load}")), 1e-8);
         assert_eq!(leaf.stable(), Some(true));
         let barrier = margin.barrier.unwrap_or_else(|| panic!("{part}"));
         let (energy, error) = (barrier.energy, barrier.error.unwrap());
-        println!("{part}: {energy} within {error:.1e}");
         assert!(error < 1e-3 * energy, "{part}: {energy} within {error}");
         energy
     }));
@@ -294,8 +221,7 @@ fn passes_next_to_a_fold_are_not_overstepped() {
         assert!(leaf.tips[0].y < 0.0, "{force}");
         let barrier = margin.barrier.unwrap_or_else(|| panic!("{force}"));
         let (energy, error) = (barrier.energy, barrier.error.unwrap());
-        println!("{force}: {energy} within {error:.1e}");
-        assert!(error < 1e-6 * energy);
+        assert!(error < 1e-6 * energy, "{force}: {energy} within {error}");
         // By the theorem of Castigliano it changes with the way between both tips.
         let way = barrier.saddle.tip.y - leaf.tips[0].y;
         [force, energy, way]
@@ -303,28 +229,22 @@ fn passes_next_to_a_fold_are_not_overstepped() {
     for pair in energies.windows(2) {
         let [[f, e, w], [g, h, v]] = [pair[0], pair[1]];
         let trapezium = 0.5 * (g - f) * (w + v);
-        println!("{} {trapezium}", h - e);
-        assert!((h - e - trapezium).abs() < 0.01 * (h - e));
+        close("change", h - e, trapezium, 0.01 * (h - e));
     }
 }
 
 #[test]
 fn what_has_no_margin_is_said() {
     let place = Workplace::new();
-    let run = |more: &str| place.run(&format!("relax leaf.toml --margin --write none {more}"));
-    place.refuses("relax leaf.toml --margin --all", "cannot be used with");
-    place.refuses(
-        "relax leaf.toml --margin --method shooting",
-        "--margin: a margin is that of a relaxed leaf",
+    let run = |more: &str| place.run(format!("relax leaf.toml --margin --write none {more}"));
+    workplace::all_refused(
+        "relax leaf.toml --margin",
+        "--all => cannot be used with
+        --method shooting => --margin: a margin is that of a relaxed leaf
+        --set leaf.rods=1 --set load.tip_moment=[0,0,1] => dead moment",
     );
-    place.refuses(
-        "relax leaf.toml --margin --set leaf.rods=1 --set load.tip_moment=[0,0,1]",
-        "dead moment",
-    );
-    let held = "--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]";
-    run(held)
-        .ends(0)
-        .says(&["the tip is held: a force on it moves nothing"]);
+    let held = run("--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]").ends(0);
+    held.says(&["the tip is held: a force on it moves nothing"]);
     let free = run("--set leaf.joined=false").ends(0);
     assert!(!free.out.contains(" at the tip"), "{}", free.out);
 }
@@ -333,14 +253,10 @@ fn what_has_no_margin_is_said() {
 fn margins_do_not_depend_on_threads() {
     let place = Workplace::new();
     let [one, two] = ["1", "2"].map(|threads| {
-        let run = place.run_on(
-            threads,
-            "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1",
-        );
-        let mut margin = run.ends(0).json()["margin"].clone();
-        margin.as_object_mut().unwrap().remove("wall_seconds");
-        margin
+        let asked =
+            "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1";
+        timeless(place.run_on(threads, asked).ends(0).json()["margin"].clone())
     });
     assert_eq!(one, two);
-    assert!(one["pushes"].as_array().unwrap().len() == 6);
+    assert_eq!(one["pushes"].list().len(), 6);
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::motion::{discrete, off_cosine, rest, three_veins};
-use common::{close, fig04};
+use common::*;
 use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
 use leafdyn::internals::modes;
 use leafdyn::internals::motion::{Inertia, Physics};
@@ -95,15 +95,13 @@ fn shapes_are_orthonormal() {
     for (a, first) in pairs.iter().enumerate() {
         for (b, second) in pairs.iter().enumerate() {
             let mut product = 0.0;
-            for j in 0..4 {
-                for i in 1..=8 {
-                    let node = state.base(j) + i;
-                    let (p, q) = (first.shape[node], second.shape[node]);
-                    let inertia: Inertia = physics.inertia(&grid, j, i);
-                    let tensor = inertia.tensor(exact.q[node]);
-                    let [p, q] = [p, q].map(|s| (turn(&s), shift(&s)));
-                    product += p.0.dot(tensor * q.0) + inertia.mass * p.1.dot(q.1);
-                }
+            for (j, i) in (0..4).flat_map(|j| (1..=8).map(move |i| (j, i))) {
+                let node = state.base(j) + i;
+                let inertia: Inertia = physics.inertia(&grid, j, i);
+                let tensor = inertia.tensor(exact.q[node]);
+                let [p, q] = [first, second].map(|mode| mode.shape[node]);
+                let turned = turn(&p).dot(tensor * turn(&q));
+                product += turned + inertia.mass * shift(&p).dot(shift(&q));
             }
             close("product", product, f64::from(u8::from(a == b)), 1e-9);
         }

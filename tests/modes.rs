@@ -8,14 +8,11 @@ use std::f64::consts::PI;
 use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, three_veins};
 use common::random::{cases, leaves};
 use common::vibration::Linear;
-use common::{
-    TIMOSHENKO, close, extrapolate, fig04, in_full, keeping, linear, on_threads, paper_leaf,
-    relaxed, scenario, settled, table,
-};
+use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
 use leafdyn::internals::motion::Physics;
-use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
-use leafdyn::scenario::{Dynamics, Profile, Scenario};
+use leafdyn::relax::{Method, Mode, relax};
+use leafdyn::scenario::Dynamics;
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
 
@@ -51,7 +48,6 @@ fn assert_known(name: &str, leaf: &Equilibrium, known: &[f64], digits: f64) {
         let error = (found / known - 1.0).abs();
         let estimate = mode.error.expect("several grids") / (2.0 * known * known);
         let what = format!("{name}, mode {k}: {found:.10}, {error:.1e}, estimate {estimate:.1e}");
-        println!("{what}");
         assert!(error < 1e-6, "{what}");
         assert!(error <= estimate + digits, "{what}");
     }
@@ -61,13 +57,8 @@ fn assert_known(name: &str, leaf: &Equilibrium, known: &[f64], digits: f64) {
 #[test]
 fn a_slender_beam_vibrates_as_euler_and_bernoulli_say() {
     let known: Vec<f64> = SLENDER.iter().flat_map(|b| [b * b; 2]).collect();
-    let slender = beam(1e-10, [f64::INFINITY; 2]);
-    assert_known(
-        "Euler-Bernoulli",
-        &settled(&slender, &with(6)),
-        &known,
-        1e-8,
-    );
+    let slender = settled(&beam(1e-10, [f64::INFINITY; 2]), &with(6));
+    assert_known("Euler-Bernoulli", &slender, &known, 1e-8);
 }
 
 /// Roots of the frequency equation of the clamped Timoshenko beam (T. C. Huang,
@@ -98,14 +89,12 @@ fn a_hanging_chain() {
         rod.rods[0].couple_stiffness[0] = linear(&at, &value);
         let leaf = settled(&rod, &with(4));
         let found: Vec<f64> = modes_of(&leaf).iter().filter_map(Mode::frequency).collect();
-        println!("bending {part}: {found:?} on {:?}", leaf.accuracy.segments);
         close("twice", found[1] / found[0], 1.0, 1e-8);
         close("twice", found[3] / found[2], 1.0, 1e-8);
         [found[0], found[2]]
     });
     for (k, within) in [(0, 1e-6), (1, 2e-5)] {
         let found = extrapolate(&softer.map(|pair| pair[k]), 0.5);
-        println!("mode {}: {:.1e}", k + 1, found / known[k] - 1.0);
         close("frequency", found / known[k], 1.0, within);
     }
 }
@@ -141,35 +130,32 @@ fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
 
 #[test]
 fn eigenvalues_are_those_of_a_dense_method() {
-    let on = |segments, count, keep: bool| {
-        let options = Options {
-            tolerance: Some(1e-12),
-            ..with_on(segments, count)
-        };
-        if keep { keeping(options) } else { options }
+    let on = |segments, count| Options {
+        tolerance: Some(1e-12),
+        ..with_on(segments, count)
     };
-    assert_as_dense("three veins", &three_veins(), &on(6, 25, false));
+    assert_as_dense("three veins", &three_veins(), &on(6, 25));
     let mut round = three_veins();
     round.dynamics.polar_excess = 1.0;
     round.dynamics.density = vec![Profile::Constant(7.0); 3];
-    assert_as_dense("heavier", &round, &on(6, 25, false));
+    assert_as_dense("heavier", &round, &on(6, 25));
     let mut free = three_veins();
     free.joined = false;
-    assert_as_dense("free tips", &free, &on(6, 25, false));
-    assert_as_dense("Fig. 4", &fig04(5), &on(8, 20, false));
+    assert_as_dense("free tips", &free, &on(6, 25));
+    assert_as_dense("Fig. 4", &fig04(5), &on(8, 20));
     // Every vein vibrates nearly alike, or exactly: eigenvalues are close
     // together, or the same twelve times.
-    assert_as_dense("Fig. 4, many veins", &fig04(20), &on(4, 12, false));
+    assert_as_dense("Fig. 4, many veins", &fig04(20), &on(4, 12));
     let mut same = paper_leaf(6, [1.0; 3], [100.0; 3], 0.0);
     same.joined = false;
     same.coupling = vec![[0.0; 3]; 5];
     for count in [2, 12, 15] {
-        assert_as_dense("six equal veins", &same, &on(4, count, false));
+        assert_as_dense("six equal veins", &same, &on(4, count));
     }
     // All there are.
-    assert_as_dense("one vein", &fig04(1), &on(4, 100, false));
+    assert_as_dense("one vein", &fig04(1), &on(4, 100));
     let flat = scenario("paper/fig10", "leaf.rods=5");
-    assert_as_dense("a saddle", &flat, &on(10, 30, true));
+    assert_as_dense("a saddle", &flat, &keeping(on(10, 30)));
 }
 
 /// The three veins brought to rest by motion have the same modes.
@@ -284,18 +270,13 @@ fn no_modes_without_a_potential_or_rest_or_request() {
     let mut rollup = fig04(1);
     rollup.tip_moment = [0.0, 1.0, 0.0];
     assert!(settled(&rollup, &with(3)).stability.modes.is_none());
-    assert!(
-        settled(&fig04(2), &Options::default())
-            .stability
-            .modes
-            .is_none()
-    );
-    let options = Options {
-        modes: 3,
-        ..Options::default()
+    let unasked = settled(&fig04(2), &Options::default());
+    assert!(unasked.stability.modes.is_none());
+    let without_shapes = Options {
+        mode_shapes: false,
+        ..with(3)
     };
-    let leaf = settled(&fig04(3), &options);
-    assert_eq!(modes_of(&leaf).len(), 3);
+    assert_eq!(modes_of(&settled(&fig04(3), &without_shapes)).len(), 3);
     let many = relax(&fig04(1), &with(101), &mut |_| {});
     assert!(many.unwrap_err().to_string().contains("modes = 101"));
 }

@@ -14,11 +14,10 @@ mod common;
 
 use common::motion::{BOTH, Scheme, discrete, explicit, method, released};
 use common::vibration::Linear;
-use common::{order, paper_leaf};
+use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
 use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation;
-use leafdyn::scenario::{Profile, Scenario};
 
 /// Amplitude: small enough to be linear, large beside rounding.
 const SIZE: f64 = 1e-6;
@@ -104,7 +103,7 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
             let order = order(errors[0], errors[1]);
             let ratio = drag / (2.0 * omega);
             let what = format!("{name}, {scheme:?}, mode {mode}, damping ratio {ratio:.2}");
-            println!("{what}: order {order:.3}, errors {errors:?}");
+            let what = format!("{what}: order {order:.3}, errors {errors:?}");
             // Beside nonlinear terms, an error this small has no order.
             assert!(errors[1] < 1e-3, "{what}");
             assert!((order - 2.0).abs() < 0.05 || errors[1] < 1e-6, "{what}");

@@ -7,13 +7,11 @@
 
 mod common;
 
-use common::motion::{discrete, explicit, released};
-use common::parse;
-use glam::DVec3;
+use common::motion::{Scheme, discrete, explicit, moving, released};
+use common::*;
 use leafdyn::internals::leaf::{DiscreteLeaf, Leaf};
 use leafdyn::internals::motion::{Method, Physics, Snapshot};
-use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{Options, Refused, Scheme, Simulation};
+use leafdyn::simulate::{self, Refused, Simulation};
 
 /// L = 10, EA = GA = 1e4, EI = GJ = 500, rho A = 1, rho I = 10; loads rise
 /// until t = 2.5 and fall until t = 5. The loaded end is the tip.
@@ -137,7 +135,6 @@ fn momenta_are_the_impulses_of_the_loads() {
         let chord = |s: &Snapshot| s.state.x[0].distance(s.state.tip(0));
         let shortest = flight.snapshots.iter().map(chord).fold(1.0, f64::min);
         let tip = flight.snapshots[ALL].state.tip(0);
-        println!("{internal}: {linear:.1e} {angular:.1e}; chord {shortest:.2}, tip at {tip:.2}");
         assert!(linear < 1e-12 && angular < 1e-12);
         assert!(shortest < 0.85 && tip.x > 5.0 && tip.z < -0.2);
 
@@ -155,10 +152,8 @@ fn momenta_are_the_impulses_of_the_loads() {
         assert!(kept, "{linear:.1e} {angular:.1e}");
         let energies = flight.snapshots[LOADED..].iter().map(|s| s.energy);
         let balance: Vec<f64> = energies.map(|e| e.balance()).collect();
-        let off = balance.iter().map(|b| (b - balance[0]).abs());
-        let off = off.fold(0.0, f64::max);
+        let off = largest(balance.iter().map(|b| (b - balance[0]).abs()));
         let kinetic = flight.snapshots[LOADED].energy.kinetic;
-        println!("balance within {off:.1e} of {kinetic:.2}");
         assert!(off < 1e-4 * kinetic);
     }
 }
@@ -175,7 +170,6 @@ fn damped_from_outside_both_decay_alike() {
     let decayed = free.iter().enumerate().skip(1);
     let decayed = decayed.map(|(k, now)| (now, free[0].map(|start| start * part.powi(k as i32))));
     let [linear, angular] = worst(decayed);
-    println!("decay: linear {linear:.1e}, angular {angular:.1e}");
     assert!(linear < 1e-12 && angular < 1e-12);
     let all: f64 = (ALL - LOADED) as f64 * flight.step * flight.damping;
     let left = free[free.len() - 1][0].length() / free[0][0].length();
@@ -186,18 +180,14 @@ fn damped_from_outside_both_decay_alike() {
 #[test]
 fn the_semi_implicit_method_does_not_fly() {
     let scenario = parse(SPAGHETTI);
-    let of = |scheme| {
-        let options = Options {
-            scheme,
-            ..Options::default()
-        };
-        Simulation::new(&scenario, &options).map(|s| s.scheme())
+    let of = |scenario: &Scenario, options: &simulate::Options| {
+        Simulation::new(scenario, options).map(|simulation| simulation.scheme())
     };
-    assert_eq!(of(None), Ok(Scheme::Explicit));
+    let default = simulate::Options::default();
+    assert_eq!(of(&scenario, &default), Ok(Scheme::Explicit));
     let held = Err(Refused::Held { rigid: false });
-    assert_eq!(of(Some(Scheme::SemiImplicit)), held);
+    assert_eq!(of(&scenario, &moving(Scheme::SemiImplicit, None)), held);
     let mut rigid = scenario.clone();
-    rigid.rods[0].force_stiffness[0] = leafdyn::scenario::Profile::Constant(f64::INFINITY);
-    let refused = Simulation::new(&rigid, &Options::default()).map(|_| ());
-    assert_eq!(refused, Err(Refused::Held { rigid: true }));
+    rigid.rods[0].force_stiffness[0] = Profile::Constant(f64::INFINITY);
+    assert_eq!(of(&rigid, &default), Err(Refused::Held { rigid: true }));
 }

@@ -11,9 +11,8 @@ use common::motion::{
     BOTH, DAMPINGS, Scheme, apart, at, curling, distance, limit, method, numbers, ramp, rest,
     three_veins, twisted_rod,
 };
-use common::order;
+use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
-use leafdyn::scenario::Scenario;
 
 /// How equal limits can be: internal damping also takes the fast waves, whose
 /// error falls with the order but is large.
@@ -37,8 +36,7 @@ fn assert_order(name: &str, scenario: &Scenario, far: f64, equal: f64) {
         let found = [1, 2, 4].map(|times| numbers(&on(times)));
         let changes = [0, 1].map(|k| distance(&found[k], &found[k + 1]));
         let order = order(changes[0], changes[1]);
-        println!("{name}, {scheme:?}: order {order:.3}, changes {changes:?}");
-        assert!((order - 2.0).abs() < 0.1, "{name}, {scheme:?}: {order:.3}");
+        close(&format!("order of {name}, {scheme:?}"), order, 2.0, 0.1);
         limit(&found[1], &found[2])
     });
     let positions = 3 * state.x.len();
@@ -46,7 +44,6 @@ fn assert_order(name: &str, scenario: &Scenario, far: f64, equal: f64) {
     let moved = apart(&start, &limits[0][..positions]);
     assert!(moved > far, "{name}: moved by {moved}");
     let between = apart(&limits[0], &limits[1]);
-    println!("{name}: moved by {moved:.2}, methods {between:.1e} apart");
     assert!(between < equal, "{name}: {between:.1e} apart");
 }
 
@@ -122,7 +119,6 @@ fn in_intervals_of_any_lengths() {
             [2e-3, 2.5e-4].map(|h| in_intervals(scheme, &leaf, &state, h));
         let errors = [coarse, fine].map(|found| distance(&found, &truth));
         let order = (errors[0] / errors[1]).ln() / (many / few).ln();
-        println!("{scheme:?} in intervals: order {order:.3}, errors {errors:?}");
-        assert!((order - 2.0).abs() < 0.1, "{scheme:?}: {errors:?}");
+        close(&format!("order of {scheme:?}"), order, 2.0, 0.1);
     }
 }

@@ -3,17 +3,14 @@
 
 mod common;
 
-use common::random::splitmix64;
-use common::{entries, scenario};
-use glam::DVec3;
-use leafdyn::scenario::Scenario;
+use common::motion::run;
+use common::random::Draw;
+use common::*;
 use leafdyn::simulate::{Options, Simulation};
 
 fn leaf(overrides: &str) -> Scenario {
-    let rigid = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.shear_3=inf";
     let moving = "dynamics.external_damping=0; dynamics.internal_damping=0; dynamics.duration=0.3";
-    assert!(!entries(overrides).is_empty());
-    scenario("motion/swing", &format!("{rigid}; {moving}; {overrides}"))
+    scenario("motion/swing", &format!("{RIGID}; {moving}; {overrides}"))
 }
 
 #[test]
@@ -42,17 +39,18 @@ fn they_are_closed_and_their_energy_is_kept() {
         let begin = first.energy.balance();
         let mut largest = 0.0_f64;
         while !simulation.done() {
-            let frame = simulation.next_frame().unwrap_or_else(|stopped| {
-                panic!("{overrides}: {stopped}");
-            });
-            largest = largest.max(frame.energy.kinetic);
-            let off = frame.energy.balance() - begin;
-            assert!(
-                off.abs() < 1e-3 * (1.0 + begin.abs()),
-                "{overrides}: {off:.1e}"
+            let frame = simulation.next_frame();
+            let energy = frame
+                .unwrap_or_else(|stopped| panic!("{overrides}: {stopped}"))
+                .energy;
+            largest = largest.max(energy.kinetic);
+            close(
+                overrides,
+                energy.balance(),
+                begin,
+                1e-3 * (1.0 + begin.abs()),
             );
         }
-        println!("{overrides}: {begin} kept, {largest} moved");
         assert!(largest > 1e-4, "{overrides}: it moves");
     }
 }
@@ -60,26 +58,19 @@ fn they_are_closed_and_their_energy_is_kept() {
 /// Fans of all kinds move, those too in which a rod has to bend far to reach the others.
 #[test]
 fn fans_of_all_kinds_move() {
-    let mut state = 5;
-    let mut uniform = |low: f64, high: f64| low + (high - low) * splitmix64(&mut state);
+    let mut draw = Draw(5);
     for case in 0..30 {
-        let rods = uniform(2.0, 9.0) as usize;
-        let mut each = |low, high| -> Vec<f64> { (0..rods).map(|_| uniform(low, high)).collect() };
-        let (fan, length) = (each(-1.6, 1.6), each(0.7, 1.4));
+        let rods = draw.uniform(2.0, 9.0) as usize;
+        let (fan, length) = (draw.list(rods, -1.6, 1.6), draw.list(rods, 0.7, 1.4));
         let fan = match case % 3 {
             0 => format!("{fan:?}"),
             1 => "\"symmetric\"".into(),
             _ => "\"paper\"".into(),
         };
-        let overrides = format!(
-            "leaf.rods={rods}; leaf.fan={fan}; leaf.length={length:?}; dynamics.duration=1e-3; dynamics.output_interval=1e-3"
-        );
-        let mut simulation = Simulation::new(&leaf(&overrides), &Options::default()).unwrap();
-        while !simulation.done() {
-            simulation.next_frame().unwrap_or_else(|stopped| {
-                panic!("{overrides}: {stopped}");
-            });
-        }
-        assert!(simulation.frame().energy.kinetic > 0.0, "{overrides}");
+        let short = "dynamics.duration=1e-3; dynamics.output_interval=1e-3";
+        let overrides =
+            format!("leaf.rods={rods}; leaf.fan={fan}; leaf.length={length:?}; {short}");
+        let last = run(&leaf(&overrides), &Options::default());
+        assert!(last.energy.kinetic > 0.0, "{overrides}");
     }
 }

@@ -4,10 +4,9 @@
 mod common;
 
 use common::motion::{explicit, released, semi_implicit};
-use common::{on_threads, parse};
+use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
 use leafdyn::internals::motion::{Method, Steps};
-use leafdyn::scenario::Scenario;
 
 /// A damped leaf under loads that change.
 fn scenario(rods: usize) -> Scenario {

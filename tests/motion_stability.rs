@@ -7,10 +7,10 @@ mod common;
 use common::motion::{discrete, explicit, ramp, released};
 use common::random::{cases, movers};
 use common::vibration::Linear;
-use common::{paper_leaf, rod, settle_on};
+use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
 use leafdyn::internals::motion::{Energy, Method, Physics, Stopped};
-use leafdyn::scenario::{Scenario, Schedule};
+use leafdyn::scenario::Schedule;
 use leafdyn::simulate::{Options, Refused, Simulation};
 use proptest::prelude::*;
 
@@ -69,7 +69,6 @@ proptest! {
         let method = |h: f64| explicit(&model, &state, Some(h));
         let stable = method(1.0).stable_step();
         let (said, truth) = (stable.step, true_limit(&model, &state));
-        println!("{}: {:.3} times longer is stable, too", stable.limit, truth / said);
         prop_assert!((0.999..1.5).contains(&(truth / said)), "{stable:?}, in truth {truth}");
 
         let h = 0.99 * said;
@@ -105,7 +104,6 @@ fn of_a_leaf_that_coupling_rules() {
         let method = |h| explicit(&leaf, &state, Some(h));
         let stable = method(1.0).stable_step();
         let ratio = true_limit(&leaf, &state) / stable.step;
-        println!("{rods} rods: {ratio:.3} times longer is stable, too");
         assert_eq!(stable.limit, "coupling");
         assert!((0.999..1.2).contains(&ratio), "{ratio}");
         let steps = |part: f64| {
@@ -147,8 +145,7 @@ fn a_thick_rod_comes_to_rest() {
         let rest = settle_on(&rod, 20, false);
         let off = now.state.tip(0).distance(rest.tips[0]);
         let kinetic = now.energy.kinetic;
-        println!("damping {damping}: kinetic {kinetic:.1e}, tip off by {off:.1e}");
-        assert!(kinetic < 1e-20 && off < 1e-8);
+        assert!(kinetic < 1e-20 && off < 1e-8, "{kinetic:e} {off:e}");
     }
 }
 
@@ -168,8 +165,7 @@ fn a_thick_rod_keeps_its_energy() {
         most = most.max(energy.kinetic);
         off = off.max((energy.balance() - start).abs());
     }
-    println!("kinetic energy up to {most:.2}, balance off by {off:.1e}");
-    assert!(most > 5.0 && off < 0.05 * most);
+    assert!(most > 5.0 && off < 0.05 * most, "{off} of {most}");
 }
 
 /// What has no energy yet and what is loaded within a step is not taken for

@@ -3,10 +3,7 @@
 
 mod common;
 
-use common::{fig04, linear, on, paper_leaf, settled};
-use glam::DVec3;
-use leafdyn::relax::Options;
-use leafdyn::scenario::{Profile, Scenario};
+use common::*;
 
 /// Positions at the stations of the coarsest grid, solved on one grid.
 fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
@@ -26,8 +23,7 @@ fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
 }
 
 fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
-    let apart = a.iter().zip(b).map(|(a, b)| (*a - *b).length());
-    apart.fold(0.0, f64::max)
+    largest(a.iter().zip(b).map(|(a, b)| a.distance(*b)))
 }
 
 /// Column m of the extrapolation table, on seven grids each half as fine as
@@ -43,13 +39,18 @@ fn assert_orders(name: &str, scenario: &Scenario, coarsest: usize) {
         let changes: Vec<f64> = column.windows(2).map(|w| distance(&w[0], &w[1])).collect();
         // Two successive changes above rounding, as fine as possible.
         let rounding = if m < 3 { 1e-12 } else { 3e-14 };
-        let above = changes.iter().take_while(|change| **change > rounding);
-        let seen = above.count();
+        let seen = changes
+            .iter()
+            .take_while(|change| **change > rounding)
+            .count();
         assert!(seen >= 2, "{name}: column {m} changes by {changes:?}");
         let observed = (changes[seen - 2] / changes[seen - 1]).log2();
-        let what = format!("{name}: order {observed:.3} for {order}, changes {changes:?}");
-        println!("{what}");
-        assert!((observed - order).abs() < slack, "{what}");
+        close(
+            &format!("order of {name}, {changes:?}"),
+            observed,
+            order,
+            slack,
+        );
         let power = 4f64.powi(m as i32 + 1);
         let next = |w: &[Vec<DVec3>]| {
             let pairs = w[0].iter().zip(&w[1]);

@@ -5,15 +5,14 @@
 mod common;
 
 use common::random::{cases, leaves};
-use common::{keeping, on, parse, relaxed, rest, same, scenario};
-use glam::{DVec2, DVec3};
+use common::*;
+use glam::DVec2;
 use leafdyn::internals::lanes::Lanes;
 use leafdyn::internals::rod::{
     Element, Ends, Nodes, PlanarElement, Section, Sections, SpatialElement,
 };
 use leafdyn::internals::rotation;
-use leafdyn::relax::{Options, Outcome, SemiImplicit, Work};
-use leafdyn::scenario::{Profile, Scenario};
+use leafdyn::relax::{Outcome, SemiImplicit};
 use leafdyn::shape::Difference;
 use proptest::prelude::*;
 use pulp::Scalar;
@@ -39,8 +38,7 @@ proptest! {
     #[test]
     fn a_leaf_in_its_plane_is_the_leaf(leaf in leaves()) {
         let leaf = in_plane(leaf);
-        let segments = Some(20);
-        let (planar, full) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+        let [planar, full] = reduced_and_full(&leaf, Some(20));
         prop_assert_eq!(planar.outcome, full.outcome);
         prop_assert!(!full.model.planar);
         prop_assert_eq!(planar.stability.negative_eigenvalues, full.stability.negative_eigenvalues);
@@ -48,8 +46,7 @@ proptest! {
         same(&leaf, &planar, &full);
         // Nothing is told of the plane that is not so.
         if planar.model.planar {
-            let nodes = || full.shape.rods.iter().flat_map(|rod| &rod.nodes);
-            prop_assert!(nodes().all(|node| node.position.z == 0.0));
+            prop_assert!(nodes(&full.shape.rods).all(|node| node.position.z == 0.0));
         }
     }
 
@@ -134,23 +131,26 @@ fn the_paper_s_flat_leaf_is_found_in_its_plane() {
         (35, [4, 10, 10, 13]),
     ] {
         let leaf = fig05(&format!("leaf.rods={rods}"));
-        let (planar, full) = (rest(&leaf, false, None), rest(&leaf, true, None));
+        let [planar, full] = reduced_and_full(&leaf, None);
         assert!(planar.model.planar && !full.model.planar);
         assert_eq!(planar.outcome, Outcome::Converged);
         assert_eq!(planar.accuracy.segments, full.accuracy.segments);
-        let [steps, factorizations, force_evaluations, cg_iterations] = work;
-        let counted = Work {
-            steps,
-            factorizations,
-            force_evaluations,
-            cg_iterations,
-        };
-        assert_eq!(planar.work, counted, "{rods} rods");
-        assert_eq!(planar.work.steps, full.work.steps);
-        assert_eq!(planar.work.cg_iterations, full.work.cg_iterations);
+        let [found, full_work] = [&planar, &full].map(|leaf| {
+            let work = leaf.work;
+            [
+                work.steps,
+                work.factorizations,
+                work.force_evaluations,
+                work.cg_iterations,
+            ]
+        });
+        assert_eq!(found, work, "{rods} rods");
+        assert_eq!([found[0], found[3]], [full_work[0], full_work[3]]);
         let apart = Difference::between(&planar.shape.rods, &full.shape.rods);
-        let equal = apart.position < 1e-13 && apart.rotation < 1e-12;
-        assert!(equal, "{apart:?}");
+        assert!(
+            apart.position < 1e-13 && apart.rotation < 1e-12,
+            "{apart:?}"
+        );
         for (a, b) in [
             (planar.model.shear_effect, full.model.shear_effect),
             (planar.model.stretch_effect, full.model.stretch_effect),
@@ -165,7 +165,7 @@ fn the_paper_s_flat_leaf_is_found_in_its_plane() {
 fn both_reductions_go_together() {
     for (rods, solved) in [(2, 1), (4, 2), (5, 3), (21, 11)] {
         let leaf = fig05(&format!("leaf.rods={rods}; leaf.fan='symmetric'"));
-        let (both, full) = (rest(&leaf, false, Some(16)), rest(&leaf, true, Some(16)));
+        let [both, full] = reduced_and_full(&leaf, Some(16));
         assert!(both.model.planar);
         assert_eq!(both.model.rods, solved);
         let apart = Difference::between(&both.shape.rods, &full.shape.rods);
@@ -188,21 +188,20 @@ fn a_leaf_that_buckles_out_of_its_plane_is_followed() {
         let soft = format!("{soft}; leaf.fan='{fan}'; stiffness.bending_3={bending_3}; {entry}");
         let leaf = fig05(&soft);
         for segments in [Some(16), None] {
-            let (found, full) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+            let [found, full] = reduced_and_full(&leaf, segments);
             assert!(found.outcome.is_success(), "{what}: {:?}", found.outcome);
             assert_eq!(found.outcome, full.outcome, "{what}");
             assert_eq!(found.stability.negative_eigenvalues, Some(0), "{what}");
             assert!(!found.model.planar, "{what}");
-            let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
-            let lift = nodes().fold(0.0_f64, |most, node| most.max(node.position.z.abs()));
+            let lift = largest(nodes(&found.shape.rods).map(|node| node.position.z.abs()));
             assert!(lift > 0.05, "{what}: {lift}");
             let apart = Difference::between(&found.shape.rods, &full.shape.rods);
             assert!(apart.position < 1e-12, "{what}: {apart:?}");
         }
         // Stiff enough, the same leaf stays flat.
         let stiff = "stiffness.bending_2=50; stiffness.torsion=50";
-        let leaf = fig05(&format!("{soft}; {stiff}"));
-        assert!(rest(&leaf, false, None).model.planar, "{what}");
+        let leaf = relaxed(&fig05(&format!("{soft}; {stiff}")), &Options::default());
+        assert!(leaf.model.planar, "{what}");
     }
 }
 
@@ -227,7 +226,7 @@ fn a_flat_valley_that_the_leaf_does_not_come_to_is_not_told() {
         value = [[1.3714156700735378, 1.533170181247829, 0.8228494020441227], [1.0032007292937608, 1.1215253533429401, 0.6019204375762565]]
     "#,
     );
-    let (found, full) = (rest(&leaf, false, Some(20)), rest(&leaf, true, Some(20)));
+    let [found, full] = reduced_and_full(&leaf, Some(20));
     assert!(!found.model.planar);
     assert_eq!(found.outcome, full.outcome);
     let apart = Difference::between(&found.shape.rods, &full.shape.rods);
@@ -248,21 +247,19 @@ fn other_leaves_are_solved_in_space() {
         "rest.bend_2=[0, 1e-9, 0]",
         "rest.twist=[0, 0, 1e-9]",
     ] {
-        let leaf = fig05(&format!("leaf.rods=3; {entry}"));
-        assert!(!rest(&leaf, false, Some(8)).model.planar, "{entry}");
+        let leaf = relaxed(&fig05(&format!("leaf.rods=3; {entry}")), &on(8));
+        assert!(!leaf.model.planar, "{entry}");
     }
     let leaf = fig05("leaf.rods=3");
     let disturbed = SemiImplicit {
         disturbance: Some(1),
         ..SemiImplicit::default()
     };
-    for options in [
-        keeping(Options::default()),
-        Options {
-            method: disturbed.into(),
-            ..Options::default()
-        },
-    ] {
+    let disturbed = Options {
+        method: disturbed.into(),
+        ..Options::default()
+    };
+    for options in [keeping(Options::default()), disturbed] {
         assert!(!relaxed(&leaf, &options).model.planar);
     }
 }

@@ -3,8 +3,7 @@
 
 mod common;
 
-use common::{Both, table};
-use glam::DVec3;
+use common::*;
 
 /// Length in m.
 const LENGTH: f64 = 0.508;

@@ -5,65 +5,39 @@ mod workplace;
 
 use std::fs;
 
-use workplace::{Run, Workplace, contains};
+use workplace::{Json, Run, Workplace, contains, pairs};
+
+/// Requests, and what is said of them.
+const REFUSED: &str = "
+    relax absent.toml => absent.toml: cannot be read
+    relax leaf.toml --segments few => invalid value 'few' for '--segments <N>'
+    relax => <SCENARIO>
+    relax leaf.toml --write pdf => pdf: must be some of
+    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
+    relax leaf.toml --out plain/out => plain is not a folder
+    check leaf.toml --intervals 0 => --intervals 0: allowed are
+    simulate leaf.toml --resume => cannot resume
+    trace leaf.toml --vary leaf.rods=1..2 => a whole number has nothing between
+    map leaf.toml --vary stiffness.torsion=1 => has no ..
+    map leaf.toml --vary rest.twist=0..1 --shard 3/2 => --shard <I/K>
+    chart leaf.toml --seconds 0 => --seconds 0: must be
+";
 
 #[test]
 fn every_refusal_is_one_json_object() {
     let place = Workplace::new();
-    fs::write(place.path("plain"), "").unwrap();
-    for (arguments, part) in [
-        ("relax absent.toml --json", "absent.toml: cannot be read"),
-        (
-            "relax leaf.toml --json --segments few",
-            "invalid value 'few' for '--segments <N>'",
-        ),
-        ("relax --json", "<SCENARIO>"),
-        ("relax leaf.toml --json --write pdf", "pdf: must be some of"),
-        (
-            "relax leaf.toml --json --set leaf.rods=0",
-            "leaf.rods = 0: must be a whole number",
-        ),
-        (
-            "relax leaf.toml --json --out plain/out",
-            "plain is not a folder",
-        ),
-        (
-            "check leaf.toml --json --intervals 0",
-            "--intervals 0: allowed are",
-        ),
-        ("simulate leaf.toml --json --resume", "cannot resume"),
-        (
-            "trace leaf.toml --json --vary leaf.rods=1..2",
-            "a whole number has nothing between",
-        ),
-        (
-            "map leaf.toml --json --vary stiffness.torsion=1",
-            "has no ..",
-        ),
-        (
-            "map leaf.toml --json --vary rest.twist=0..1 --shard 3/2",
-            "--shard <I/K>",
-        ),
-        ("chart leaf.toml --json --seconds 0", "--seconds 0: must be"),
-    ] {
-        place.refuses(arguments, part);
-        let run = place.run(arguments);
+    place.write("plain", "");
+    for (arguments, part) in pairs(REFUSED) {
+        let run = place.refuses(format!("{arguments} --json"), part);
         let refused = run.json();
         let keys: Vec<&String> = refused.as_object().unwrap().keys().collect();
         assert_eq!(keys, ["error", "exit_status"], "{arguments}");
         // To people it says the same.
-        assert_eq!(
-            run.err.trim_end(),
-            format!("error: {}", refused["error"].as_str().unwrap())
-        );
+        let said = format!("error: {}", refused["error"].text());
+        assert_eq!(run.err.trim_end(), said);
     }
-    assert!(
-        place
-            .run("relax --help --json")
-            .ok()
-            .out
-            .starts_with("Find how a leaf")
-    );
+    let help = place.ok("relax --help --json").out;
+    assert!(help.starts_with("Find how a leaf"));
 }
 
 /// What was found is not lost with the files, and is one object, too.
@@ -71,14 +45,14 @@ fn every_refusal_is_one_json_object() {
 fn files_that_cannot_be_written_are_told_beside_the_result() {
     let place = Workplace::new();
     fs::create_dir_all(place.path("out/small/figure.svg/in")).unwrap();
+    place.write("leaf2.toml", workplace::leaf("two", 2));
     for verb in ["relax leaf.toml", "relax leaf.toml leaf2.toml"] {
-        fs::write(place.path("leaf2.toml"), workplace::leaf("two", 2)).unwrap();
-        let run = place.run(&format!("{verb} --json")).ends(2);
+        let run = place.run(format!("{verb} --json")).ends(2);
         let json = run.json();
         let json = if json.is_array() { &json[0] } else { &json };
         assert_eq!(json["outcome"], "converged");
         assert_eq!(json["exit_status"], 2);
-        let error = json["error"].as_str().unwrap();
+        let error = json["error"].text();
         contains(error, &["cannot write out/small/figure.svg"]);
         assert_eq!(run.err.trim_end(), format!("error: {error}"));
     }
@@ -87,9 +61,8 @@ fn files_that_cannot_be_written_are_told_beside_the_result() {
 /// What a terminal gets of a run.
 fn shown(run: Run) -> String {
     let all = run.out + &run.err;
-    let obeyed = all
-        .chars()
-        .find(|c| c.is_control() && !matches!(c, '\n' | '\t'));
+    let mut characters = all.chars();
+    let obeyed = characters.find(|c| c.is_control() && !matches!(c, '\n' | '\t'));
     assert_eq!(obeyed, None, "{all:?}");
     assert!(!all.contains(['\u{202e}', '\u{2066}']), "{all:?}");
     all
@@ -98,45 +71,32 @@ fn shown(run: Run) -> String {
 #[test]
 fn control_characters_are_escaped() {
     let place = Workplace::new();
-    let (esc, bell, back) = ("\u{1b}[31m", "\u{7}", "\u{202e}");
-    let run = |arguments: &[&str]| {
-        let mut command = place.command("");
-        let run = Run::from(command.args(arguments).output().unwrap());
-        assert_eq!(run.status, Some(2), "{arguments:?}");
-        shown(run)
+    let (esc, escaped) = ("\u{1b}[31m", "\\u{1b}[31m");
+    let run = |arguments: &str| {
+        let named = arguments.replace("NAME", &format!("{esc}\u{7}\u{202e}"));
+        shown(place.run(named).ends(2))
     };
-    let escaped = "\\u{1b}[31m";
-    let name = format!("{esc}{bell}{back}");
-    let set = |entry: &str| ["relax", "leaf.toml", "--set", entry].map(String::from);
     for arguments in [
-        ["relax", &format!("{name}.toml"), "--json", "--write=none"].map(String::from),
-        set(&format!("{name}=1")),
-        set(&format!("leaf.fan={name}")),
-        set(&format!("name={name}")),
-        set(&format!("leaf.rods[{name}]=1")),
-        ["relax", "leaf.toml", "--out", &format!("leaf.toml/{name}")].map(String::from),
-        ["chart", "leaf.toml", "--peers", &name].map(String::from),
+        "relax NAME.toml --json --write=none",
+        "relax leaf.toml --set NAME=1",
+        "relax leaf.toml --set leaf.fan=NAME",
+        "relax leaf.toml --set name=NAME",
+        "relax leaf.toml --set leaf.rods[NAME]=1",
+        "relax leaf.toml --out leaf.toml/NAME",
+        "chart leaf.toml --peers NAME",
     ] {
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        let said = run(&arguments);
+        let said = run(arguments);
         assert!(said.contains(escaped), "{arguments:?}: {said}");
     }
     // Of requests that are not understood they may also be left out.
     for arguments in [
-        ["relax", "leaf.toml", "--method", &name].map(String::from),
-        ["map", "leaf.toml", "--vary", &format!("{name}=1..2")].map(String::from),
-        [
-            "trace",
-            "leaf.toml",
-            "--vary",
-            &format!("rest.twist={name}"),
-        ]
-        .map(String::from),
-        ["relax", "leaf.toml", "--write", &name].map(String::from),
-        ["relax", "leaf.toml", &format!("--{name}"), "1"].map(String::from),
+        "relax leaf.toml --method NAME",
+        "map leaf.toml --vary NAME=1..2",
+        "trace leaf.toml --vary rest.twist=NAME",
+        "relax leaf.toml --write NAME",
+        "relax leaf.toml --NAME 1",
     ] {
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        run(&arguments);
+        run(arguments);
     }
     // And those in a file: its name, a key, a value, a comment beside a slip.
     let file = format!("a{esc}.toml");
@@ -147,17 +107,10 @@ fn control_characters_are_escaped() {
         format!("name = \"a\"\nnamee = 3 # {esc}"),
         format!("{{\"{esc}\": 1}}"),
     ] {
-        fs::write(place.path(&file), text).unwrap();
-        contains(&run(&["relax", &file]), &[escaped]);
+        place.write(&file, text);
+        contains(&run(&format!("relax {file}")), &[escaped]);
     }
-    fs::write(place.path(&file), workplace::leaf("small", 2)).unwrap();
-    let out = format!("o{esc}");
-    let report = place
-        .command("relax")
-        .args([file.as_str(), "--out", out.as_str()])
-        .output();
-    contains(
-        &shown(Run::from(report.unwrap())),
-        &["o\\u{1b}[31m: summary.json"],
-    );
+    place.write(&file, workplace::leaf("small", 2));
+    let report = place.run(format!("relax {file} --out o{esc}"));
+    contains(&shown(report), &["o\\u{1b}[31m: summary.json"]);
 }

@@ -7,13 +7,13 @@ use leafdyn::scenario::Scenario;
 
 /// Every scenario file in the folders of `scenarios/`.
 fn files() -> Vec<PathBuf> {
-    let list = |folder: &Path| -> Vec<PathBuf> {
-        let entries = fs::read_dir(folder).unwrap();
-        entries.map(|entry| entry.unwrap().path()).collect()
+    let list = |folder: PathBuf| {
+        fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
     };
-    let top = list(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios"));
-    let folders = top.iter().filter(|path| path.is_dir());
-    let mut files: Vec<_> = folders.flat_map(|folder| list(folder)).collect();
+    let top = list(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios"));
+    let mut files: Vec<_> = top.filter(|path| path.is_dir()).flat_map(list).collect();
     // Measured data stand beside their scenarios.
     files.retain(|file| file.extension().is_none_or(|kind| kind != "csv"));
     files.sort();
@@ -58,10 +58,8 @@ fn every_file_names_the_schema_which_is_todays() {
 
 #[test]
 fn the_papers_figures_share_what_the_paper_says_of_all() {
-    let paper: Vec<_> = files()
-        .into_iter()
-        .filter(|path| path.parent().unwrap().ends_with("paper"))
-        .collect();
+    let mut paper = files();
+    paper.retain(|path| path.parent().unwrap().ends_with("paper"));
     assert_eq!(paper.len(), 9);
     for path in paper {
         let scenario = read(&path);
@@ -110,10 +108,8 @@ fn files_that_cannot_be_read() {
     };
     let absent = folder.path().join("absent.toml");
     assert!(message(&absent).starts_with(": cannot be read: "));
-    assert_eq!(
-        message(folder.path()),
-        ": is a folder: give the TOML file itself"
-    );
+    let expected = ": is a folder: give the TOML file itself";
+    assert_eq!(message(folder.path()), expected);
     let latin = folder.path().join("latin.toml");
     fs::write(&latin, b"name = \"a\"\n# Bl\xe4tter\n").unwrap();
     let expected = ":2: is not text in UTF-8: byte 15 is 0xe4: save the file as UTF-8";

@@ -2,10 +2,10 @@
 
 mod common;
 
+use common::*;
 use std::f64::consts::PI;
 
 use leafdyn::relax::Method;
-use leafdyn::scenario::Scenario;
 
 fn with(section: &str) -> Result<Scenario, String> {
     let text = format!(
@@ -34,30 +34,37 @@ fn the_papers_estimate() {
 /// A leaf with a section is the leaf with its stiffnesses, to the last bit.
 #[test]
 fn the_same_leaf_with_its_stiffnesses_written_out() {
-    let leaf = with(
-        r#"section = { shape = "rectangle", width = [0.2, 0.3], thickness = 0.05, young = 3.0, poisson = 0.25, mass_density = 2.0 }"#,
-    )
-    .unwrap();
-    let mut text = String::from("[stiffness]\n");
-    for (key, axis) in [("torsion", 0), ("bending_2", 1), ("bending_3", 2)] {
-        let values = leaf
-            .rods
-            .iter()
-            .map(|rod| rod.couple_stiffness[axis].at(0.5));
-        text += &format!("{key} = {:?}\n", values.collect::<Vec<_>>());
-    }
-    for (key, axis) in [("axial", 0), ("shear_2", 1), ("shear_3", 2)] {
-        let values = leaf
-            .rods
-            .iter()
-            .map(|rod| rod.force_stiffness[axis].at(0.5));
-        text += &format!("{key} = {:?}\n", values.collect::<Vec<_>>());
-    }
-    let of = |profiles: &[leafdyn::scenario::Profile]| -> Vec<f64> {
-        profiles.iter().map(|profile| profile.at(0.5)).collect()
+    let section = r#"section = { shape = "rectangle", width = [0.2, 0.3], thickness = 0.05, young = 3.0, poisson = 0.25, mass_density = 2.0 }"#;
+    let leaf = with(section).unwrap();
+    let list = |key: &str, profiles: Vec<&Profile>| {
+        let values: Vec<f64> = profiles.iter().map(|profile| profile.at(0.5)).collect();
+        format!("{key} = {values:?}\n")
     };
-    text += &format!("[dynamics]\ndensity = {:?}\n", of(&leaf.dynamics.density));
-    text += &format!("rotary_inertia = {:?}\n", of(&leaf.dynamics.rotary_inertia));
+    let mut text = String::from("[stiffness]\n");
+    for (axis, key) in ["torsion", "bending_2", "bending_3"].iter().enumerate() {
+        text += &list(
+            key,
+            leaf.rods
+                .iter()
+                .map(|rod| &rod.couple_stiffness[axis])
+                .collect(),
+        );
+    }
+    for (axis, key) in ["axial", "shear_2", "shear_3"].iter().enumerate() {
+        text += &list(
+            key,
+            leaf.rods
+                .iter()
+                .map(|rod| &rod.force_stiffness[axis])
+                .collect(),
+        );
+    }
+    text += "[dynamics]\n";
+    text += &list("density", leaf.dynamics.density.iter().collect());
+    text += &list(
+        "rotary_inertia",
+        leaf.dynamics.rotary_inertia.iter().collect(),
+    );
     assert_eq!(with(&text).unwrap(), leaf);
     // Mass of the first vein per length: 2 times 0.2 times 0.05.
     common::close("density", leaf.dynamics.density[0].at(0.1), 0.02, 1e-16);
@@ -76,64 +83,32 @@ fn a_taper_is_followed_exactly() {
     let integral = (cubed(0.1) - cubed(0.08)) / 0.05 + (cubed(0.08) - cubed(0.02)) / 0.1;
     let integral = 0.3 * PI / 64.0 * integral;
     common::close("integral", bending.integral(1.0) / integral, 1.0, 1e-13);
-    let relaxed = leaf.relaxation().tolerance(1e-9).run().unwrap();
-    assert!(relaxed.outcome.is_success(), "{:?}", relaxed.remark);
-    let shooting = Method::Shooting { intervals: None };
-    let shot = leaf
-        .relaxation()
-        .method(shooting)
-        .tolerance(1e-9)
-        .run()
-        .unwrap();
-    let apart = (relaxed.tips[0] - shot.tips[0]).length();
-    assert!(apart < 2e-9 && relaxed.tips[0].z < -0.01, "{apart:e}");
+    let relaxed = settle(&leaf, 1e-9);
+    let shooting = Options {
+        method: Method::Shooting { intervals: None },
+        ..to(1e-9)
+    };
+    let shot = common::relaxed(&leaf, &shooting);
+    let apart = (tip(&relaxed) - tip(&shot)).length();
+    assert!(apart < 2e-9 && tip(&relaxed).z < -0.01, "{apart:e}");
 }
 
 #[test]
 fn what_cannot_be_a_section_is_refused() {
-    for (section, said) in [
-        (
-            r#"shape = "circle", young = 1"#,
-            "section.diameter is missing",
-        ),
-        (r#"diameter = 0.1, young = 1"#, "section.shape is missing"),
-        (
-            r#"shape = "oval", diameter = 0.1, young = 1"#,
-            r#"must be "circle", "ellipse" or "rectangle""#,
-        ),
-        (
-            r#"shape = "circle", diameter = 0.1, width = 1, young = 1"#,
-            "a circle has a diameter",
-        ),
-        (
-            r#"shape = "ellipse", diameter = 0.1, young = 1"#,
-            "width (along d2)",
-        ),
-        (
-            r#"shape = "circle", diameter = -0.1, young = 1"#,
-            "must be greater than 0",
-        ),
-        (
-            r#"shape = "circle", diameter = 0.1, young = 1, poisson = 0.6"#,
-            "at most 0.5",
-        ),
-        (
-            r#"shape = "circle", diameter = 0.1, young = 1, poisson = -1"#,
-            "greater than -1",
-        ),
-        (
-            r#"shape = "circle", diameter = 1e-20, young = 1e-10"#,
-            "choose other units",
-        ),
-        (
-            r#"shape = "circle", diameter = [0.1], young = 1"#,
-            "must have 2",
-        ),
-        (
-            r#"shape = "circle", diameter = [0.1, 1e5], young = 1"#,
-            "A_max/A",
-        ),
-    ] {
+    let table = r#"
+        shape = "circle", young = 1 => section.diameter is missing
+        diameter = 0.1, young = 1 => section.shape is missing
+        shape = "oval", diameter = 0.1, young = 1 => must be "circle", "ellipse" or "rectangle"
+        shape = "circle", diameter = 0.1, width = 1, young = 1 => a circle has a diameter
+        shape = "ellipse", diameter = 0.1, young = 1 => width (along d2)
+        shape = "circle", diameter = -0.1, young = 1 => must be greater than 0
+        shape = "circle", diameter = 0.1, young = 1, poisson = 0.6 => at most 0.5
+        shape = "circle", diameter = 0.1, young = 1, poisson = -1 => greater than -1
+        shape = "circle", diameter = 1e-20, young = 1e-10 => choose other units
+        shape = "circle", diameter = [0.1], young = 1 => must have 2
+        shape = "circle", diameter = [0.1, 1e5], young = 1 => A_max/A
+    "#;
+    for (section, said) in pairs(table) {
         let refused = with(&format!("section = {{ {section} }}")).unwrap_err();
         assert!(refused.contains(said), "{section}: {refused}");
     }

@@ -4,11 +4,7 @@
 mod common;
 
 use common::random::{drawn, leaves, wild_leaves};
-use common::{
-    TIGHT, agree, apart, entries, files, read, relaxed, scale, scenario, settle, shoot_alone,
-    shoot_near, shot_near, to,
-};
-use leafdyn::scenario::Scenario;
+use common::*;
 
 /// Of position, in lengths of the leaf; ten times that of all else.
 const CLOSE: f64 = 1e-9;

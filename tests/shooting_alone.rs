@@ -4,13 +4,8 @@
 
 mod common;
 
-use common::{
-    TIGHT, agree, apart, files, found, in_lab, path, read, scenario, settle, shoot_over, shot_alone,
-};
-use glam::DVec3;
+use common::*;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::relax::RodShape;
-use leafdyn::scenario::Scenario;
 
 /// Scenes with one equilibrium, or with one that continuation from the arcs
 /// leads to: the relaxed one.

@@ -3,12 +3,8 @@
 
 mod common;
 
-use common::{
-    TIGHT, agree, apart, fig04, found, linear, paper_leaf, relaxed, rod, settle, shoot_near,
-    shoot_over, shot_alone, shot_near, to,
-};
+use common::*;
 use leafdyn::internals::bvp::Reason;
-use leafdyn::scenario::Scenario;
 
 /// Relaxed, shot from there, and shot alone.
 #[track_caller]
@@ -90,10 +86,8 @@ fn angles_beyond_a_turn() {
     all_agree("wound", &leaf);
     let relaxed = settle(&leaf, 1e-8);
     let shot = shot_near(&leaf, &relaxed);
-    for (a, b) in relaxed.shape.rods.iter().zip(&shot.rods) {
-        for (a, b) in a.nodes.iter().zip(&b.nodes) {
-            assert!(a.rotation.dot(b.rotation) > 0.0);
-        }
+    for (a, b) in nodes(&relaxed.shape.rods).zip(nodes(&shot.rods)) {
+        assert!(a.rotation.dot(b.rotation) > 0.0);
     }
 }
 
@@ -132,11 +126,8 @@ fn error(leaf: &Scenario, tolerance: f64) -> (f64, f64) {
     let relaxed = settle(leaf, tolerance);
     let shot = shot_near(leaf, &relaxed);
     assert!(shot.error.position < 1e-10);
-    let estimate = relaxed.accuracy.error_estimate.unwrap() / relaxed.shape.rods[0].length;
-    (
-        apart(leaf, &relaxed.shape.rods, &shot.rods).position,
-        estimate,
-    )
+    let off = apart(leaf, &relaxed.shape.rods, &shot.rods).position;
+    (off, estimate(&relaxed) / relaxed.shape.rods[0].length)
 }
 
 /// Relaxed to few digits a leaf is known at few stations, and between them badly

@@ -6,12 +6,8 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{
-    agree, close, files, kept, paper_leaf, read, scenario, settle, shot_alone, shot_near, tip,
-};
-use glam::DVec3;
+use common::*;
 use leafdyn::internals::bvp::{Neutral, Reason, Solution};
-use leafdyn::scenario::Scenario;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
@@ -29,6 +25,11 @@ fn column(part: f64) -> Scenario {
 #[track_caller]
 fn alone(scenario: &Scenario) -> Solution {
     shot_alone(scenario, &STATIONS)
+}
+
+/// What is said of a leaf of which this would move.
+fn words(moves: &str) -> String {
+    format!("a bifurcation is near, or the leaf can move without resistance; {moves}")
 }
 
 #[track_caller]
@@ -52,8 +53,7 @@ fn a_column_at_eulers_load_would_move_sideways() {
         let neutral = neutral(shot);
         assert_eq!(
             neutral.to_string(),
-            "a bifurcation is near, or the leaf can move without resistance; \
-             vein 1 would move, mostly along y"
+            words("vein 1 would move, mostly along y")
         );
         let [rod] = neutral.displacement.as_slice() else {
             panic!("one rod");
@@ -92,10 +92,10 @@ fn a_round_column_can_turn_about_its_axis() {
         assert!(bulge.y.hypot(bulge.z) > 0.1);
         let shot = shot_near(&column, &leaf);
         agree(&format!("P = {load}"), &column, &leaf, &shot, 1e-9);
-        let positions: Vec<DVec3> = shot.rods[0].nodes.iter().map(|n| n.position).collect();
+        let places = nodes(&shot.rods).map(|node| node.position);
+        let turning: Vec<DVec3> = places.map(|r| DVec3::X.cross(r)).collect();
         let neutral = neutral(shot);
-        let turning: Vec<DVec3> = positions.iter().map(|r| DVec3::X.cross(*r)).collect();
-        let largest = turning.iter().fold(0.0, |m: f64, v| m.max(v.length()));
+        let largest = largest(turning.iter().map(|v| v.length()));
         let side = turning[1].dot(neutral.displacement[0][1]).signum();
         for (moved, turning) in neutral.displacement[0].iter().zip(&turning) {
             let off = *moved - side * *turning / largest;
@@ -131,33 +131,26 @@ fn published_bifurcations_are_seen() {
         let entry = format!("load.gravity=[{weight:?}, 0, 0]");
         scenario("classic/hanging_curved", &entry)
     };
-    for (leaf, wanted) in [
-        (lens(0.93780575743), "all veins would move, mostly along z"),
-        (
-            hanging(11.868750740620),
-            "vein 1 would move, mostly along z",
-        ),
-    ] {
+    let (length, weight) = (0.93780575743, 11.868750740620);
+    for (leaf, moves) in [(lens(length), "all veins"), (hanging(weight), "vein 1")] {
         let text = neutral(alone(&leaf)).to_string();
-        assert!(text.ends_with(wanted), "{text}");
+        assert_eq!(text, words(&format!("{moves} would move, mostly along z")));
     }
     for off in [1.0 - 1e-3, 1.0 + 1e-3] {
-        assert!(alone(&lens(off * 0.93780575743)).neutral.is_none());
-        assert!(alone(&hanging(off * 11.868750740620)).neutral.is_none());
+        assert!(alone(&lens(off * length)).neutral.is_none());
+        assert!(alone(&hanging(off * weight)).neutral.is_none());
     }
 }
 
 /// The files and the paper's leaves are nowhere near a bifurcation.
 #[test]
 fn nothing_is_reported_of_ordinary_leaves() {
-    let leaves = [("classic", ""), ("paper", "leaf.rods=5")];
-    for leaf in leaves
-        .map(|(folder, entries)| files(folder).into_iter().map(|file| read(&file, entries)))
-        .into_iter()
-        .flatten()
-    {
-        let shot = shot_near(&leaf, &settle(&leaf, 1e-8));
-        assert!(shot.neutral.is_none(), "{}", leaf.name);
+    for (folder, entries) in [("classic", ""), ("paper", "leaf.rods=5")] {
+        for file in files(folder) {
+            let leaf = read(&file, entries);
+            let shot = shot_near(&leaf, &settle(&leaf, 1e-8));
+            assert!(shot.neutral.is_none(), "{}", leaf.name);
+        }
     }
 }
 
@@ -171,24 +164,16 @@ fn moving(displacements: &[[f64; 3]]) -> Neutral {
 
 #[test]
 fn what_moves_and_why_it_failed_is_put_into_words() {
+    let all = [[1.0, 0.3, 0.3], [0.9, 0.3, 0.3]];
+    let second = [[0.0, 0.1, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.1]];
+    let two = [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, -0.5, 0.4]];
     for (displacements, wanted) in [
         (&[[0.0, 0.1, -1.0]][..], "vein 1 would move, mostly along z"),
-        (
-            &[[1.0, 0.3, 0.3], [0.9, 0.3, 0.3]],
-            "all veins would move, mostly along x",
-        ),
-        (
-            &[[0.0, 0.1, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.1]],
-            "vein 2 would move, mostly along y",
-        ),
-        (
-            &[[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, -0.5, 0.4]],
-            "veins 1, 3 would move, mostly along y",
-        ),
+        (&all, "all veins would move, mostly along x"),
+        (&second, "vein 2 would move, mostly along y"),
+        (&two, "veins 1, 3 would move, mostly along y"),
     ] {
-        let text =
-            format!("a bifurcation is near, or the leaf can move without resistance; {wanted}");
-        let neutral = moving(displacements);
+        let (text, neutral) = (words(wanted), moving(displacements));
         assert_eq!(neutral.to_string(), text);
         let why = Reason::Singular(neutral).to_string();
         let because = "the equations are singular (ratio of singular values 1.5e-12)";

@@ -4,10 +4,8 @@
 
 mod common;
 
-use common::{agree, apart, found, scenario, settle, shoot_over, shot_near};
+use common::*;
 use leafdyn::internals::bvp::{Options, Precision, Reason, Solution, Start, solve};
-use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::Scenario;
 
 /// A figure with five veins that are softer still, under other loads.
 fn soft(figure: &str, load: &str) -> Scenario {
@@ -101,7 +99,7 @@ fn the_accuracy_asked_for_is_reached() {
             let shot = found(&leaf, solve(&leaf, &options, &mut |_| {}));
             assert!(shot.error.position <= accuracy);
             let off = apart(&leaf, &relaxed.shape.rods, &shot.rods);
-            let both = accuracy + relaxed.accuracy.error_estimate.unwrap();
+            let both = accuracy + estimate(&relaxed);
             assert!(off.position <= both, "{figure}, {load}: {off:?}");
         }
     }

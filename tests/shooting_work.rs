@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{scenario, settle, shot_alone, shot_near};
+use common::*;
 use leafdyn::internals::bvp::Work;
 
 /// Linearisations and corrections to the last one, integration steps to a few.

@@ -3,8 +3,7 @@
 
 mod common;
 
-use common::{close, on, paper_leaf, settle, settled, tip};
-use leafdyn::relax::Options;
+use common::*;
 
 const STIFFNESSES: [f64; 5] = [1e2, 1e4, 1e6, 1e8, f64::INFINITY];
 

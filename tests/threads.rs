@@ -3,10 +3,8 @@
 
 mod common;
 
-use common::{bits, fig04, on_threads, scenario, settle};
+use common::*;
 use leafdyn::internals::bvp::{self, Start};
-use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Profile, Scenario};
 
 fn bits_of(numbers: impl IntoIterator<Item = f64>) -> Vec<u64> {
     numbers.into_iter().map(f64::to_bits).collect()
@@ -55,16 +53,10 @@ fn shooting_finds_equal_bits_on_one_two_and_five_threads() {
             let precision = bvp::Precision::LocalError(1e-11);
             let options = bvp::Options::new(start, &stations, precision);
             let shot = on_threads(threads, || bvp::solve(leaf, &options, &mut |_| {})).unwrap();
-            let numbers = [
-                shot.error.position,
-                shot.error.force,
-                shot.energy,
-                shot.defect,
-            ];
-            let more = [shot.growth, shot.condition]
-                .into_iter()
-                .chain(shot.intervals);
-            let numbers = bits_of(numbers.into_iter().chain(more));
+            let errors = [shot.error.position, shot.error.force, shot.defect];
+            let numbers = [shot.energy, shot.growth, shot.condition];
+            let numbers = errors.into_iter().chain(numbers).chain(shot.intervals);
+            let numbers = bits_of(numbers);
             (bits(&shot.rods), numbers, shot.work)
         };
         let alone = on(1);

@@ -5,11 +5,10 @@
 mod common;
 
 use common::random::{drawn, leaves};
-use common::{relaxed, to};
+use common::*;
 use leafdyn::internals::branch::{Equations, Family, Kind, Point, Walk, walk};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::relax::project;
-use leafdyn::scenario::Scenario;
 
 /// The leaf under loads turned over, from as they are to their opposite times
 /// `MOST`: what was lifted is pressed down.
@@ -34,9 +33,8 @@ fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
 
 /// Energy of a state under the loads at a fraction of their range.
 fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
-    family
-        .with(fraction, grid, |leaf| leaf.energy(state))
-        .unwrap()
+    let energy = family.with(fraction, grid, |leaf| leaf.energy(state));
+    energy.unwrap()
 }
 
 #[test]

@@ -3,12 +3,10 @@
 
 mod workplace;
 
-use std::fs;
-
 use serde_json::Value;
-use workplace::{Workplace, contains, floats};
+use workplace::{Json, Workplace, contains, near};
 
-const FILES: [&str; 4] = ["trace.csv", "trace.json", "trace.png", "trace.svg"];
+const FILES: &str = "trace.csv trace.json trace.png trace.svg";
 
 /// A rod along e1, bending up and down, with these entries besides.
 fn rod(place: &Workplace, couple: [f64; 3], entries: &str) {
@@ -18,7 +16,7 @@ fn rod(place: &Workplace, couple: [f64; 3], entries: &str) {
          stiffness = {{ torsion = {torsion}, bending_2 = {bending_2}, bending_3 = {bending_3}, \
          axial = 1000.0, shear_2 = 1000.0, shear_3 = 1000.0 }}\n{entries}\n"
     );
-    fs::write(place.path("rod.toml"), text).unwrap();
+    place.write("rod.toml", text);
 }
 
 /// A column that is turned from lying to standing to lying buckles sideways where it
@@ -29,21 +27,19 @@ fn a_loop_is_closed() {
     rod(&place, [50.0, 1.0, 50.0], "load = { gravity = [-9, 0, 0] }");
     let run = place.run("trace rod.toml --vary leaf.fan[0]=-1..1 --switch");
     run.ends(0).says(&["branches cross at", "points, closed"]);
-    assert_eq!(place.names("out/rod"), FILES);
+    place.holds("out/rod", FILES);
     let trace = place.json("out/rod/trace.json");
     assert_eq!(trace["complete"], true);
-    let branches = trace["branches"].as_array().unwrap();
+    let branches = trace["branches"].list();
     let ends: Vec<&Value> = branches.iter().map(|branch| &branch["end"]).collect();
     assert_eq!(ends, ["reached", "closed", "closed", "closed", "closed"]);
     for branch in &branches[1..] {
         let [first, last] = ["first", "last"].map(|end| &branch[end]);
-        let [a, b] = [first, last].map(|point| point["value"].as_f64().unwrap());
+        let [a, b] = [first, last].map(|point| point["value"].number());
         assert!((a - b).abs() < 1e-6, "{a} {b}");
-        for (a, b) in floats(&first["tip"]).iter().zip(floats(&last["tip"])) {
-            assert!((a - b).abs() < 2e-6, "{a} {b}");
-        }
+        near(&first["tip"], &last["tip"], 2e-6);
         // It goes through both crossings and to both sides.
-        let number = branch["points"].as_u64().unwrap();
+        let number = branch["points"].count();
         assert!(number > 20, "{number}");
     }
 }
@@ -53,18 +49,12 @@ fn a_loop_is_closed() {
 fn a_range_may_end_where_leaves_do() {
     let place = Workplace::new();
     for (range, end) in [("40..0", "0.0"), ("2..1e-9", "1e-9")] {
-        let run = place.run(&format!("trace leaf.toml --vary coupling.z={range} --json"));
-        let trace = run.ends(0).json();
+        let trace = place.told(0, format!("trace leaf.toml --vary coupling.z={range}"));
         assert_eq!(trace["branches"][0]["end"], "reached", "{trace}");
         let last = &trace["branches"][0]["last"];
         assert_eq!(last["value"].as_f64(), end.parse().ok());
-        let leaf = place.run(&format!(
-            "relax leaf.toml --set coupling.z={end} --json --out r"
-        ));
-        let tips = [&last["tip"], &leaf.json()["tip"]].map(floats);
-        for (a, b) in tips[0].iter().zip(&tips[1]) {
-            assert!((a - b).abs() < 2e-6, "{a} {b}");
-        }
+        let leaf = place.told(0, format!("relax leaf.toml --set coupling.z={end} --out r"));
+        near(&last["tip"], &leaf["tip"], 2e-6);
     }
 }
 
@@ -78,13 +68,13 @@ fn a_spiral_is_wound_up_until_no_grid_resolves_it() {
         "ends: grid too coarse",
         "a vein bends by more than a right angle within one segment",
     ]);
-    assert_eq!(place.names("out/rod"), FILES);
+    place.holds("out/rod", FILES);
     let trace = place.json("out/rod/trace.json");
     assert_eq!(trace["complete"], false);
     let branch = &trace["branches"][0];
     assert_eq!(branch["end"], "unresolved");
-    contains(branch["remark"].as_str().unwrap(), &["right angle"]);
+    contains(branch["remark"].text(), &["right angle"]);
     // 512 segments that turn by 1.6 each.
-    let last = branch["last"]["value"].as_f64().unwrap();
+    let last = branch["last"]["value"].number();
     assert!((last - 819.2).abs() < 1.0, "{last}");
 }

@@ -4,11 +4,10 @@
 mod common;
 
 use common::random::{drawn, leaves};
-use common::{relaxed, to};
+use common::*;
 use leafdyn::internals::branch::{End, Family, Followed, Walk, begin};
 use leafdyn::internals::bvp::{self, Precision::LocalError, Start};
 use leafdyn::internals::relax::index_near;
-use leafdyn::scenario::{Profile, Scenario};
 use rayon::prelude::*;
 
 /// Accuracy of the tips, relative to the longest vein.
@@ -58,21 +57,6 @@ struct Found {
     critical: usize,
     solved_again: usize,
     not_solved: usize,
-}
-
-impl std::ops::Add for Found {
-    type Output = Found;
-
-    fn add(self, other: Found) -> Found {
-        Found {
-            at_rest: self.at_rest + other.at_rest,
-            lost: self.lost + other.lost,
-            points: self.points + other.points,
-            critical: self.critical + other.critical,
-            solved_again: self.solved_again + other.solved_again,
-            not_solved: self.not_solved + other.not_solved,
-        }
-    }
 }
 
 fn follow(case: usize, leaf: &Scenario) -> Found {
@@ -159,10 +143,7 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
         let off = rod.nodes.last()?.position / length - *tip;
         let allowed = point.error + shot.error.position / length + 1e-9;
         let off = off.length();
-        assert!(
-            off <= allowed,
-            "{what}: off by {off:.1e}, {allowed:.1e} stated"
-        );
+        assert!(off <= allowed, "{what}: off by {off:.1e} of {allowed:.1e}");
     }
     index_near(&scenario, point.grid.clone(), &rods)
 }
@@ -170,17 +151,20 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
 /// `LEAFDYN_TRACES=200 cargo test --release --test trace_verified -- --nocapture`.
 #[test]
 fn random_traces() {
-    let asked = std::env::var("LEAFDYN_TRACES").ok();
-    let count = asked.map_or(TRACES, |count| count.parse().unwrap());
+    let count = asked("LEAFDYN_TRACES", TRACES);
     let cases: Vec<(usize, Scenario)> = drawn(leaves(), count).into_iter().enumerate().collect();
     let each = cases.par_iter().map(|(case, leaf)| follow(*case, leaf));
-    let found = each.reduce(Found::default, |a, b| a + b);
-    println!("{count} traces: {found:?}");
-    assert!(found.at_rest + count / 100 >= count, "{found:?}");
-    assert_eq!(found.lost, 0, "{found:?}");
-    assert!(
-        found.points > 8 * count && 40 * found.critical > count,
-        "{found:?}"
+    let found: Vec<Found> = each.collect();
+    let sum = |of: fn(&Found) -> usize| found.iter().map(of).sum::<usize>();
+    let (at_rest, lost) = (sum(|it| it.at_rest), sum(|it| it.lost));
+    let (points, critical) = (sum(|it| it.points), sum(|it| it.critical));
+    let (solved, not_solved) = (sum(|it| it.solved_again), sum(|it| it.not_solved));
+    println!(
+        "{count} traces: {at_rest} at rest, {lost} lost; {points} points, {critical} critical"
     );
-    assert!(20 * found.not_solved < found.solved_again, "{found:?}");
+    println!("solved again: {solved}, and not: {not_solved}");
+    assert!(at_rest + count / 100 >= count, "{at_rest}");
+    assert_eq!(lost, 0);
+    assert!(points > 8 * count && 40 * critical > count);
+    assert!(20 * not_solved < solved);
 }

@@ -5,10 +5,8 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{fig04, rod, scenario, settle, settle_on};
-use glam::{DMat3, DQuat, DVec3};
-use leafdyn::relax::{NodeState, RodShape};
-use leafdyn::scenario::Scenario;
+use common::*;
+use glam::{DMat3, DQuat};
 use leafdyn::undulation::{Hand, Undulation, Vein};
 
 const SEGMENTS: usize = 64;
@@ -23,14 +21,13 @@ fn sheet(point: impl Fn(f64, f64) -> DVec3) -> Vec<RodShape> {
         n: DVec3::ZERO,
         m: DVec3::ZERO,
     };
-    let rod = |across: f64| RodShape {
-        length: 1.0,
-        nodes: stations()
-            .iter()
-            .map(|&sigma| node(sigma, across))
-            .collect(),
+    let rod = |j: i32| {
+        let along = stations().into_iter();
+        let nodes = along.map(|sigma| node(sigma, 0.5 * f64::from(j) - 1.0));
+        let (length, nodes) = (1.0, nodes.collect());
+        RodShape { length, nodes }
     };
-    (0..5).map(|j| rod(0.5 * j as f64 - 1.0)).collect()
+    (0..5).map(rod).collect()
 }
 
 fn stations() -> Vec<f64> {
@@ -231,11 +228,7 @@ fn the_papers_soft_leaves_are_saddles_when_flat() {
 #[test]
 fn a_leaf_that_has_just_buckled_leaves_its_plane_soon() {
     for (bending, torsion) in [(0.27, 1.46), (0.15, 1.84), (0.37, 1.2)] {
-        let others = [bending; 5].map(|it: f64| it.to_string()).join(", ");
-        let overrides = format!(
-            "load.gravity=[0, 0, 0];stiffness.torsion={torsion};\
-             stiffness.bending_2=[{others}, 1000, {others}]"
-        );
+        let overrides = common::branch::weightless(bending, torsion);
         let leaf = settle(&scenario("study/undulation", &overrides), 1e-4);
         assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
         let left = leaf.stability.saddle.map(|it| it.negative_eigenvalues);

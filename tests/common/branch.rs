@@ -2,25 +2,50 @@
 
 use leafdyn::study::{Base, Trace, TraceRequest, trace};
 
-use crate::common::{entries, extrapolate, path};
+use crate::common::{base, extrapolate, path};
 
 /// The text of a scenario that comes with the program.
 pub fn text(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap()
 }
 
-/// Follows the scenario of a text with [`entries`] replaced.
-pub fn follow(text: &str, overrides: &str, vary: &str, switch: bool) -> Trace {
-    let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
-    let request = TraceRequest {
-        base: base.unwrap(),
+/// The keys, as one, by which all veins of `study/undulation` but the midrib bend up and down.
+pub fn weak_veins() -> String {
+    let weak = (0..11).filter(|vein| *vein != 5);
+    let keys: Vec<_> = weak
+        .map(|vein| format!("stiffness.bending_2[{vein}]"))
+        .collect();
+    keys.join("+")
+}
+
+/// The entries of `study/undulation` without weight, in which the other veins bend so easily.
+pub fn weightless(bending: f64, torsion: f64) -> String {
+    let weak = [bending; 5].map(|it| it.to_string()).join(", ");
+    format!(
+        "load.gravity=[0, 0, 0]; stiffness.torsion={torsion}; \
+         stiffness.bending_2=[{weak}, 1000, {weak}]"
+    )
+}
+
+/// To follow the equilibria of a leaf, unstable ones too.
+pub fn request(base: Base, vary: &str, tolerance: f64, most_points: usize) -> TraceRequest {
+    TraceRequest {
+        base,
         vary: vary.parse().unwrap(),
-        switch,
+        switch: false,
         keep_unstable: true,
         segments: None,
-        tolerance: Some(1e-8),
-        most_points: 2000,
+        tolerance: Some(tolerance),
+        most_points,
         cross_section: None,
+    }
+}
+
+/// Follows the scenario of a text with entries replaced.
+pub fn follow(text: &str, overrides: &str, vary: &str, switch: bool) -> Trace {
+    let request = TraceRequest {
+        switch,
+        ..request(base(text, overrides), vary, 1e-8, 2000)
     };
     trace(&request, &mut |_, _, _| {}).unwrap()
 }
@@ -68,10 +93,9 @@ pub fn critical(
         assert!(unstable(high, segments), "stable at {high} still");
         for _ in 0..45 {
             let middle = 0.5 * (low + high);
-            if unstable(middle, segments) {
-                high = middle;
-            } else {
-                low = middle;
+            match unstable(middle, segments) {
+                true => high = middle,
+                false => low = middle,
             }
         }
         0.5 * (low + high)

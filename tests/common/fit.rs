@@ -1,23 +1,9 @@
 //! Made-up measurements.
 
-use crate::common::random::splitmix64;
-use leafdyn::study::{Base, Data, Fit, FitRequest, fit};
+use leafdyn::study::{Base, Data, Fit, FitOutcome, FitRequest, fit};
 
-/// Normal numbers, always the same: by Box's and Muller's formula.
-pub struct Noise(pub u64);
-
-impl Noise {
-    /// An even number between 0 and 1.
-    pub fn even(&mut self) -> f64 {
-        splitmix64(&mut self.0)
-    }
-
-    /// A normal number.
-    pub fn normal(&mut self) -> f64 {
-        let (a, b) = (1.0 - self.even(), self.even());
-        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-    }
-}
+use crate::common::random::Draw;
+use crate::common::{base, settle};
 
 /// A vein that hangs.
 pub const VEIN: &str = r#"
@@ -36,12 +22,6 @@ pub const LEAF: &str = r#"
     coupling = { y = 1.0, z = 1.0 }
     load = { gravity = [0.0, 0.0, -1.0] }
 "#;
-
-/// A scenario with entries replaced.
-pub fn base(text: &str, entries: &[&str]) -> Base {
-    let entries: Vec<String> = entries.iter().map(|entry| entry.to_string()).collect();
-    Base::of_text(text.into(), "leaf.toml".into(), &entries).unwrap()
-}
 
 /// A fit of free numbers to these tables.
 pub fn request(base: Base, data: &[&str], free: &[&str]) -> FitRequest {
@@ -66,27 +46,39 @@ pub fn fitted(request: &FitRequest) -> Fit {
     fit(request, &mut |_| {}).unwrap_or_else(|refused| panic!("{refused}"))
 }
 
-/// Tips of a leaf pulled by these forces, as a table with noise of a deviation.
-pub fn pulls(
-    text: &str,
-    truth: &[&str],
-    forces: &[[f64; 3]],
-    sd: f64,
-    noise: &mut Noise,
-) -> String {
+/// Asserts that a fit has found these numbers, but for a part of them.
+#[track_caller]
+pub fn gives_back(found: &Fit, wanted: &[f64], within: f64) {
+    let remarks = &found.remarks;
+    assert_ne!(found.outcome, FitOutcome::NotConverged, "{remarks:?}");
+    assert_eq!(found.parameters.len(), wanted.len());
+    for (parameter, wanted) in found.parameters.iter().zip(wanted) {
+        let error = (parameter.value / wanted - 1.0).abs();
+        assert!(error < within, "{parameter:?}: {wanted}");
+    }
+}
+
+/// Asserts that a fit has found these numbers within so many halves of their intervals.
+#[track_caller]
+pub fn within_bars(found: &Fit, wanted: &[f64], halves: f64) {
+    assert_eq!(found.parameters.len(), wanted.len());
+    for (parameter, wanted) in found.parameters.iter().zip(wanted) {
+        let half = 0.5 * (parameter.high.unwrap() - parameter.low.unwrap());
+        let off = (parameter.value - wanted).abs();
+        assert!(off < halves * half, "{parameter:?}: {wanted}");
+    }
+}
+
+/// Tips of a leaf with these numbers pulled by these forces, as a table with noise of a deviation.
+pub fn pulls(text: &str, truth: &str, forces: &[[f64; 3]], sd: f64, noise: &mut Draw) -> String {
     let header = "load.tip_force[0],load.tip_force[1],load.tip_force[2],tip_x,tip_y,tip_z,sd_tip_x,sd_tip_y,sd_tip_z\n";
     let mut table = String::from(header);
     for force in forces {
-        let load = format!("load.tip_force={force:?}");
-        let entries: Vec<&str> = truth.iter().copied().chain([load.as_str()]).collect();
-        let leaf = super::settle(base(text, &entries).scenario(), 1e-9);
-        let tip = leaf.tips[0].to_array().map(|x| x + sd * noise.normal());
-        let cells: Vec<String> = force
-            .iter()
-            .chain(&tip)
-            .chain(&[sd; 3])
-            .map(|x| format!("{x:?}"))
-            .collect();
+        let pulled = base(text, &format!("{truth}; load.tip_force={force:?}"));
+        let tip = settle(pulled.scenario(), 1e-9).tips[0].to_array();
+        let tip = tip.map(|x| x + sd * noise.normal());
+        let cells = [*force, tip, [sd; 3]].concat();
+        let cells: Vec<String> = cells.iter().map(|x| format!("{x:?}")).collect();
         table += &(cells.join(",") + "\n");
     }
     table

@@ -6,6 +6,8 @@
 pub mod branch;
 pub mod fit;
 pub mod motion;
+mod numerics;
+mod pairs;
 pub mod plane;
 pub mod random;
 mod shot;
@@ -16,11 +18,16 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 pub use branch::{NEUTRAL, critical, critical_of_rigid};
-use glam::DVec3;
+pub use glam::DVec3;
 use leafdyn::internals::leaf::{Leaf, Scale};
-use leafdyn::relax::{Equilibrium, Method, NodeState, Options, RodShape, SemiImplicit, relax};
-use leafdyn::scenario::{Dynamics, Profile, Radii, Rod, Scenario, Units};
+pub use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape};
+use leafdyn::relax::{Method, SemiImplicit, relax};
+use leafdyn::scenario::{Dynamics, Radii, Rod, Units};
+pub use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
+use leafdyn::study::Base;
+pub use numerics::*;
+pub use pairs::pairs;
 pub use shot::*;
 
 /// The tolerance at which canonical values are checked: small enough for the
@@ -49,6 +56,27 @@ pub fn entries(text: &str) -> Vec<String> {
         .filter(|e| !e.is_empty())
         .map(String::from)
         .collect()
+}
+
+/// What the environment asks for by a name, such as how many leaves are tried.
+pub fn asked(name: &str, otherwise: usize) -> usize {
+    std::env::var(name).map_or(otherwise, |text| text.parse().expect(name))
+}
+
+/// Largest of some numbers, none of which is negative; NaN if one of them is.
+pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    let larger = |most: f64, number: f64| match number > most || number.is_nan() {
+        true => number,
+        false => most,
+    };
+    numbers.into_iter().fold(0.0, larger)
+}
+
+/// The scenario of a text with [`entries`] replaced, to be varied.
+#[track_caller]
+pub fn base(text: &str, overrides: &str) -> Base {
+    let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
+    base.unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 /// A scenario that comes with the program, with [`entries`] replaced.
@@ -115,6 +143,14 @@ pub fn on(segments: usize) -> Options {
     }
 }
 
+/// Relaxing to a tolerance that every node keeps.
+pub fn at_every_node(tolerance: f64) -> Options {
+    Options {
+        every_node: true,
+        ..to(tolerance)
+    }
+}
+
 /// With something else asked of the semi-implicit method.
 fn with(options: Options, change: impl Fn(&mut SemiImplicit)) -> Options {
     let Method::SemiImplicit(mut method) = options.method else {
@@ -178,13 +214,10 @@ pub fn kept(scenario: &Scenario, tolerance: f64) -> Equilibrium {
     settled(scenario, &keeping(to(tolerance)))
 }
 
-/// An equilibrium as it is found by default, or by the full model.
-pub fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
-    let options = segments.map_or(Options::default(), on);
-    match full_model {
-        true => relaxed(scenario, &in_full(options)),
-        false => relaxed(scenario, &options),
-    }
+/// An equilibrium as it is found by default, and by the full model.
+pub fn reduced_and_full(scenario: &Scenario, segments: Option<usize>) -> [Equilibrium; 2] {
+    let options = || segments.map_or(Options::default(), on);
+    [options(), in_full(options())].map(|options| relaxed(scenario, &options))
 }
 
 /// A scenario file with [`entries`] replaced, relaxed at the tight tolerance.
@@ -215,6 +248,11 @@ pub fn tip_angle(rods: &[RodShape], rod: usize, axis: DVec3) -> f64 {
     tangent.dot(axis).atan2(tangent.x)
 }
 
+/// The sum of the forces at the bases.
+pub fn carried(rods: &[RodShape]) -> DVec3 {
+    rods.iter().map(|rod| in_lab(&rod.nodes[0]).0).sum()
+}
+
 /// Force and moment of a node along the lab axes.
 pub fn in_lab(node: &NodeState) -> (DVec3, DVec3) {
     (node.rotation * node.n, node.rotation * node.m)
@@ -224,10 +262,8 @@ pub fn in_lab(node: &NodeState) -> (DVec3, DVec3) {
 #[track_caller]
 pub fn close(what: &str, found: f64, wanted: f64, tolerance: f64) {
     let error = (found - wanted).abs();
-    assert!(
-        error <= tolerance,
-        "{what}: {found} is {error:.1e} from {wanted}, allowed {tolerance:.1e}"
-    );
+    let what = format!("{what}: {found} is {error:.1e} from {wanted}");
+    assert!(error <= tolerance, "{what}, allowed {tolerance:.1e}");
 }
 
 /// Asserts that the tip is `wanted`, whose components are known to `digits`,
@@ -236,16 +272,21 @@ pub fn close(what: &str, found: f64, wanted: f64, tolerance: f64) {
 pub fn tip_is(what: &str, leaf: &Equilibrium, wanted: DVec3, digits: f64, tolerance: f64) {
     assert!(digits <= tolerance);
     let error = (tip(leaf) - wanted).abs().max_element();
-    assert!(
-        error <= tolerance,
-        "{what}: tip {} is {error:.1e} from {wanted}, allowed {tolerance:.1e}",
-        tip(leaf)
-    );
-    let estimate = leaf.accuracy.error_estimate.unwrap();
-    assert!(
-        error <= estimate + digits,
-        "{what}: the error {error:.1e} is more than its estimate {estimate:.1e}"
-    );
+    let what = format!("{what}: tip {} is {error:.1e} from {wanted}", tip(leaf));
+    assert!(error <= tolerance, "{what}, allowed {tolerance:.1e}");
+    let estimate = estimate(leaf);
+    assert!(error <= estimate + digits, "{what}, told {estimate:.1e}");
+}
+
+/// The error that a leaf is told to have.
+#[track_caller]
+pub fn estimate(leaf: &Equilibrium) -> f64 {
+    leaf.accuracy.error_estimate.unwrap()
+}
+
+/// All nodes of some rods.
+pub fn nodes(rods: &[RodShape]) -> impl Iterator<Item = &NodeState> {
+    rods.iter().flat_map(|rod| &rod.nodes)
 }
 
 /// `KEY=VALUE` for a vector.
@@ -323,15 +364,10 @@ pub fn fig04(rods: usize) -> Scenario {
 
 /// Largest distance between two results at the stations they share.
 pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
-    let mut largest = 0.0_f64;
-    let mut shared = 0;
+    let (mut largest, mut shared) = (0.0_f64, 0);
     for (i, sigma) in a.shape.stations.iter().enumerate() {
-        let Some(k) = b
-            .shape
-            .stations
-            .iter()
-            .position(|s| (s - sigma).abs() < 1e-12)
-        else {
+        let mut stations = b.shape.stations.iter();
+        let Some(k) = stations.position(|s| (s - sigma).abs() < 1e-12) else {
             continue;
         };
         shared += 1;

@@ -8,7 +8,9 @@ use leafdyn::relax::{Equilibrium, Options};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 use leafdyn::simulate::{self, Frame, Simulation};
 
-use crate::common::{on, paper_leaf, settled};
+pub use leafdyn::simulate::Scheme;
+
+use crate::common::{largest, nodes, on, paper_leaf, settled};
 
 /// Linear from zero at time 0 to `value` at time `until`, then constant.
 pub fn ramp(until: f64, value: [f64; 3]) -> Schedule<[f64; 3]> {
@@ -61,10 +63,12 @@ pub fn at_beginning(scenario: &Scenario) -> Scenario {
     resting.tip_force = dynamics.tip_force.at(0.0);
     resting.tip_moment = dynamics.tip_moment.at(0.0);
     let factor = dynamics.rest.at(0.0);
-    for rod in &mut resting.rods {
-        for curvature in &mut rod.rest_curvature {
-            *curvature = curvature.scaled(factor);
-        }
+    for curvature in resting
+        .rods
+        .iter_mut()
+        .flat_map(|rod| &mut rod.rest_curvature)
+    {
+        *curvature = curvature.scaled(factor);
     }
     resting
 }
@@ -125,7 +129,7 @@ pub fn rest(scenario: &Scenario, segments: usize) -> State {
 /// The state of a result on one grid.
 pub fn state_of(scenario: &Scenario, found: &Equilibrium) -> State {
     let length = Leaf::new(scenario).scale.length;
-    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = || nodes(&found.shape.rods);
     State::new(
         found.shape.stations.len() - 1,
         nodes().map(|node| node.position / length).collect(),
@@ -178,12 +182,6 @@ pub fn semi_implicit(leaf: &Leaf, state: &State, steps: Steps) -> SemiImplicit {
 }
 
 /// The two methods.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scheme {
-    Explicit,
-    SemiImplicit,
-}
-
 pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 
 /// A method at time 0 with steps of `h`.
@@ -202,6 +200,15 @@ pub fn at(scheme: Scheme, leaf: &Leaf, state: &State, h: f64, until: f64) -> Sna
         panic!("{scheme:?}, steps of {h}: {broken:?}");
     }
     method.snapshot()
+}
+
+/// Moving by a method, on a grid of so many segments.
+pub fn moving(scheme: Scheme, segments: Option<usize>) -> simulate::Options {
+    simulate::Options {
+        scheme: Some(scheme),
+        segments,
+        ..simulate::Options::default()
+    }
 }
 
 /// The last frame of a simulation.
@@ -227,8 +234,7 @@ pub fn numbers(snapshot: &Snapshot) -> Vec<f64> {
 /// Largest difference.
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    differences.fold(0.0, f64::max)
+    largest(a.iter().zip(b).map(|(a, b)| (a - b).abs()))
 }
 
 /// Root of the mean square of the differences, smoother than the largest.

@@ -45,6 +45,14 @@ pub fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
     Scenario::from_toml_with(VALID, "leaf.toml", &overrides)
 }
 
+/// Tries what every line of a table gives: `refused!(by; given => parts of the message;)`.
+#[macro_export]
+macro_rules! refused {
+    ($by:expr; $($given:expr => $($part:expr),+;)+) => {
+        $($by($given, &[$($part),+]);)+
+    };
+}
+
 #[track_caller]
 pub fn holds(scenario: Result<Scenario, ScenarioError>, parts: &[&str]) {
     let message = scenario.unwrap_err().to_string();

@@ -136,12 +136,8 @@ impl Linear {
                 masses[shift] += mass;
             }
         }
-        for (shift, mass) in masses
-            .into_iter()
-            .enumerate()
-            .filter(|(_, mass)| *mass > 0.0)
-        {
-            for c in 0..3 {
+        for (shift, mass) in masses.into_iter().enumerate() {
+            for c in (0..3).filter(|_| mass > 0.0) {
                 self.per_root_mass[(shift + c, shift + c)] = mass.sqrt().recip();
             }
         }
@@ -151,11 +147,8 @@ impl Linear {
     pub fn only(&self, wanted: &[usize]) -> Linear {
         let mut chosen = Vec::new();
         for [turn, shift] in self.freedoms.iter().flatten() {
-            chosen.extend(
-                wanted
-                    .iter()
-                    .map(|&c| if c < 3 { turn + c } else { shift + c - 3 }),
-            );
+            let of = |c: &usize| if *c < 3 { turn + c } else { shift + c - 3 };
+            chosen.extend(wanted.iter().map(of));
         }
         let part = |m: &DMatrix<f64>| m.select_rows(&chosen).select_columns(&chosen);
         Linear {
@@ -171,21 +164,16 @@ impl Linear {
         let root = &self.per_root_mass;
         let count = root.nrows();
         // A row has three entries at most.
-        let near = |r: usize| r.saturating_sub(2)..(r + 3).min(count);
-        let entries: Vec<Vec<(usize, f64)>> = (0..count)
-            .map(|r| {
-                near(r)
-                    .map(|c| (c, root[(r, c)]))
-                    .filter(|e| e.1 != 0.0)
-                    .collect()
-            })
-            .collect();
+        let row = |r: usize| -> Vec<(usize, f64)> {
+            let near = r.saturating_sub(2)..(r + 3).min(count);
+            let entries = near.map(|c| (c, root[(r, c)]));
+            entries.filter(|(_, value)| *value != 0.0).collect()
+        };
+        let rows: Vec<_> = (0..count).map(row).collect();
         let times = |matrix: &DMatrix<f64>| {
+            let entry = |r, (k, value): &(usize, f64)| matrix[(*k, r)] * value;
             DMatrix::from_fn(count, count, |r, c| {
-                entries[c]
-                    .iter()
-                    .map(|(k, value)| matrix[(*k, r)] * value)
-                    .sum()
+                rows[c].iter().map(|of| entry(r, of)).sum()
             })
         };
         // Transposed on the way, twice.

@@ -1,10 +1,16 @@
 //! What the tests of the command line share: a folder to run the program in.
-#![allow(dead_code)]
+#![allow(dead_code, unused_imports)]
+
+// A test that takes both this and `common` has it twice.
+#[allow(clippy::duplicate_mod)]
+#[path = "../common/pairs.rs"]
+mod pairs;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
+pub use pairs::pairs;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -61,8 +67,14 @@ impl Run {
 
 impl Workplace {
     pub fn new() -> Self {
+        let place = Workplace::empty();
+        place.write("leaf.toml", leaf("small", 5));
+        place
+    }
+
+    /// A folder without that leaf.
+    pub fn empty() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("leaf.toml"), leaf("small", 5)).unwrap();
         Workplace { folder }
     }
 
@@ -85,8 +97,22 @@ impl Workplace {
         command
     }
 
-    pub fn run(&self, arguments: &str) -> Run {
-        self.command(arguments).output().unwrap().into()
+    pub fn run(&self, arguments: impl AsRef<str>) -> Run {
+        self.command(arguments.as_ref()).output().unwrap().into()
+    }
+
+    /// A run that succeeds without a word on standard error.
+    #[track_caller]
+    pub fn ok(&self, arguments: impl AsRef<str>) -> Run {
+        self.run(arguments).ok()
+    }
+
+    /// What a run that ends so says with `--json`.
+    #[track_caller]
+    pub fn told(&self, status: i32, arguments: impl AsRef<str>) -> Value {
+        self.run(format!("{} --json", arguments.as_ref()))
+            .ends(status)
+            .json()
     }
 
     /// A run on so many threads.
@@ -106,8 +132,8 @@ impl Workplace {
     /// A run that is refused: status 2, the message, nothing printed but JSON that
     /// says the same, and nothing written.
     #[track_caller]
-    pub fn refuses(&self, arguments: &str, message: &str) {
-        let before = self.names(".");
+    pub fn refuses(&self, arguments: impl AsRef<str>, message: &str) -> Run {
+        let (arguments, before) = (arguments.as_ref(), self.names("."));
         let run = self.run(arguments);
         assert_eq!(run.status, Some(2), "{arguments}: {}", run.err);
         match arguments.contains("--json") {
@@ -120,6 +146,7 @@ impl Workplace {
         }
         assert!(run.err.contains(message), "{message} in {}", run.err);
         assert_eq!(self.names("."), before, "{arguments}");
+        run
     }
 
     /// Names in a folder, sorted; hidden ones too.
@@ -130,6 +157,16 @@ impl Workplace {
             .collect();
         names.sort();
         names
+    }
+
+    /// Asserts that a folder holds these files, names between blanks, and nothing else.
+    #[track_caller]
+    pub fn holds(&self, folder: &str, names: &str) {
+        assert_eq!(self.names(folder).join(" "), names, "{folder}");
+    }
+
+    pub fn write(&self, file: &str, text: impl AsRef<[u8]>) {
+        fs::write(self.path(file), text).unwrap();
     }
 
     #[track_caller]
@@ -181,31 +218,57 @@ pub fn contains(text: &str, parts: &[&str]) {
     }
 }
 
-/// The help of a verb must name these options and exit statuses, one a line.
-#[track_caller]
-pub fn help_names(verb: &str, parts: &str) {
-    let run = Workplace::new().run(&format!("{verb} --help")).ok();
-    let help: Vec<&str> = run.out.split_whitespace().collect();
-    let parts: Vec<&str> = parts.lines().map(str::trim).collect();
-    contains(&help.join(" "), &parts);
-}
-
 /// Asks for what every line of a table names, `arguments => message`: each is
 /// refused in a folder of its own.
 #[track_caller]
 pub fn all_refused(common: &str, table: &str) {
-    for line in table.trim().lines() {
-        let (arguments, message) = line.split_once("=>").unwrap();
-        let arguments = format!("{common} {arguments}");
-        Workplace::new().refuses(&arguments, message.trim());
+    for (arguments, message) in pairs(table) {
+        Workplace::new().refuses(format!("{common} {arguments}"), message);
+    }
+}
+
+/// What a JSON value must be.
+pub trait Json {
+    fn list(&self) -> &[Value];
+    fn number(&self) -> f64;
+    fn count(&self) -> usize;
+    fn text(&self) -> &str;
+}
+
+impl Json for Value {
+    #[track_caller]
+    fn list(&self) -> &[Value] {
+        self.as_array().expect("a list")
+    }
+
+    #[track_caller]
+    fn number(&self) -> f64 {
+        self.as_f64().expect("a number")
+    }
+
+    #[track_caller]
+    fn count(&self) -> usize {
+        self.as_u64().expect("a whole number") as usize
+    }
+
+    #[track_caller]
+    fn text(&self) -> &str {
+        self.as_str().expect("a text")
     }
 }
 
 /// The numbers of a JSON list.
 #[track_caller]
 pub fn floats(value: &Value) -> Vec<f64> {
-    let list = value.as_array().expect("a list");
-    list.iter().map(|number| number.as_f64().unwrap()).collect()
+    value.list().iter().map(Json::number).collect()
+}
+
+/// Asserts that two JSON lists are the same numbers but for so much.
+#[track_caller]
+pub fn near(a: &Value, b: &Value, within: f64) {
+    let (a, b) = (floats(a), floats(b));
+    let near = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() < within);
+    assert!(near, "{a:?} {b:?}");
 }
 
 /// What a JSON object tells, but for times.
