@@ -3,8 +3,8 @@
 use super::equations::{Equations, Stuck};
 use super::family::{Family, OutOfRange};
 use crate::leaf::{DiscreteLeaf, Grid, State};
-use crate::relax::node_state;
 use crate::relax::richardson::Richardson;
+use crate::relax::shape_of;
 use crate::shape::RodShape;
 use glam::DVec3;
 
@@ -40,21 +40,8 @@ impl Refined {
     /// # Errors
     /// If the extrapolated parameter is one that no leaf can have.
     pub fn shapes(&self, family: &Family) -> Result<Vec<RodShape>, OutOfRange> {
-        let scale = family.scale();
-        let node = |leaf: &DiscreteLeaf, j: usize, i: usize| {
-            let mut node = node_state(leaf, &self.state, j, i);
-            node.position *= scale.length;
-            node.u /= scale.length;
-            node.n *= scale.force();
-            node.m *= scale.moment();
-            node
-        };
-        let rod = |leaf: &DiscreteLeaf, j: usize| RodShape {
-            length: leaf.leaf.length(j) * scale.length,
-            nodes: (0..=leaf.segments()).map(|i| node(leaf, j, i)).collect(),
-        };
         family.with(self.fraction, &self.grid, |leaf| {
-            (0..leaf.rods()).map(|j| rod(leaf, j)).collect()
+            shape_of(leaf, &self.state)
         })
     }
 }

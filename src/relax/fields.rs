@@ -217,10 +217,5 @@ fn unpack(leaf: &Leaf, j: usize, sigma: f64, values: &Node) -> NodeState {
         m: vector(10),
     };
     shape::strains(leaf, j, sigma, &mut node);
-    let scale = leaf.scale;
-    node.position *= scale.length;
-    node.u /= scale.length;
-    node.n *= scale.force();
-    node.m *= scale.moment();
-    node
+    shape::in_units(node, leaf.scale)
 }

@@ -62,7 +62,7 @@ pub use saddle::Saddle;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
 pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};
-pub(crate) use shape::node as node_state;
+pub(crate) use shape::rods as shape_of;
 pub use solve::relax;
 pub(crate) use solve::relax_on_grids;
 pub(crate) use start::start;

@@ -1,7 +1,8 @@
 //! Strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Leaf, State};
-use crate::shape::NodeState;
+use crate::scenario::Scale;
+use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
 /// The state of node `i` of rod `j`, dimensionless: strains follow from the stress
@@ -19,6 +20,30 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
     };
     strains(&leaf.leaf, j, leaf.grid.sigma()[i], &mut node);
     node
+}
+
+/// A dimensionless node in the units of a scenario.
+pub fn in_units(node: NodeState, scale: Scale) -> NodeState {
+    NodeState {
+        position: node.position * scale.length,
+        u: node.u / scale.length,
+        n: node.n * scale.force(),
+        m: node.m * scale.moment(),
+        ..node
+    }
+}
+
+/// All rods of a state in the units of the scenario.
+pub fn rods(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
+    let scale = leaf.leaf.scale;
+    let rod = |j: usize| {
+        let nodes = (0..=leaf.segments()).map(|i| in_units(node(leaf, state, j, i), scale));
+        RodShape {
+            length: leaf.leaf.length(j) * scale.length,
+            nodes: nodes.collect(),
+        }
+    };
+    (0..leaf.rods()).map(rod).collect()
 }
 
 /// Stress resultant n and couple m at node `i` of rod `j` along its directors, dimensionless:

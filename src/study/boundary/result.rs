@@ -5,7 +5,6 @@ use serde::ser::{Serialize, Serializer};
 
 use crate::branch::boundary::{Halt, Special};
 use crate::branch::{Doubt, Kind};
-use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 
@@ -26,9 +25,6 @@ pub struct Boundary {
     /// The second parameter at the first trace, at whose critical points curves begin; others
     /// begin at those of the map's rows.
     pub start: f64,
-    /// Names of the units, if the scenario gives any.
-    #[serde(skip)]
-    pub units: Units,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.

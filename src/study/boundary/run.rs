@@ -117,7 +117,6 @@ fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Bound
         ranges: both.map(Vary::ends),
         log: both.map(|it| it.log),
         start,
-        units: trace.units.clone(),
         rods: trace.rods,
         joined: trace.joined,
         tolerance: trace.tolerance,

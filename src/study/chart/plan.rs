@@ -28,7 +28,9 @@ pub enum Setting {
 }
 
 /// Tolerances from coarse to fine.
-const TOLERANCES: [f64; 10] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11];
+const TOLERANCES: [f64; 11] = [
+    1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11,
+];
 
 /// Single grids from coarse to fine.
 pub(super) const SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];

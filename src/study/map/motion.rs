@@ -1,12 +1,11 @@
 //! Explicit motion with one time step, stable or not: the answer of a plain simulation
 //! of the damped leaf.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Stopped};
-use crate::relax::{self, Outcome, Work, index_near, node_state, start};
+use crate::relax::{self, Outcome, Work, index_near, shape_of, start};
 use crate::scenario::Scenario;
-use crate::shape::RodShape;
 use crate::study::judge::{Answer, SAME_LEAF, fine_grid, grid_error};
 use crate::undulation::Undulation;
 
@@ -77,7 +76,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
         return failed(MapOutcome::NotConverged, moves);
     }
-    let rods = shape(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
+    let rods = shape_of(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
     let index = index_near(scenario, grid.clone(), &rods);
     if index.is_none() && leaf.loads.tip_moment == glam::DVec3::ZERO {
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
@@ -109,26 +108,6 @@ pub fn stable_step(varied: &Varied) -> Option<f64> {
     let time = physics.time;
     let motion = Explicit::new(discrete, physics, &state, Some(1.0)).ok()?;
     Some(motion.stable_step().step * time)
-}
-
-/// The shape in the scenario's units.
-fn shape(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
-    let scale = leaf.leaf.scale;
-    (0..leaf.rods())
-        .map(|j| RodShape {
-            length: leaf.leaf.length(j) * scale.length,
-            nodes: (0..=leaf.segments())
-                .map(|i| {
-                    let mut node = node_state(leaf, state, j, i);
-                    node.position *= scale.length;
-                    node.u /= scale.length;
-                    node.n *= scale.force();
-                    node.m *= scale.moment();
-                    node
-                })
-                .collect(),
-        })
-        .collect()
 }
 
 /// Additional stations that a reference should have.
