@@ -81,3 +81,26 @@ fn the_strip_leaves_its_plane_and_comes_to_rest_stable() {
         }
     }
 }
+
+/// Just beyond it the way to the new equilibrium is a curved valley that whole Newton steps
+/// leave: where shooting confirms it, the strip comes to rest out of its plane.
+#[test]
+fn strips_just_beyond_their_load_come_to_rest() {
+    let (key, rows) = CRITICAL[0];
+    for [torsion, strong, ratio] in table(rows) {
+        for beyond in [1.0005, 1.001, 1.002, 1.003] {
+            let load = beyond * ratio * torsion.sqrt();
+            let strip = strip(&section(torsion, strong), f64::INFINITY, key, load);
+            let leaf = settle(&strip, 1e-6);
+            let what = format!("{strong}, {beyond}: {:?}", leaf.remark);
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
+            assert!(tip(&leaf).y.abs() > 0.01, "{what}");
+            let shot = shot_near(&strip, &leaf);
+            let off = apart(&strip, &leaf.shape.rods, &shot.rods).position;
+            assert!(
+                off <= estimate(&leaf) + shot.error.position,
+                "{what}: {off:e}"
+            );
+        }
+    }
+}

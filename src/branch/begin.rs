@@ -14,9 +14,12 @@ const FINEST: usize = 512;
 /// the length.
 const SAME_LEAF: f64 = 0.02;
 
+/// A relaxation on fewer segments counts as one on this many.
+const COARSEST: usize = 8;
+
 /// The first point of a branch and its grid: the equilibrium `rest`, found with these
 /// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
-/// the first one, at least twice as fine as the coarsest of the relaxation, on which the index
+/// the first one, at least twice as fine as the stations of the relaxation, on which the index
 /// is that of `rest`.
 ///
 /// # Errors
@@ -27,7 +30,8 @@ pub fn begin<'a>(
     options: &Options,
     segments: Option<usize>,
 ) -> Result<(Grids<'a>, Point), Stuck> {
-    let least = segments.unwrap_or(2 * (rest.shape.stations.len() - 1));
+    let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
+    let least = segments.unwrap_or(2 * coarsest);
     search(family, rest, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.

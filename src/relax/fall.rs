@@ -21,6 +21,6 @@ pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Opt
     let settled = run.settle(grid.clone(), InitialGuess::Pushed(state));
     settled.rest.ok()?;
     run.push(settled.level);
-    while !run.check_stability().ok()? {}
+    while !run.check_stability(true).ok()? {}
     run.levels.pop().map(|level| level.state)
 }

@@ -26,9 +26,9 @@ pub struct Fields {
 }
 
 /// All nodal fields after `columns` extrapolations, at the nodes of the coarsest grid or, if
-/// these are few, of the next; if every node is requested, of the finest. If the leaf was
-/// `integrated` to the tolerance (with that error) the fields are those of the integration,
-/// for a corrected leaf at every node of its grid. Otherwise they are returned only at nodes
+/// these are few and there is a finer one, of the next; if every node is requested, of the
+/// finest. If the leaf was `integrated` to the tolerance (with that error) the fields are those
+/// of the integration, for a corrected leaf at every node of its grid. Otherwise they are returned only at nodes
 /// that satisfy the tolerance as those of the coarsest grid do, which have the given `error`:
 /// nodes of the coarsest grid have the whole extrapolation, nodes added by a finer grid have
 /// that of the grids from there on, plus the interpolated remainder of the coarser grids'
@@ -41,20 +41,22 @@ pub fn fields(
     integrated: Option<(&Estimate, f64)>,
 ) -> Fields {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
-    let few = first.leaf.segments() < STATIONS && levels.len() > 1;
+    let few = first.leaf.segments() < STATIONS;
     let wanted = match every_node {
         true => finest,
-        false => levels[usize::from(few)],
+        false => levels[usize::from(few && levels.len() > 1)],
     };
     let known_error = error.unwrap_or(0.0);
     let leaf = &first.leaf.leaf;
     if let Some((estimate, error)) = integrated {
         let between = (error - known_error).max(0.0);
+        let first = &first.leaf.grid;
         let wanted = match every_node {
-            true => &estimate.grid,
-            false => &wanted.leaf.grid,
+            true => estimate.grid.clone(),
+            false if few && estimate.grid != *first => first.refined(),
+            false => first.clone(),
         };
-        return Fields::new(leaf, wanted, &sampled(estimate, wanted, finest), between);
+        return Fields::new(leaf, &wanted, &sampled(estimate, &wanted, finest), between);
     }
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();

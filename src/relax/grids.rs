@@ -51,14 +51,14 @@ impl Run<'_, '_> {
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             self.estimate_accuracy();
-            if self.accurate() && self.check_stability()? && !self.needs_another_grid() {
+            if self.accurate() && self.check_stability(false)? && !self.needs_another_grid() {
                 return Ok(true);
             }
             if self.out_of_time() {
                 return Err(Stop::StepLimit);
             }
             let Some(finer) = self.finer() else {
-                self.check_stability()?;
+                self.check_stability(true)?;
                 return Ok(false);
             };
             self.settle_on(finer)?;

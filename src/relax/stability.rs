@@ -19,17 +19,18 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Whether the stability on the first grid may not be that on finer ones.
-    fn needs_comparison(&self) -> bool {
-        self.levels.len() == 1 && self.segments().is_none() && !self.clearly_stable
+    /// Whether the stability on the first grid may not be that on finer ones, of which there
+    /// are some.
+    fn needs_comparison(&self, last: bool) -> bool {
+        !last && self.levels.len() == 1 && self.segments().is_none() && !self.clearly_stable
     }
 
-    /// Counts the negative eigenvalues on the finest grid. On the first of several grids the
-    /// leaf must be clearly stable. If saddles are accepted the number must be that on the grid
+    /// Counts the negative eigenvalues on the finest grid. On the first, unless it is the `last`,
+    /// the leaf must be clearly stable. If saddles are accepted the number must be that on the grid
     /// before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
     /// equilibrium reached. Returns whether stability is known, as far as possible: if not,
     /// finer grids are needed.
-    pub fn check_stability(&mut self) -> Result<bool, Stop> {
+    pub fn check_stability(&mut self, last: bool) -> Result<bool, Stop> {
         let level = self.levels.last().expect("the leaf has settled");
         if level.leaf.tip_moment() != DVec3::ZERO {
             return Ok(true);
@@ -38,7 +39,7 @@ impl Run<'_, '_> {
             let level = complete(self.leaf, whole, level);
             let mut system = System::new(&level.leaf);
             self.index = self.count_negative(&level, &mut system);
-            if self.needs_comparison() {
+            if self.needs_comparison(last) {
                 return Ok(false);
             }
             return match self.index {
@@ -53,7 +54,7 @@ impl Run<'_, '_> {
         let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
         self.index = self.count_negative(&level, &mut system);
         self.levels.push(level);
-        if self.needs_comparison() {
+        if self.needs_comparison(last) {
             return Ok(false);
         }
         if !matches!(self.index, Some(1..)) {
@@ -83,7 +84,7 @@ impl Run<'_, '_> {
         self.push(level);
         rest?;
         match self.segments() {
-            Some(_) => self.check_stability(),
+            Some(_) => self.check_stability(last),
             None => Ok(false),
         }
     }

@@ -48,6 +48,9 @@ const MAX_STEPS: usize = 2000;
 /// Largest growth factor of the time step.
 const MAX_GROWTH: f64 = 4.0;
 
+/// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
+const SMALLEST_PART: f64 = 1e-3;
+
 /// Relative growth of the energy that is attributed to rounding.
 const ENERGY_SLACK: f64 = 1e-9;
 
@@ -179,6 +182,9 @@ impl Relaxation<'_> {
         let mut trial = self.state.clone();
         let mut motion = Motion::new(leaf);
         let mut resting = false;
+        // The part of Newton's step that the energy allows near rest: close to a bifurcation
+        // the whole step may leave a curved valley.
+        let mut newton_part = 1.0_f64;
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
@@ -202,7 +208,8 @@ impl Relaxation<'_> {
             }
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
-            let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
+            let longest = if motion.is_newton() { newton_part } else { 1.0 };
+            let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(longest);
             leaf.advance(&self.state, system, part, &mut trial);
             let mut rest = None;
             if motion.is_newton() && part == 1.0 {
@@ -231,7 +238,10 @@ impl Relaxation<'_> {
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
             if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
-                if !motion.time_step.shorten() {
+                let near_rest = motion.is_newton() && (resting || newton_part < 1.0);
+                if near_rest && newton_part > SMALLEST_PART {
+                    newton_part /= 2.0;
+                } else if !motion.time_step.shorten() {
                     return Err(Stop::Stuck);
                 }
                 sums = leaf.assemble(&self.state, system);
@@ -245,7 +255,7 @@ impl Relaxation<'_> {
             sums = next;
             self.work.steps += 1;
             if motion.is_newton() {
-                resting = false;
+                (resting, newton_part) = (false, (2.0 * newton_part).min(1.0));
                 if let Some(remaining) = rest
                     && satisfies_lengths(leaf, &self.state, accuracy)
                 {

@@ -315,10 +315,10 @@ mod tests {
         };
         let contenders = [Contender::ALL[0]];
         let told = remarks(&rows, &contenders, Some(&reference));
-        assert!(told[0].starts_with("semi-implicit is not run from tolerance=1e-4 on"));
+        assert!(told[0].starts_with("semi-implicit is not run from tolerance=1e-3 on"));
         assert_eq!(
             told[1..],
-            ["semi-implicit underestimates its error at tolerance=1e-2"]
+            ["semi-implicit underestimates its error at tolerance=1e-1"]
         );
         // Along a neutral direction no estimate can be wrong.
         reference.neutral = Some("the leaf can move".into());
