@@ -42,7 +42,10 @@ pub fn eigenvalues(count: Option<usize>) -> String {
 pub fn grids(equilibrium: &Equilibrium) -> String {
     let grids = equilibrium.accuracy.segments.iter();
     let grids: Vec<String> = grids.map(usize::to_string).collect();
-    format!("grids of {} segments a vein", grids.join(", "))
+    match grids.as_slice() {
+        [only] => format!("a grid of {only} segments a vein"),
+        _ => format!("grids of {} segments a vein", grids.join(", ")),
+    }
 }
 
 /// An upper bound; zero means up to rounding.
