@@ -77,7 +77,7 @@ fn a_leaf_is_charted_and_written_down() {
     place.holds("out/small", FILES);
     let parts = ["small: speed against accuracy", "N = 2", "single shooting"];
     contains(&place.picture("out/small/chart"), &parts);
-    assert_eq!(rows(&place, "out/small/chart.csv", COLUMNS).len(), 38);
+    assert_eq!(rows(&place, "out/small/chart.csv", COLUMNS).len(), 41);
 }
 
 #[test]

@@ -71,7 +71,7 @@ fn on_fig_4_with_as_many_veins_as_the_paper() {
 fn from_rough_starts_too() {
     for figure in ["fig04", "fig05", "fig06", "fig13"] {
         let leaf = scenario(&format!("paper/{figure}"), "leaf.rods=5");
-        let (mut rough, fine) = (settle(&leaf, 0.1), settle(&leaf, TIGHT));
+        let (mut rough, fine) = (settle_on(&leaf, 8, false), settle(&leaf, TIGHT));
         for node in rough.shape.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
             node.position.z += 0.01;
             node.n.x += 0.1;
