@@ -23,7 +23,7 @@ def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
     source = (TESTS / "hostile_scenarios.rs").read_text()
     valid = (TESTS / "common" / "valid.rs").read_text().split('r#"', 1)[1].split('"#', 1)[0]
     rows = []
-    for table in re.findall(r"each! \{ refused;\n(.*?)\n    \}", source, re.S):
+    for table in re.findall(r"refused! \{ refused;\n(.*?)\n    \}", source, re.S):
         for row in re.finditer(rf"{TEXT}\s*=>\s*((?:{TEXT}\s*,?\s*)+);", table):
             parts = [unescape(part) for part in re.findall(TEXT, row.group(2))]
             rows.append((unescape(row.group(1)), parts))
@@ -60,7 +60,7 @@ def test_every_hostile_line_in_a_dict(line: str, parts: list[str]) -> None:
         numbers = tomllib.loads(VALID.replace(before, line, 1))
     except (tomllib.TOMLDecodeError, OverflowError):
         return  # No such dict.
-    if "1e999" in line:
+    if "1e999" in line or "1e309" in line:
         return  # Of which Python makes an infinity itself.
     with pytest.raises(leafdyn.ScenarioError) as refused:
         leafdyn.relax(numbers)

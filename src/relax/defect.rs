@@ -99,7 +99,7 @@ pub fn estimate(
     let assumed = (CONTRACTION.0 / (n * n)).max(CONTRACTION.1);
     let mut uncorrected = None;
     let mut before = 0.0;
-    let mut steps = Steps::new(finest.segments() / count / 2);
+    let mut steps = Steps::new(finest.segments() / count / 2, last == 0);
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
         let integrated = integrated((first, &parts), &mut flow, &known, steps.count);
@@ -153,29 +153,37 @@ struct Steps {
     halved: bool,
     /// Bound on the error of the integration.
     error: f64,
+    /// Whether the leaf is on a single grid.
+    alone: bool,
 }
 
 impl Steps {
-    fn new(count: usize) -> Self {
+    fn new(count: usize, alone: bool) -> Self {
         Steps {
             count,
             halved: false,
             error: f64::INFINITY,
+            alone,
         }
     }
 
     /// With the estimated error of a round: after a round with longer steps it includes their
     /// error, and so bounds that of the halved steps.
     fn measure(&mut self, largest: f64) {
-        if self.halved {
-            self.error = HALVED * largest;
-        }
+        self.error = match (self.halved, self.alone) {
+            (true, true) => HALVED * largest,
+            (true, false) => 0.0,
+            (false, true) => self.error,
+            (false, false) => f64::INFINITY,
+        };
     }
 
-    /// Halves the steps if the next round, whose error is `expected`, may be the last and their
-    /// own error is not known to be small.
+    /// Halves the steps if the next round, whose error is `expected`, may be the last; on a
+    /// single grid only if their own error is not known to be small. For small tolerances, with
+    /// several grids, the ends of more steps make better stations.
     fn choose(&mut self, expected: f64, enough: f64) {
-        self.halved = self.error > 0.5 * enough && expected <= enough;
+        let unknown = !self.alone || self.error > 0.5 * enough;
+        self.halved = unknown && expected <= enough;
         if self.halved {
             self.count *= 2;
         }

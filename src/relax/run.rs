@@ -34,13 +34,13 @@ const LARGEST: f64 = 10.0;
 /// not computed: it would hardly be small enough.
 const OUT_OF_REACH: f64 = 3e3;
 
-/// The smallest tolerance for which the first grid is tried alone: below it two grids, which
-/// need fewer corrections, are faster.
-const LEAST_ALONE: f64 = 5e-9;
+/// The smallest tolerance for which the first grid is tried alone: below it nodes would be too
+/// few for stations between them.
+const LEAST_ALONE: f64 = 5e-7;
 
 /// Largest number of corrections by the estimated error, and the part of the error that each
 /// leaves at best.
-const CORRECTIONS: usize = 6;
+const CORRECTIONS: usize = 4;
 const CORRECTED: f64 = 1e-2;
 
 /// For leaves with more nodes than this no equations are kept while others are solved, which
