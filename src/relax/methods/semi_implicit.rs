@@ -181,35 +181,21 @@ impl Relaxation<'_> {
     ) -> Result<f64, Stop> {
         let mut trial = self.state.clone();
         let mut motion = Motion::new(leaf);
-        let mut resting = false;
-        // The part of Newton's step that the energy allows near rest: close to a bifurcation
-        // the whole step may leave a curved valley.
-        let mut newton_part = 1.0_f64;
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
-
         for step in 0..MAX_STEPS {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 break;
             }
-            // A positive definite matrix and its solution, with as long a time
-            // step as it takes.
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
-            while !self.solve(leaf, space.as_ref(), system, &motion, tolerance) {
-                if resting {
-                    return Err(Stop::Saddle);
-                }
-                self.moved = true;
-                if self.convex_only || !motion.time_step.shorten() {
-                    return Err(Stop::Stuck);
-                }
-            }
+            self.solve_shortening(leaf, space.as_ref(), system, &mut motion, tolerance)?;
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
-            let longest = if motion.is_newton() { newton_part } else { 1.0 };
-            let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(longest);
+            let part = (MAX_TURN / turn)
+                .min(MAX_SHIFT / shift)
+                .min(motion.longest_part());
             leaf.advance(&self.state, system, part, &mut trial);
             let mut rest = None;
             if motion.is_newton() && part == 1.0 {
@@ -238,10 +224,7 @@ impl Relaxation<'_> {
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
             if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
-                let near_rest = motion.is_newton() && (resting || newton_part < 1.0);
-                if near_rest && newton_part > SMALLEST_PART {
-                    newton_part /= 2.0;
-                } else if !motion.time_step.shorten() {
+                if !motion.shorten() {
                     return Err(Stop::Stuck);
                 }
                 sums = leaf.assemble(&self.state, system);
@@ -254,15 +237,14 @@ impl Relaxation<'_> {
             std::mem::swap(&mut self.state, &mut trial);
             sums = next;
             self.work.steps += 1;
-            if motion.is_newton() {
-                (resting, newton_part) = (false, (2.0 * newton_part).min(1.0));
-                if let Some(remaining) = rest
-                    && satisfies_lengths(leaf, &self.state, accuracy)
-                {
-                    return Ok(remaining);
-                }
-            } else {
-                resting = motion.accept(at_saddle(leaf, &self.state, size), part) || resting;
+            if let Some(remaining) = rest
+                && satisfies_lengths(leaf, &self.state, accuracy)
+            {
+                return Ok(remaining);
+            }
+            match motion.is_newton() {
+                true => motion.accept_newton(),
+                false => motion.accept(at_saddle(leaf, &self.state, size), part),
             }
             previous = size;
             if system.coupled() {
@@ -270,6 +252,27 @@ impl Relaxation<'_> {
             }
         }
         Err(Stop::StepLimit)
+    }
+
+    /// Solves for the next step with as long a time step as makes the matrix positive definite.
+    fn solve_shortening(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        space: Option<&DiscreteLeaf>,
+        system: &mut System,
+        motion: &mut Motion,
+        tolerance: f64,
+    ) -> Result<(), Stop> {
+        while !self.solve(leaf, space, system, motion, tolerance) {
+            if motion.resting {
+                return Err(Stop::Saddle);
+            }
+            self.moved = true;
+            if self.convex_only || !motion.time_step.shorten() {
+                return Err(Stop::Stuck);
+            }
+        }
+        Ok(())
     }
 
     /// Factorises and solves for the next time step of a motion; false if the matrix is not
@@ -302,6 +305,11 @@ struct Motion {
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
     newton: f64,
+    /// The part of Newton's step that the energy allows near rest: close to a bifurcation the
+    /// whole step may leave a curved valley.
+    newton_part: f64,
+    /// Whether it was at a possible saddle, or at rest, before the next step of Newton's method.
+    resting: bool,
 }
 
 impl Motion {
@@ -316,11 +324,33 @@ impl Motion {
             next_velocity: velocity.clone(),
             velocity,
             newton: f64::INFINITY,
+            newton_part: 1.0,
+            resting: false,
         }
     }
 
     fn is_newton(&self) -> bool {
         self.time_step.dt.is_infinite()
+    }
+
+    /// The longest part of the next step that may be taken.
+    fn longest_part(&self) -> f64 {
+        if self.is_newton() {
+            self.newton_part
+        } else {
+            1.0
+        }
+    }
+
+    /// Shortens a step that raises the energy: near rest a part of Newton's step is taken,
+    /// otherwise a shorter time step. False if there is none.
+    fn shorten(&mut self) -> bool {
+        let near_rest = self.is_newton() && (self.resting || self.newton_part < 1.0);
+        if near_rest && self.newton_part > SMALLEST_PART {
+            self.newton_part /= 2.0;
+            return true;
+        }
+        self.time_step.shorten()
     }
 
     /// Whether the total energy does not grow in a step, of which the fraction `part` is
@@ -338,15 +368,21 @@ impl Motion {
 
     /// Updates velocity and time step after an accepted step. At a possible saddle the next
     /// step is Newton's, without inertia or damping: it leaves the saddle, or shows that the
-    /// leaf is at rest. Returns whether that is so.
-    fn accept(&mut self, at_saddle: bool, part: f64) -> bool {
+    /// leaf is at rest.
+    fn accept(&mut self, at_saddle: bool, part: f64) {
         std::mem::swap(&mut self.velocity, &mut self.next_velocity);
+        self.resting |= at_saddle;
         if at_saddle {
             self.time_step.dt = f64::INFINITY;
         } else if part == 1.0 {
             self.time_step.lengthen();
         }
-        at_saddle
+    }
+
+    /// After an accepted step of Newton's method.
+    fn accept_newton(&mut self) {
+        self.resting = false;
+        self.newton_part = (2.0 * self.newton_part).min(1.0);
     }
 }
 
