@@ -68,7 +68,8 @@ impl Grid {
         self.cut(|a, b, third| [a, a + third, b - third])
     }
 
-    /// The grid of which this is the refined one; `None` if there is none.
+    /// The grid with every second node; a kink may then lie inside a segment. `None` unless the
+    /// segments are pairs of equal ones.
     pub fn coarsened(&self) -> Option<Self> {
         let pairs = self.widths.chunks(2);
         let equal = |pair: &[f64]| matches!(pair, [a, b] if a == b);
@@ -133,7 +134,9 @@ mod tests {
             );
             let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
             assert!((sum - 1.0).abs() < 1e-15);
+            assert_eq!(grid.refined().coarsened(), Some(grid));
         }
+        assert_eq!(Grid::new(11, &[0.2, 0.25, 0.9]).coarsened(), None);
         for grid in [
             Grid::new(32, &[0.3404]),
             Grid::new(8, &[0.3404]).refined().refined(),
