@@ -63,7 +63,7 @@ fn the_full_model_tends_to_it_with_the_square_of_the_load() {
     for axis in [1, 2] {
         for tension in [-30.0, -6.0, -0.7, 0.5, 4.0, 40.0] {
             // What is bent less is known less well.
-            let most = if f64::abs(tension) > 10.0 { 4e-2 } else { 2e-2 };
+            let most = if tension > 10.0 { 4e-2 } else { 2e-2 };
             let errors = [1.0, 0.5, 0.25].map(|part| relative_error(axis, part * most, tension));
             assert!(errors[0] < 0.02, "{tension}: {errors:?}");
             for pair in errors.windows(2) {

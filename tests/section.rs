@@ -40,24 +40,21 @@ fn the_same_leaf_with_its_stiffnesses_written_out() {
         let values: Vec<f64> = profiles.iter().map(|profile| profile.at(0.5)).collect();
         format!("{key} = {values:?}\n")
     };
+    let keys = [
+        "torsion",
+        "bending_2",
+        "bending_3",
+        "axial",
+        "shear_2",
+        "shear_3",
+    ];
     let mut text = String::from("[stiffness]\n");
-    for (axis, key) in ["torsion", "bending_2", "bending_3"].iter().enumerate() {
-        text += &list(
-            key,
-            leaf.rods
-                .iter()
-                .map(|rod| &rod.couple_stiffness[axis])
-                .collect(),
-        );
-    }
-    for (axis, key) in ["axial", "shear_2", "shear_3"].iter().enumerate() {
-        text += &list(
-            key,
-            leaf.rods
-                .iter()
-                .map(|rod| &rod.force_stiffness[axis])
-                .collect(),
-        );
+    for (k, key) in keys.iter().enumerate() {
+        let profiles = leaf.rods.iter().map(|rod| match k {
+            0..3 => &rod.couple_stiffness[k],
+            _ => &rod.force_stiffness[k - 3],
+        });
+        text += &list(key, profiles.collect());
     }
     text += "[dynamics]\n";
     text += &list("density", leaf.dynamics.density.iter().collect());

@@ -19,7 +19,7 @@ fn large_leaves_are_relaxed_equally_on_one_two_and_five_threads() {
         rod.couple_stiffness[1] = Profile::Constant(0.05);
     }
     for leaf in [fig04(600), soft] {
-        let on = |threads| on_threads(threads, || settle(&leaf, 1e-9));
+        let on = |threads| on_threads(threads, || settle(&leaf, 1e-8));
         let bits = |leaf: &Equilibrium| {
             let numbers = [leaf.energy, leaf.accuracy.residual].map(Option::unwrap);
             let numbers = bits_of(numbers.into_iter().chain(leaf.accuracy.error_estimate));
