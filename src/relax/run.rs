@@ -268,7 +268,8 @@ impl<'a, 'o> Run<'a, 'o> {
         let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
         let columns = match self.table.best() {
             Some(best) => (best.error <= farthest).then_some(best.columns),
-            None => (most > 0 && self.tolerance >= LEAST_ALONE).then_some(0),
+            // What has left a saddle may be close to another on the next grid.
+            None => (most > 0 && self.tolerance >= LEAST_ALONE && self.pushes == 0).then_some(0),
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);

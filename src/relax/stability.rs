@@ -9,25 +9,25 @@ use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
 use glam::DVec3;
 
 impl Run<'_, '_> {
-    /// Number of negative eigenvalues on one grid; also stores whether the leaf is clearly stable.
-    fn count_negative(&mut self, level: &Level, system: &mut System) -> Option<usize> {
+    /// Counts the negative eigenvalues on one grid, and whether the leaf is clearly stable. If
+    /// it is not and will be `compared` with another grid nothing is counted; returns whether
+    /// it was.
+    fn count_negative(&mut self, level: &Level, system: &mut System, compared: bool) -> bool {
         let Level { leaf, state } = level;
         self.clearly_stable = saddle::clearly_stable(leaf, state, system, &mut self.work);
-        match self.clearly_stable {
+        if compared && !self.clearly_stable {
+            return false;
+        }
+        self.index = match self.clearly_stable {
             true => Some(0),
             false => saddle::index(leaf, state, system, 0.0, &mut self.work),
-        }
-    }
-
-    /// Whether the stability on the first grid may not be that on finer ones, of which there
-    /// are some.
-    fn needs_comparison(&self, last: bool) -> bool {
-        !last && self.levels.len() == 1 && self.segments().is_none() && !self.clearly_stable
+        };
+        true
     }
 
     /// Counts the negative eigenvalues on the finest grid. On the first, unless it is the `last`,
-    /// the leaf must be clearly stable. If saddles are accepted the number must be that on the grid
-    /// before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
+    /// the leaf must be clearly stable. If saddles are accepted the number must be that on the
+    /// grid before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
     /// equilibrium reached. Returns whether stability is known, as far as possible: if not,
     /// finer grids are needed.
     pub fn check_stability(&mut self, last: bool) -> Result<bool, Stop> {
@@ -35,11 +35,11 @@ impl Run<'_, '_> {
         if level.leaf.tip_moment() != DVec3::ZERO {
             return Ok(true);
         }
+        let compared = !last && self.levels.len() == 1 && self.segments().is_none();
         if let Some(whole) = self.whole {
             let level = complete(self.leaf, whole, level);
             let mut system = System::new(&level.leaf);
-            self.index = self.count_negative(&level, &mut system);
-            if self.needs_comparison(last) {
+            if !self.count_negative(&level, &mut system, compared) {
                 return Ok(false);
             }
             return match self.index {
@@ -52,9 +52,9 @@ impl Run<'_, '_> {
         let spare_system = self.spare_system.take();
         let spare_system = spare_system.filter(|spare_system| spare_system.fits(&level.leaf));
         let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
-        self.index = self.count_negative(&level, &mut system);
+        let counted = self.count_negative(&level, &mut system, compared);
         self.levels.push(level);
-        if self.needs_comparison(last) {
+        if !counted {
             return Ok(false);
         }
         if !matches!(self.index, Some(1..)) {
