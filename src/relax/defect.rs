@@ -43,7 +43,7 @@ const FORCES: f64 = 50.0;
 /// The factorised equations of one of the grids.
 pub struct Linear {
     grid: usize,
-    system: System,
+    pub system: System,
 }
 
 /// A leaf on one grid or several, with its error estimated from the equilibrium equations.
@@ -73,12 +73,13 @@ impl Estimate {
 /// segments of the one before, with `columns` extrapolations. If the error is more than
 /// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
 /// `None` where the linear equations cannot be solved, or where the segments of a single level
-/// are not pairs of equal ones. The equations are factorised unless `linear` has them already.
+/// are not pairs of equal ones. The equations are factorised, if it fits in `spare`, unless
+/// `linear` has them already.
 pub fn estimate(
     levels: &[Level],
     columns: usize,
     (enough, most): (f64, usize),
-    linear: &mut Option<Linear>,
+    (linear, spare): (&mut Option<Linear>, &mut Option<System>),
     work: &mut Work,
 ) -> Option<Estimate> {
     let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
@@ -88,7 +89,7 @@ pub fn estimate(
         _ => (first.grid.clone(), last.saturating_sub(COARSER).max(1)),
     };
     if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
-        let system = factorized(&levels[grid], work)?;
+        let system = factorized(&levels[grid], spare.take(), work)?;
         *linear = Some(Linear { grid, system });
     }
     let (level, system) = (&levels[grid], &mut linear.as_mut()?.system);
@@ -220,8 +221,8 @@ impl Round {
 
 /// Assembled anew at rest: the equations of the last Newton step have the forces before it,
 /// which differ where rods are rigid.
-fn factorized(level: &Level, work: &mut Work) -> Option<System> {
-    let mut system = System::new(&level.leaf);
+fn factorized(level: &Level, spare: Option<System>, work: &mut Work) -> Option<System> {
+    let mut system = System::reused(spare, &level.leaf);
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
@@ -373,7 +374,8 @@ mod tests {
                 relax_on_grids(&leaf, &Options::default(), 1e-3, &mut |_| {}).unwrap();
             let (mut linear, mut work) = (None, Work::default());
             let mut estimated = |enough, most| {
-                estimate(&levels, 1, (enough, most), &mut linear, &mut work).unwrap()
+                let systems = (&mut linear, &mut None);
+                estimate(&levels, 1, (enough, most), systems, &mut work).unwrap()
             };
             let first = estimated(0.0, 0).largest();
             // The last round only verifies.

@@ -75,6 +75,7 @@ impl Run<'_, '_> {
                 limit: &self.options.limit,
                 convex_only: false,
                 moved: false,
+                in_time: false,
                 by_steps: false,
                 moved_softened: false,
                 load_part: 0.0,

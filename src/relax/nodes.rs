@@ -15,6 +15,10 @@ pub type Node = [f64; FIELDS];
 /// grids, rod after rod, dimensionless.
 pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodFields>> {
     let finest = &levels[levels.len() - 1];
+    let rods = 0..finest.leaf.rods();
+    if columns == 0 {
+        return rods.map(|j| on_grid(finest, j, parts)).collect();
+    }
     let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
     let node = |values: &Node| {
         let vector = |k: usize| DVec3::from_slice(&values[k..]);
@@ -30,7 +34,20 @@ pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodField
         let nodes = RodNodes::new(&used, finest, j).extrapolated(parts);
         nodes.iter().map(node).collect()
     };
-    (0..finest.leaf.rods()).map(rod).collect()
+    rods.map(rod).collect()
+}
+
+/// The fields of a rod on one grid.
+fn on_grid(level: &Level, j: usize, parts: usize) -> Vec<RodFields> {
+    let Level { leaf, state } = level;
+    let stride = leaf.segments() / parts;
+    let node = |(i, q): (usize, DQuat)| {
+        let [n, m] = shape::resultants(leaf, state, j, i).map(|vector| q * vector);
+        let x = state.x[state.base(j) + i];
+        RodFields { x, q, n, m }
+    };
+    let rotations = rotations(level, j).into_iter().enumerate();
+    rotations.step_by(stride).map(node).collect()
 }
 
 /// The nodes of a rod on several grids, each computed on first use and cached: nodes common to

@@ -2,9 +2,10 @@
 //! with its own stiffness.
 //!
 //! Stiff rods are softened while a leaf moves ([`super::methods`]), and a softened leaf may
-//! come to rest in another valley (basin of attraction) of its energy. Where that is possible,
-//! the damped motion of the leaf with its own stiffness is integrated on one grid, from the
-//! start and with the mass and damping of a relaxation, until it has settled in a valley;
+//! come to rest in another valley (basin of attraction) of its energy, even if its steps, too
+//! long to resolve inertia, never leave the valley of its start. Unless Newton's steps alone led
+//! to rest, the damped motion of the leaf with its own stiffness is integrated on one grid, from
+//! the start and with the mass and damping of a relaxation, until it has settled in a valley;
 //! Newton's method continues from there.
 
 use crate::leaf::{DiscreteLeaf, Grid, System};

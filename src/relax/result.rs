@@ -147,7 +147,7 @@ fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline
     (&finest.leaf.grid, lines.collect())
 }
 
-/// Remark on a leaf that moved far while softened.
+/// Remark on a leaf that moved in time while softened.
 const SOFTENED: &str = "stiff rods were softened while the leaf moved: \
      where it has several equilibria, its own motion may end in another; simulate shows it";
 

@@ -96,7 +96,7 @@ pub struct Run<'a, 'o> {
     pub pushes: i32,
     /// Whether the leaf did not come to rest in a first attempt.
     pub by_steps: bool,
-    /// Whether it moved through states of non-convex energy while softened.
+    /// Whether it took time steps while softened.
     pub moved_softened: bool,
     /// Part of the loads under which it came to rest in the second attempt.
     pub load_part: f64,
@@ -261,6 +261,11 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
+    /// Whether the first grid may be enough.
+    pub fn may_be_alone(&self) -> bool {
+        self.corrections() > 0 && self.tolerance >= LEAST_ALONE
+    }
+
     /// Estimates the error of the values on the only grid or of the extrapolated values from
     /// their defect, and corrects it if that makes them accurate enough.
     pub fn estimate_accuracy(&mut self) {
@@ -269,12 +274,13 @@ impl<'a, 'o> Run<'a, 'o> {
         let columns = match self.table.best() {
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
-            None => (most > 0 && self.tolerance >= LEAST_ALONE && self.pushes == 0).then_some(0),
+            None => (self.may_be_alone() && self.pushes == 0).then_some(0),
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
+        let systems = (&mut self.linear, &mut self.spare_system);
+        let (levels, work) = (&self.levels, &mut self.work);
         self.estimate =
-            columns.and_then(|columns| defect::estimate(levels, columns, enough, linear, work));
+            columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.linear = None;
         }

@@ -13,9 +13,11 @@ use crate::relax::start::{disturb, start};
 use glam::DVec3;
 
 /// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
-/// coarse, a looser one saves a step on the finest.
+/// coarse, a looser one saves a step on the finest. On a grid that may be the only one it is
+/// estimated, and subtracted, with the error of the grid.
 const ITERATION_PART: f64 = 1e-3;
 const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+const ITERATION_PART_ALONE: f64 = 5e-2;
 
 /// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
 const FIXED_ACCURACY: f64 = 1e-12;
@@ -158,7 +160,10 @@ impl Run<'_, '_> {
         let first = (self.levels.first()).map_or(leaf.segments(), |first| first.leaf.segments());
         match self.segments() {
             Some(_) => FIXED_ACCURACY,
-            None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
+            None if self.too_coarse(first) => match self.levels.is_empty() && self.may_be_alone() {
+                true => ITERATION_PART_ALONE * self.tolerance,
+                false => ITERATION_PART_FROM_COARSE * self.tolerance,
+            },
             None => ITERATION_PART * self.tolerance,
         }
     }
@@ -199,6 +204,7 @@ impl Run<'_, '_> {
                 limit: &self.options.limit,
                 convex_only,
                 moved: false,
+                in_time: false,
                 by_steps,
                 moved_softened: false,
                 load_part: 0.0,

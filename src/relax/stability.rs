@@ -49,9 +49,12 @@ impl Run<'_, '_> {
         }
         let before = self.index;
         let level = self.levels.pop().expect("the leaf has settled");
-        let spare_system = self.spare_system.take();
-        let spare_system = spare_system.filter(|spare_system| spare_system.fits(&level.leaf));
-        let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
+        let mut spare = self.spare_system.take();
+        if spare.is_none() && self.levels.is_empty() {
+            // Further grids have equations of their own.
+            spare = self.linear.take().map(|linear| linear.system);
+        }
+        let mut system = System::reused(spare, &level.leaf);
         let counted = self.count_negative(&level, &mut system, compared);
         self.levels.push(level);
         if !counted {

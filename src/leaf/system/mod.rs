@@ -139,9 +139,11 @@ impl System {
         }
     }
 
-    /// Whether it has the numbers of rods and segments of `leaf`.
-    pub fn fits(&self, leaf: &DiscreteLeaf) -> bool {
-        (self.rods, self.segments) == (leaf.rods(), leaf.segments())
+    /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
+    /// on a grid of as many segments.
+    pub fn reused(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
+        let fits = |spare: &System| (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
+        spare.filter(fits).unwrap_or_else(|| System::new(leaf))
     }
 
     /// Number of rods.

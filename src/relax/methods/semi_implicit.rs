@@ -11,26 +11,14 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{DiscreteLeaf, Increment, State, System};
+use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{
     Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
     satisfies_lengths,
 };
+use crate::relax::methods::damped_motion::Motion;
 use crate::rod::RESOLVED_TURN;
-
-/// Damping c: critical for the lowest bending mode of a single rod, whose
-/// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
-const DAMPING: f64 = 2.0 * 3.516;
-
-/// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
-const FIRST_STEP: f64 = 0.06;
-
-/// Shortest time step; a leaf that needs a shorter one is not settling.
-const SHORTEST_STEP: f64 = 1e-7;
-
-/// Beyond this time step inertia is negligible: the step becomes Newton's.
-const LONGEST_STEP: f64 = 1e3;
 
 /// Largest rotation of a node in one step, radians.
 const MAX_TURN: f64 = 1.0;
@@ -44,15 +32,6 @@ const SMALL: f64 = 1e-3;
 
 /// Largest number of steps on one grid.
 const MAX_STEPS: usize = 2000;
-
-/// Largest growth factor of the time step.
-const MAX_GROWTH: f64 = 4.0;
-
-/// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
-const SMALLEST_PART: f64 = 1e-3;
-
-/// Relative growth of the energy that is attributed to rounding.
-const ENERGY_SLACK: f64 = 1e-9;
 
 /// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
 /// one is first settled with this compliance, which also gives its segment forces, and then
@@ -96,9 +75,12 @@ pub struct Relaxation<'a> {
     pub convex_only: bool,
     /// Whether the leaf moved through states of non-convex energy.
     pub moved: bool,
+    /// Whether it took time steps: Newton's did not lead to rest.
+    pub in_time: bool,
     /// Whether this is a second attempt, by continuation in loads and stiffness.
     pub by_steps: bool,
-    /// Whether it did so while softened.
+    /// Whether it took time steps while softened: its inertia, and that of the leaf with its
+    /// own stiffness, may decide where it comes to rest.
     pub moved_softened: bool,
     /// Part of the loads under which the leaf came to rest, in such an attempt.
     pub load_part: f64,
@@ -121,15 +103,13 @@ impl Relaxation<'_> {
         let mut soften = !self.near_rest;
         loop {
             if soften {
-                let moved = std::mem::take(&mut self.moved);
                 let soft = leaf.softened(compliance);
                 if self.pushes > 0 {
                     // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
                 let rest = self.move_to_rest(&soft, system, SOFT_ACCURACY);
-                self.moved_softened |= self.moved;
-                self.moved |= moved;
+                self.moved_softened |= self.in_time;
                 rest?;
             }
             let before = self.state.clone();
@@ -244,7 +224,10 @@ impl Relaxation<'_> {
             }
             match motion.is_newton() {
                 true => motion.accept_newton(),
-                false => motion.accept(at_saddle(leaf, &self.state, size), part),
+                false => {
+                    self.in_time = true;
+                    motion.accept(at_saddle(leaf, &self.state, size), part);
+                }
             }
             previous = size;
             if system.coupled() {
@@ -268,7 +251,7 @@ impl Relaxation<'_> {
                 return Err(Stop::Saddle);
             }
             self.moved = true;
-            if self.convex_only || !motion.time_step.shorten() {
+            if self.convex_only || !motion.shorten_in_time() {
                 return Err(Stop::Stuck);
             }
         }
@@ -286,129 +269,12 @@ impl Relaxation<'_> {
         motion: &Motion,
         tolerance: f64,
     ) -> bool {
-        let (dt, velocity) = (motion.time_step.dt, motion.velocity.as_slice());
-        let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
-        let shift = match dt.is_finite() {
-            true => (1.0 / dt + DAMPING) / dt,
-            false => leaf.neutral_shift(),
+        let (shift, inertia) = match motion.inertia() {
+            Some((shift, momentum)) => (shift, Some(momentum)),
+            None => (leaf.neutral_shift(), None),
         };
         let (solver, work) = (&mut self.solver, &mut *self.work);
         solver.convex_in_space(space, &self.state, shift, work)
             && solver.solve(system, shift, inertia, tolerance, work)
-    }
-}
-
-/// Velocities, and the time step; an infinite time step is Newton's method.
-struct Motion {
-    time_step: TimeStep,
-    velocity: Vec<Vec<Increment>>,
-    next_velocity: Vec<Vec<Increment>>,
-    /// Size of the last step if it was one of Newton's method.
-    newton: f64,
-    /// The part of Newton's step that the energy allows near rest: close to a bifurcation the
-    /// whole step may leave a curved valley.
-    newton_part: f64,
-    /// Whether it was at a possible saddle, or at rest, before the next step of Newton's method.
-    resting: bool,
-}
-
-impl Motion {
-    /// At rest, with the longest step.
-    fn new(leaf: &DiscreteLeaf) -> Self {
-        let velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
-        Motion {
-            time_step: TimeStep {
-                dt: f64::INFINITY,
-                growth: MAX_GROWTH,
-            },
-            next_velocity: velocity.clone(),
-            velocity,
-            newton: f64::INFINITY,
-            newton_part: 1.0,
-            resting: false,
-        }
-    }
-
-    fn is_newton(&self) -> bool {
-        self.time_step.dt.is_infinite()
-    }
-
-    /// The longest part of the next step that may be taken.
-    fn longest_part(&self) -> f64 {
-        if self.is_newton() {
-            self.newton_part
-        } else {
-            1.0
-        }
-    }
-
-    /// Shortens a step that raises the energy: near rest a part of Newton's step is taken,
-    /// otherwise a shorter time step. False if there is none.
-    fn shorten(&mut self) -> bool {
-        let near_rest = self.is_newton() && (self.resting || self.newton_part < 1.0);
-        if near_rest && self.newton_part > SMALLEST_PART {
-            self.newton_part /= 2.0;
-            return true;
-        }
-        self.time_step.shorten()
-    }
-
-    /// Whether the total energy does not grow in a step, of which the fraction `part` is
-    /// taken, with these potential energies before and after it.
-    fn energy_does_not_grow(&mut self, system: &System, part: f64, potential: [f64; 2]) -> bool {
-        let [mut energy, mut next_energy] = potential;
-        if !self.is_newton() {
-            energy += system.kinetic_energy(&self.velocity);
-            system.velocity(part, self.time_step.dt, &mut self.next_velocity);
-            next_energy += system.kinetic_energy(&self.next_velocity);
-        }
-        let slack = ENERGY_SLACK * (1.0 + energy.abs());
-        next_energy.is_finite() && next_energy <= energy + slack
-    }
-
-    /// Updates velocity and time step after an accepted step. At a possible saddle the next
-    /// step is Newton's, without inertia or damping: it leaves the saddle, or shows that the
-    /// leaf is at rest.
-    fn accept(&mut self, at_saddle: bool, part: f64) {
-        std::mem::swap(&mut self.velocity, &mut self.next_velocity);
-        self.resting |= at_saddle;
-        if at_saddle {
-            self.time_step.dt = f64::INFINITY;
-        } else if part == 1.0 {
-            self.time_step.lengthen();
-        }
-    }
-
-    /// After an accepted step of Newton's method.
-    fn accept_newton(&mut self) {
-        self.resting = false;
-        self.newton_part = (2.0 * self.newton_part).min(1.0);
-    }
-}
-
-/// The time step, and its growth factor after an accepted step.
-struct TimeStep {
-    dt: f64,
-    growth: f64,
-}
-
-impl TimeStep {
-    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
-    fn shorten(&mut self) -> bool {
-        self.dt = match self.dt.is_finite() {
-            true => self.dt / 4.0,
-            false => FIRST_STEP,
-        };
-        self.growth = 1.0;
-        self.dt >= SHORTEST_STEP
-    }
-
-    /// Lengthens the time step after an accepted step; the factor doubles up to [`MAX_GROWTH`].
-    fn lengthen(&mut self) {
-        self.dt *= self.growth;
-        self.growth = (2.0 * self.growth).min(MAX_GROWTH);
-        if self.dt > LONGEST_STEP {
-            self.dt = f64::INFINITY;
-        }
     }
 }
