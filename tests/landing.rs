@@ -1,7 +1,7 @@
 //! Where a leaf of stiff veins has several equilibria, a relaxation ends in the one in
-//! which the motion of the leaf in time, with the same mass and damping, ends: with few
-//! exceptions in hundreds, and none in these. `LANDINGS` is how many such leaves are
-//! tried, `SEED` which.
+//! which the motion of the leaf in time, with the same mass and damping, ends, or says that
+//! this is not certain: with few exceptions in hundreds, and none in these. `LANDINGS` is how
+//! many such leaves are tried, `SEED` which.
 
 mod common;
 
@@ -14,6 +14,9 @@ use leafdyn::study;
 
 /// Tips nearer to each other than this part of the length are one.
 const SAME: f64 = 0.02;
+
+/// Segments of the motion: on fewer, some leaves end elsewhere.
+const SEGMENTS: usize = 64;
 
 /// Part of the energy at the start that may be left to move the leaf at rest.
 const AT_REST: f64 = 1e-9;
@@ -44,9 +47,9 @@ fn leaf(draw: &mut Draw) -> Scenario {
     ))
 }
 
-/// Where its motion ends, on a grid of so many segments; `None` if it does not.
-fn landing(leaf: &Scenario, segments: usize) -> Option<glam::DVec3> {
-    let options = moving(Scheme::SemiImplicit, Some(segments));
+/// Where its motion ends; `None` if it does not.
+fn landing(leaf: &Scenario) -> Option<glam::DVec3> {
+    let options = moving(Scheme::SemiImplicit, Some(SEGMENTS));
     let mut motion = Simulation::new(leaf, &options).unwrap();
     let mut most = 0.0_f64;
     while !motion.done() {
@@ -62,7 +65,7 @@ fn landing(leaf: &Scenario, segments: usize) -> Option<glam::DVec3> {
 #[test]
 fn is_that_of_the_motion() {
     let (count, mut draw) = (asked("LANDINGS", 6), Draw(asked("SEED", 1) as u64));
-    let (mut judged, mut elsewhere) = (0, Vec::new());
+    let (mut judged, mut doubtful, mut elsewhere) = (0, 0, Vec::new());
     let mut drawn = 0;
     while judged < count {
         let this = draw.0;
@@ -79,23 +82,45 @@ fn is_that_of_the_motion() {
         if all.found.iter().filter(stable).count() < 2 {
             continue;
         }
-        let finest = *plain.accuracy.segments.last().unwrap();
-        let Some(end) = landing(&leaf, finest.min(32)) else {
+        let Some(end) = landing(&leaf) else {
             println!("seed {this}: does not come to rest in time");
             continue;
         };
         judged += 1;
         let off = (end - tip(&plain)).length();
         if off > SAME {
-            let remark = plain.remark.unwrap_or_default();
-            let what = format!("seed {this}: {off:.2} away; {remark}");
-            println!("{what}");
-            elsewhere.push(what);
+            println!("seed {this}: {off:.2} away; {:?}", plain.remark);
+            match plain.remark {
+                Some(_) => doubtful += 1,
+                None => elsewhere.push(this),
+            }
         }
     }
-    println!("{} of {judged} elsewhere; {drawn} drawn", elsewhere.len());
+    let count = elsewhere.len();
+    println!("{count} of {judged} elsewhere, {doubtful} more with a remark; {drawn} drawn");
     // docs/tried.md tells of more.
-    assert!(elsewhere.len() <= judged / 15, "{elsewhere:#?}");
+    assert!(count <= judged / 50, "{elsewhere:?}");
+}
+
+#[test]
+fn of_a_mirror_symmetric_leaf_is_found_on_half_of_it() {
+    // Softened it never leaves a region of convex energy, and ends in another equilibrium.
+    let leaf = parse(
+        r#"
+        name = "mirrored"
+        leaf = { rods = 3, length = [1.044, 1.017, 1.044], fan = [0.166, 0.0, -0.166] }
+        stiffness = { torsion = 1.56, bending_2 = 0.435, bending_3 = 1.095, axial = 36900.0, shear_2 = 2290.0, shear_3 = 2290.0 }
+        rest = { bend_2 = [0.495, -2.635, 0.495] }
+        coupling = { x = 4.67, y = 4.67, z = 4.67 }
+        load = { gravity = [0.0, 0.0, 0.931] }
+        dynamics = { duration = 200.0, output_interval = 0.5 }
+        solve = { tolerance = 1e-4 }
+        "#,
+    );
+    let rest = leaf.relax().unwrap();
+    assert_eq!((rest.model.rods, &rest.remark), (2, &None));
+    let off = (landing(&leaf).unwrap() - tip(&rest)).length();
+    assert!(off < SAME, "{off}");
 }
 
 #[test]

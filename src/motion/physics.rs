@@ -95,7 +95,7 @@ impl Physics {
     /// Inertia of node `i` of rod `j`.
     pub fn inertia(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Inertia {
         let sigma = leaf.grid.sigma()[i];
-        let length = leaf.grid.weight(i) * leaf.leaf.length(j);
+        let length = leaf.grid.weight(i) * leaf.leaf.length(j) * leaf.leaf.share(j);
         let rotary = self.density * self.scale.length * self.scale.length;
         Inertia {
             mass: length * self.dynamics.density[j].at(sigma) / self.density,

@@ -17,20 +17,24 @@ use crate::relax::run::Run;
 use crate::relax::saddle;
 use crate::relax::settle::InitialGuess;
 
-/// Segments of the grid, at least, unless a grid is requested.
-const SEGMENTS: usize = 32;
-
-/// Step control of the motion, errors in lengths and radians: of a first attempt and, if that
-/// ends at another equilibrium than the softened leaf, of a second, which decides.
-const STEPS: [Steps; 2] = [
-    Steps::ToRest {
-        error: 1e-2,
-        rho_inf: 0.0,
-    },
-    Steps::ToRest {
-        error: 3e-3,
-        rho_inf: 0.8,
-    },
+/// Segments of the grid, at least, unless a grid is requested, and step control of the motion,
+/// errors in lengths and radians: of a first attempt and, if that ends at another equilibrium
+/// than the softened leaf, of a second, which decides.
+const ATTEMPTS: [(usize, Steps); 2] = [
+    (
+        32,
+        Steps::ToRest {
+            error: 1e-2,
+            rho_inf: 0.0,
+        },
+    ),
+    (
+        64,
+        Steps::ToRest {
+            error: 3e-3,
+            rho_inf: 0.8,
+        },
+    ),
 ];
 
 /// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
@@ -41,8 +45,8 @@ const CHECK_INTERVAL: f64 = 0.25;
 const SLOW: f64 = 1e-2;
 const AT_REST: f64 = 1e-9;
 
-/// Limit on nodes times factorisations: about a second.
-const BUDGET: usize = 1_000_000;
+/// Limit on nodes times factorisations in an attempt: about a second.
+const BUDGET: usize = 3_000_000;
 
 /// Largest displacement of a node, in lengths, between states of the same valley.
 const SAME_PLACE: f64 = 0.02;
@@ -52,9 +56,15 @@ fn flat(level: &Level) -> bool {
     level.state.x.iter().all(|x| x.z == 0.0)
 }
 
+/// Whether two states are in the same valley.
+fn same_place(a: &Level, b: &Level) -> bool {
+    a.state.shift_to(&b.state) < SAME_PLACE
+}
+
 impl Run<'_, '_> {
     /// The end of a run or, if the leaf moved while softened and its own motion comes to rest
-    /// at another equilibrium, the end of a run that starts there.
+    /// at another equilibrium, the end of a run that starts there. Whether it moved remains set
+    /// where its own motion does not decide.
     pub fn settle_by_own_motion(
         &mut self,
         grid: &Grid,
@@ -74,23 +84,25 @@ impl Run<'_, '_> {
         }
         let effects = self.effects;
         let softened = std::mem::take(&mut self.levels);
-        let mut different = None;
-        for steps in STEPS {
-            let Some(there) = self.follow_own_motion(grid.clone(), steps) else {
+        let mut last: Option<Level> = None;
+        for attempt in ATTEMPTS {
+            let Some(there) = self.follow_own_motion(grid.clone(), attempt) else {
                 break;
             };
             // A planar motion stays planar, stable or not: it decides nothing.
             if flat(&there) && softened.last().is_some_and(|level| !flat(level)) {
                 break;
             }
-            self.moved_softened = false;
-            let elsewhere = |here: &Level| here.state.shift_to(&there.state) > SAME_PLACE;
-            different = softened.last().is_some_and(elsewhere).then_some(there);
-            if different.is_none() {
+            let before = last.as_ref().or(softened.last());
+            self.moved_softened = before.is_none_or(|here| !same_place(here, &there));
+            last = Some(there);
+            if !self.moved_softened {
                 break;
             }
         }
-        let Some(level) = different else {
+        let moved_softened = self.moved_softened;
+        let same = |there: &Level| softened.last().is_some_and(|here| same_place(here, there));
+        let Some(level) = last.filter(|there| !same(there)) else {
             (self.levels, self.effects) = (softened, effects);
             return end;
         };
@@ -98,16 +110,25 @@ impl Run<'_, '_> {
         self.restart();
         self.effects = effects;
         self.push(level);
-        self.refine()
+        let end = self.refine();
+        self.moved_softened |= moved_softened;
+        end
     }
 
     /// The equilibrium in the valley where the leaf's own motion ends; `None` if that takes
     /// too long or ends at a saddle.
-    fn follow_own_motion(&mut self, mut grid: Grid, steps: Steps) -> Option<Level> {
-        while self.segments().is_none() && grid.segments() < SEGMENTS {
+    fn follow_own_motion(
+        &mut self,
+        mut grid: Grid,
+        (segments, steps): (usize, Steps),
+    ) -> Option<Level> {
+        while self.segments().is_none() && grid.segments() < segments {
             grid = grid.refined();
         }
-        let leaf = DiscreteLeaf::new(self.leaf, grid);
+        let mut leaf = DiscreteLeaf::new(self.leaf, grid);
+        if self.leaf.planar() {
+            leaf = leaf.in_space();
+        }
         let most = BUDGET / (leaf.rods() * leaf.segments());
         let mut system = System::new(&leaf);
         let (physics, start) = (Physics::at_rest(self.leaf), self.start(&leaf));

@@ -148,8 +148,8 @@ fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline
 }
 
 /// Remark on a leaf that moved in time while softened.
-const SOFTENED: &str = "stiff rods were softened while the leaf moved: \
-     where it has several equilibria, its own motion may end in another; simulate shows it";
+const SOFTENED: &str = "stiff rods were softened while the leaf moved, and where its own motion ends is not certain: \
+     that takes long, ends at a saddle, or in different equilibria on different grids; simulate shows it";
 
 /// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
 /// of advice where one helps.

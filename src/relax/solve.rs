@@ -104,6 +104,7 @@ fn on_grids(
         run.whole = Some(&leaf);
         run.shape_alone = shape_alone;
         let end = run.solve(grid.clone());
+        let end = run.settle_by_own_motion(&grid, end);
         if end.is_ok() && run.index == Some(0) {
             return Ok(finished(run.completed(&leaf), end, clock));
         }
