@@ -28,7 +28,7 @@ const ENERGY_SLACK: f64 = 1e-9;
 /// Velocities, and the time step; an infinite time step is Newton's method.
 pub(super) struct Motion {
     time_step: TimeStep,
-    velocity: Vec<Vec<Increment>>,
+    pub(super) velocity: Vec<Vec<Increment>>,
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
     pub(super) newton: f64,
@@ -60,12 +60,11 @@ impl Motion {
         self.time_step.dt.is_infinite()
     }
 
-    /// Factor (1/dt + c)/dt on the mass in the matrix of the next step, and the velocities with
-    /// the factor 1/dt on their momenta; `None` if it is Newton's.
-    pub(super) fn inertia(&self) -> Option<(f64, (&[Vec<Increment>], f64))> {
+    /// Factors (1/dt + c)/dt on the mass in the matrix of the next step, and 1/dt on the momenta;
+    /// `None` if it is Newton's.
+    pub(super) fn inertia(&self) -> Option<[f64; 2]> {
         let dt = self.time_step.dt;
-        let factor = 1.0 / dt;
-        (!self.is_newton()).then_some(((factor + DAMPING) / dt, (&self.velocity, factor)))
+        (!self.is_newton()).then_some([(1.0 / dt + DAMPING) / dt, 1.0 / dt])
     }
 
     /// The longest part of the next step that may be taken.

@@ -270,7 +270,7 @@ impl Relaxation<'_> {
         tolerance: f64,
     ) -> bool {
         let (shift, inertia) = match motion.inertia() {
-            Some((shift, momentum)) => (shift, Some(momentum)),
+            Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
             None => (leaf.neutral_shift(), None),
         };
         let (solver, work) = (&mut self.solver, &mut *self.work);
