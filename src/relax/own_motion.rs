@@ -84,25 +84,24 @@ impl Run<'_, '_> {
         }
         let effects = self.effects;
         let softened = std::mem::take(&mut self.levels);
+        let softened_end = softened.last().expect("the leaf has settled");
         let mut last: Option<Level> = None;
         for attempt in ATTEMPTS {
             let Some(there) = self.follow_own_motion(grid.clone(), attempt) else {
                 break;
             };
             // A planar motion stays planar, stable or not: it decides nothing.
-            if flat(&there) && softened.last().is_some_and(|level| !flat(level)) {
+            if flat(&there) && !flat(softened_end) {
                 break;
             }
-            let before = last.as_ref().or(softened.last());
-            self.moved_softened = before.is_none_or(|here| !same_place(here, &there));
+            self.moved_softened = !same_place(last.as_ref().unwrap_or(softened_end), &there);
             last = Some(there);
             if !self.moved_softened {
                 break;
             }
         }
         let moved_softened = self.moved_softened;
-        let same = |there: &Level| softened.last().is_some_and(|here| same_place(here, there));
-        let Some(level) = last.filter(|there| !same(there)) else {
+        let Some(level) = last.filter(|there| !same_place(softened_end, there)) else {
             (self.levels, self.effects) = (softened, effects);
             return end;
         };
