@@ -100,6 +100,10 @@ fn is_that_of_the_motion() {
     println!("{count} of {judged} elsewhere, {doubtful} more with a remark; {drawn} drawn");
     // docs/tried.md tells of more.
     assert!(count <= judged / 50, "{elsewhere:?}");
+    assert!(
+        doubtful <= judged / 10,
+        "{doubtful} of {judged} are not certain"
+    );
 }
 
 #[test]
