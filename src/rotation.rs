@@ -106,8 +106,10 @@ pub fn to_quaternion((v, w): Quaternions<Scalar>) -> DQuat {
 
 /// The rotation vector of the unit quaternion `q`, of length at most pi.
 pub fn log(q: DQuat) -> DVec3 {
-    let ends = [DQuat::IDENTITY, q].map(from_quaternion);
-    Relative::between(ends).0.psi.into()
+    let (w, cos) = from_quaternion(if q.w < 0.0 { -q } else { q });
+    let off = cos - Lanes::from(1.0);
+    let [sigma, ..] = series(off.times(off, w.dot(w)));
+    w.scale(sigma + sigma).into()
 }
 
 /// The matrix a b^T.

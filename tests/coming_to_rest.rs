@@ -1,5 +1,5 @@
 //! Random leaves come to rest: wild ones, and ones at the edge of what could be
-//! a leaf. How many are drawn, from which seed, and where those that fail are
+//! a leaf. How many are drawn, from which seed, and where those that fail or take long are
 //! written, the environment says:
 //! `LEAVES=1000 SEED=7 FAILED=folder cargo test --release --test coming_to_rest -- --nocapture`.
 
@@ -47,6 +47,9 @@ fn list<T: Display>(values: Vec<T>) -> String {
     let values: Vec<String> = values.iter().map(T::to_string).collect();
     format!("[{}]", values.join(", "))
 }
+
+/// Leaves that take longer, in seconds, are told, as those that fail.
+const SLOW: f64 = 5.0;
 
 /// What leaves of a kind have at most.
 struct Kind {
@@ -197,8 +200,9 @@ fn failures(kind: &Kind, least: usize) -> (usize, usize) {
         let seconds = clock.elapsed().as_secs_f64();
         slowest = slowest.max(seconds);
         total += seconds;
-        if !found.outcome.is_success() {
-            failed += 1;
+        let at_rest = found.outcome.is_success();
+        failed += usize::from(!at_rest);
+        if !at_rest || seconds > SLOW {
             let (outcome, work) = (found.outcome.word(), found.work);
             let remark = found.remark.unwrap_or_default();
             println!("{name}: {outcome} after {seconds:.1} s, {work:?}: {remark}");

@@ -144,3 +144,22 @@ fn of_a_column_that_is_pushed_along_its_axis_stays_doubtful() {
     // The motion is given up long before it has spent what it may.
     assert!(rest.work.factorizations < 2000, "{:?}", rest.work);
 }
+
+#[test]
+fn is_found_where_the_grid_of_the_motion_does_not_resolve_the_leaf() {
+    // On 32 segments it bends too much at rest: the motion is not continued for ever, and
+    // Newton's method goes on to 64.
+    let leaf = parse(
+        r#"
+        name = "unresolved"
+        leaf = { rods = 5, length = [0.844, 0.731, 0.949, 0.743, 0.658], fan = [0.456, 1.57, -1.09, 0.567, 1.33] }
+        stiffness = { torsion = 0.52, bending_2 = 0.0633, bending_3 = [7.06, 1.13, 0.0788, 0.0301, 0.691], axial = [837.0, 52800.0, 515.0, 3740.0, inf], shear_2 = 5290.0, shear_3 = 19300.0 }
+        coupling = { x = 212.0, y = 663.0, z = 234.0 }
+        load = { gravity = [-0.158, -0.648, -0.93], tip_force = [136.0, -168.5, -3.64] }
+        "#,
+    );
+    let rest = leaf.relax().unwrap();
+    assert!(rest.outcome.is_success());
+    assert!(rest.accuracy.segments[0] >= 64, "{:?}", rest.accuracy);
+    assert!(rest.work.factorizations < 9000, "{:?}", rest.work);
+}

@@ -8,34 +8,26 @@
 //! the start and with the mass and damping of a relaxation, until it has settled in a valley;
 //! Newton's method continues from there.
 
-use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::motion::{Method as _, Physics, SemiImplicit, Steps};
 use crate::newton::Stop;
 use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit as How};
+use crate::relax::prolong::prolong;
 use crate::relax::run::Run;
 use crate::relax::saddle;
 use crate::relax::settle::InitialGuess;
 
-/// Segments of the grid, at least, unless a grid is requested, and step control of the motion,
-/// errors in lengths and radians: of a first attempt and, if that ends at another equilibrium
-/// than the softened leaf, of a second, which decides.
-const ATTEMPTS: [(usize, Steps); 2] = [
-    (
-        32,
-        Steps::ToRest {
-            error: 1e-2,
-            rho_inf: 0.0,
-        },
-    ),
-    (
-        64,
-        Steps::ToRest {
-            error: 3e-3,
-            rho_inf: 0.8,
-        },
-    ),
-];
+/// Segments of the grid, at least, unless a grid is requested: of a first attempt and, if that
+/// ends at another equilibrium than the softened leaf, of a second, which decides.
+const SEGMENTS: [usize; 2] = [32, 64];
+
+/// Step control of the motion, errors in lengths and radians. With larger steps, or more
+/// damping of what these do not resolve, some leaves end elsewhere.
+const STEPS: Steps = Steps::ToRest {
+    error: 3e-3,
+    rho_inf: 0.8,
+};
 
 /// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
 const CHECK_INTERVAL: f64 = 0.25;
@@ -47,6 +39,9 @@ const AT_REST: f64 = 1e-9;
 
 /// Limit on nodes times factorisations in an attempt: about a second.
 const BUDGET: usize = 3_000_000;
+
+/// The finest grid on which a leaf that its motion does not resolve is settled.
+const FINEST: usize = 256;
 
 /// Largest displacement of a node, in lengths, between states of the same valley.
 const SAME_PLACE: f64 = 0.02;
@@ -85,9 +80,19 @@ impl Run<'_, '_> {
         let effects = self.effects;
         let softened = std::mem::take(&mut self.levels);
         let softened_end = softened.last().expect("the leaf has settled");
+        let (mut grid, mut followed_on) = (grid.clone(), 0);
         let mut last: Option<Level> = None;
-        for attempt in ATTEMPTS {
-            let Some(there) = self.follow_own_motion(grid.clone(), attempt) else {
+        for segments in SEGMENTS {
+            while self.segments().is_none() && grid.segments() < segments {
+                grid = grid.refined();
+            }
+            if grid.segments() == followed_on {
+                // The motion would be the same.
+                self.moved_softened = false;
+                break;
+            }
+            followed_on = grid.segments();
+            let Some(there) = self.follow_own_motion(grid.clone()) else {
                 break;
             };
             // A planar motion stays planar, stable or not: it decides nothing.
@@ -116,14 +121,7 @@ impl Run<'_, '_> {
 
     /// The equilibrium in the valley where the leaf's own motion ends; `None` if that takes
     /// too long or ends at a saddle.
-    fn follow_own_motion(
-        &mut self,
-        mut grid: Grid,
-        (segments, steps): (usize, Steps),
-    ) -> Option<Level> {
-        while self.segments().is_none() && grid.segments() < segments {
-            grid = grid.refined();
-        }
+    fn follow_own_motion(&mut self, grid: Grid) -> Option<Level> {
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         if self.leaf.planar() {
             leaf = leaf.in_space();
@@ -131,11 +129,16 @@ impl Run<'_, '_> {
         let most = BUDGET / (leaf.rods() * leaf.segments());
         let mut system = System::new(&leaf);
         let (physics, start) = (Physics::at_rest(self.leaf), self.start(&leaf));
-        let mut motion = SemiImplicit::new(leaf.clone(), physics, &start, steps);
+        let mut motion = SemiImplicit::new(leaf.clone(), physics, &start, STEPS);
         let (mut next_check, mut fastest) = (CHECK_INTERVAL, 0.0_f64);
-        let mut settled = None;
         let softened = self.moved_softened;
-        while settled.is_none() && motion.factorizations < most && !self.out_of_time() {
+        let begun = self.work.factorizations;
+        let mut settled = None;
+        while !self.out_of_time() {
+            // Those of indices and of attempts to settle count, too.
+            if self.work.factorizations - begun + motion.factorizations > most {
+                break;
+            }
             if motion.step_towards(f64::INFINITY).is_err() {
                 break;
             }
@@ -152,13 +155,9 @@ impl Run<'_, '_> {
             let shift = leaf.neutral_shift();
             let index = saddle::index(&leaf, &now.state, &mut system, shift, &mut self.work);
             if index == Some(0) {
-                self.moved_softened = false;
-                let guess = InitialGuess::Coarser(now.state.clone());
-                let found = self.settle(leaf.grid.clone(), guess);
-                let stays = !found.moved && !self.moved_softened && found.rest.is_ok();
-                let near = found.level.state.shift_to(&now.state) < SAME_PLACE;
-                settled = (stays && near).then_some(found.level);
-            } else if kinetic <= AT_REST * fastest {
+                settled = self.settle_in_this_valley(&leaf, &now.state);
+            }
+            if settled.is_some() || kinetic <= AT_REST * fastest {
                 break;
             }
         }
@@ -167,5 +166,28 @@ impl Run<'_, '_> {
         self.work.force_evaluations += motion.factorizations;
         self.moved_softened = softened;
         settled
+    }
+
+    /// The equilibrium that Newton's method reaches from a state without leaving its valley, on
+    /// the first grid from this one on that resolves it.
+    fn settle_in_this_valley(&mut self, leaf: &DiscreteLeaf, state: &State) -> Option<Level> {
+        let (mut grid, mut guess) = (leaf.grid.clone(), state.clone());
+        self.moved_softened = false;
+        loop {
+            let found = self.settle(grid, InitialGuess::Coarser(guess));
+            let level = found.level;
+            let finer = level.leaf.grid.refined();
+            if found.rest == Err(Stop::Unresolved)
+                && self.segments().is_none()
+                && finer.segments() <= FINEST
+            {
+                guess = prolong(&level.leaf, &level.state);
+                grid = finer;
+                continue;
+            }
+            let stays = !found.moved && !self.moved_softened && found.rest.is_ok();
+            let near = level.state.shift_to(state) < SAME_PLACE;
+            return (stays && near).then_some(level);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::super::energy_balance::Exchange;
 use super::super::friction::rates;
-use super::SemiImplicit;
+use super::{SemiImplicit, Steps};
 use crate::leaf::{Loads, State};
 use crate::rod::Section;
 use crate::rotation;
@@ -19,10 +19,20 @@ impl SemiImplicit {
         leaf.each(0..n).map(strains).collect()
     }
 
-    /// Accepts the attempted step of `h` and updates the energy balance.
+    /// Accepts the attempted step of `h` and updates the energy balance, unless only the end of
+    /// the motion matters.
     pub(super) fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
+        if !matches!(self.steps, Steps::ToRest { .. }) {
+            self.balance_energy(h);
+        }
+        self.time += h;
+        self.count += 1;
+    }
+
+    /// Adds what the accepted step of `h` exchanged to the energy balance.
+    fn balance_energy(&mut self, h: f64) {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
             work: self.work_of_changes(h),
@@ -36,8 +46,6 @@ impl SemiImplicit {
             self.past_step = h;
         }
         self.balance.add(exchange);
-        self.time += h;
-        self.count += 1;
     }
 
     /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of

@@ -73,15 +73,17 @@ impl SemiImplicit {
     fn update_motion(&mut self, h: f64) {
         let nodes = self.leaf.segments() + 1;
         let w = self.weights;
+        let (of_increment, of_mean) = (1.0 / (w.beta * h * h), 1.0 / (1.0 - w.alpha_f));
+        let of_before = (0.5 - w.beta) / w.beta;
         for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
             let (m, d) = (self.moving[k], self.increment(k));
             let next = &mut self.next_moving[k];
             for c in 0..2 {
-                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - w.beta) * m.a[c]) / (w.beta * h * h);
+                let a1 = of_increment * (d[c] - h * m.v[c]) - of_before * m.a[c];
                 let mean = (1.0 - w.alpha_m) * a1 + w.alpha_m * m.a[c];
                 next.a[c] = a1;
                 next.v[c] = m.v[c] + h * ((1.0 - w.gamma) * m.a[c] + w.gamma * a1);
-                next.w[c] = (mean - w.alpha_f * m.w[c]) / (1.0 - w.alpha_f);
+                next.w[c] = of_mean * (mean - w.alpha_f * m.w[c]);
             }
         }
     }
