@@ -30,7 +30,7 @@ pub const FINER: f64 = 4.0;
 
 /// Distances along the tangent of the points from which a branch is interpolated across a branch
 /// point, in this order, until the error of the tips is below `ENOUGH` times their accuracy.
-const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
+const APART: [f64; 6] = [0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
 const ENOUGH: f64 = 0.1;
 
 /// A critical point with the given accuracy of its tips, on at least so many `grids`.
