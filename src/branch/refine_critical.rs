@@ -28,9 +28,9 @@ pub const PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
 /// Refinement of the finest grid of a critical point over the one it was found on.
 pub const FINER: f64 = 4.0;
 
-/// Distances along the tangent of the points from which a branch is interpolated across a branch
+/// Spacings (in arclength) of the points from which a branch is interpolated across a branch
 /// point, in this order, until the error of the tips is below `ENOUGH` times their accuracy.
-const APART: [f64; 6] = [0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
+const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 const ENOUGH: f64 = 0.1;
 
 /// A critical point with the given accuracy of its tips, on at least so many `grids`.
@@ -206,9 +206,8 @@ struct Interpolated {
 
 /// Interpolates a branch across a branch point at this fraction. There the singular matrix
 /// leaves the component along the neutral mode undetermined to rounding; but the branch is
-/// smooth, and points on both sides are well determined. They lie in planes across the tangent:
-/// next to a fold the branch does not go along the parameter. None if there is no point on one
-/// side, at an end of the range.
+/// smooth, and points on both sides are well determined. None if there is no point on one side:
+/// at an end of the range, or near a fold.
 fn interpolate_across(
     equations: &mut Equations,
     critical: &Critical,
@@ -220,15 +219,15 @@ fn interpolate_across(
     const SIXTH: [f64; 3] = [0.75, -0.3, 0.05];
     const FOURTH: [f64; 3] = [2.0 / 3.0, -1.0 / 6.0, 0.0];
     const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
-    let tangent = &critical.tangent;
     let mut best: Option<Interpolated> = None;
     for apart in APART {
+        let unit = apart * critical.tangent.fraction;
         let mut values_at = |side: f64| {
-            let at = critical.fraction + side * apart * tangent.fraction;
-            let increments = &tangent.increments;
+            let increments = &critical.tangent.increments;
+            let at = fraction + side * unit;
             let moved = equations.moved(&critical.state, at, increments, side * apart);
-            let point = equations.correct(&moved.ok()?, at, Some(tangent)).ok()?;
-            Values::of(equations, &point.state, point.fraction).ok()
+            let point = equations.correct(&moved.ok()?, at, None).ok()?;
+            Values::of(equations, &point.state, at).ok()
         };
         let pairs = [1.0, 2.0, 3.0].into_iter();
         let pairs: Option<Vec<[Values; 2]>> = pairs
@@ -244,20 +243,16 @@ fn interpolate_across(
             });
             Values::sum(&parts.collect::<Vec<_>>())
         };
-        let along = sum(SLOPE, -1.0);
-        let slope = Values::sum(&[(1.0 / along.fraction, along)]);
-        let at_fraction = |weights: [f64; 3]| {
-            let across = sum(weights, 1.0);
-            let shift = fraction - across.fraction;
-            Values::sum(&[(1.0, across), (shift, slope.clone())])
+        let values = Values {
+            fraction,
+            ..sum(SIXTH, 1.0)
         };
-        let values = at_fraction(SIXTH);
-        let error = values.distance(&at_fraction(FOURTH));
+        let error = values.distance(&sum(FOURTH, 1.0));
         if best.as_ref().is_none_or(|best| error < best.error) {
             best = Some(Interpolated {
                 values,
                 error,
-                slope,
+                slope: sum(SLOPE.map(|weight| weight / unit), -1.0),
             });
         }
         if error < ENOUGH * accuracy {
