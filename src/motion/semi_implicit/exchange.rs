@@ -25,14 +25,20 @@ impl SemiImplicit {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
         if !matches!(self.steps, Steps::ToRest { .. }) {
-            self.balance_energy(h);
+            let exchange = self.exchange(h);
+            self.balance.add(exchange);
+        }
+        if self.physics.retardation > 0.0 {
+            self.past.swap(0, 1);
+            self.past[0] = self.strains();
+            self.past_step = h;
         }
         self.time += h;
         self.count += 1;
     }
 
-    /// Adds what the accepted step of `h` exchanged to the energy balance.
-    fn balance_energy(&mut self, h: f64) {
+    /// What the accepted step of `h` exchanged.
+    fn exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
             work: self.work_of_changes(h),
@@ -41,11 +47,8 @@ impl SemiImplicit {
             let power = self.power_of_friction(h);
             exchange.dissipated += 0.5 * h * (self.friction_power + power);
             self.friction_power = power;
-            self.past.swap(0, 1);
-            self.past[0] = self.strains();
-            self.past_step = h;
         }
-        self.balance.add(exchange);
+        exchange
     }
 
     /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of
