@@ -20,7 +20,7 @@ const SAME_PLACE: f64 = 0.05;
 const FINEST_COMPARED: usize = 256;
 
 /// The finest grid that is tried when coarser ones do not resolve the bending.
-const FINEST_RESOLVING: usize = 2048;
+pub(super) const FINEST_RESOLVING: usize = 2048;
 
 impl Run<'_, '_> {
     /// From the start to rest, on as many grids as the tolerance needs; returns

@@ -11,6 +11,7 @@
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::motion::{Method as _, Physics, SemiImplicit, Steps};
 use crate::newton::Stop;
+use crate::relax::grids::FINEST_RESOLVING;
 use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit as How};
 use crate::relax::prolong::prolong;
@@ -39,9 +40,6 @@ const AT_REST: f64 = 1e-9;
 
 /// Limit on nodes times factorisations in an attempt: about a second.
 const BUDGET: usize = 3_000_000;
-
-/// The finest grid on which a leaf that its motion does not resolve is settled.
-const FINEST: usize = 256;
 
 /// Largest displacement of a node, in lengths, between states of the same valley.
 const SAME_PLACE: f64 = 0.02;
@@ -179,7 +177,7 @@ impl Run<'_, '_> {
             let finer = level.leaf.grid.refined();
             if found.rest == Err(Stop::Unresolved)
                 && self.segments().is_none()
-                && finer.segments() <= FINEST
+                && finer.segments() <= FINEST_RESOLVING
             {
                 guess = prolong(&level.leaf, &level.state);
                 grid = finer;
