@@ -5,27 +5,33 @@
 
 mod common;
 
-use common::branch::{changes_at, follow};
+use common::branch::{changes_at, follow, request};
 use common::plane;
 use common::*;
+use leafdyn::study::trace;
 
 /// Half of the opening angle.
 const ALPHA: f64 = 0.9;
 
 /// An arch of length one that neither stretches nor shears, in its plane.
 fn arch(load: f64) -> String {
-    let span = ALPHA.sin() / ALPHA;
+    clamped(ALPHA, "inf", load)
+}
+
+/// A clamped arch with this half angle, and this stiffness against stretch and shear.
+fn clamped(alpha: f64, axial: &str, load: f64) -> String {
+    let span = alpha.sin() / alpha;
     format!(
         r#"
         name = "arch"
-        leaf = {{ rods = 1, length = 1.0, fan = [{ALPHA}] }}
-        stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }}
+        leaf = {{ rods = 1, length = 1.0, fan = [{alpha}] }}
+        stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = {axial}, shear_2 = {axial}, shear_3 = {axial} }}
         rest = {{ bend_3 = {:?} }}
         tip = {{ held = "clamped", position = [{span:?}, 0.0, 0.0], angles = {:?} }}
         load = {{ gravity = [0.0, {:?}, 0.0] }}
         "#,
-        -2.0 * ALPHA,
-        -ALPHA,
+        -2.0 * alpha,
+        -alpha,
         -load
     )
 }
@@ -113,6 +119,29 @@ fn an_arch_sways_where_its_antisymmetric_half_does() {
     let vary = format!("load.gravity[1]=0..{:?}", -1.1 * critical);
     let found = follow(&arch(0.0), "", &vary, false);
     changes_at("arch", &found, &[(-critical, 1)], 1e-6);
+}
+
+#[test]
+fn a_branch_point_next_to_a_fold_is_verified() {
+    // There the branch soon turns back: it is not smooth over the parameter.
+    for axial in ["1e5", "2e5"] {
+        let branch = |tolerance: f64| {
+            let base = base(&clamped(0.3171, axial, 0.0), "");
+            let request = request(base, "load.gravity[1]=0..-90", tolerance, 2000);
+            let found = trace(&request, &mut |_, _, _| {}).unwrap();
+            assert!(found.complete, "{axial}: {:?}", found.remark);
+            found.branches[0].clone()
+        };
+        let [loose, tight] = [1e-6, 1e-7].map(branch);
+        let [loose, tight] = [&loose, &tight].map(|it| it.critical().collect::<Vec<_>>());
+        assert_eq!(loose.len(), 4, "{axial}");
+        for ((_, loose), (_, tight)) in loose.iter().zip(&tight) {
+            assert_eq!(loose.index, tight.index);
+            let off = (loose.value - tight.value).abs();
+            let told = loose.value_error.unwrap() + tight.value_error.unwrap();
+            assert!(off <= told && told < 1e-4, "{axial}: {off} {told}");
+        }
+    }
 }
 
 /// Half of the opening angle of a shallow arch, of which one end is pinned.

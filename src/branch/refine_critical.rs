@@ -30,8 +30,12 @@ pub const FINER: f64 = 4.0;
 
 /// Spacings (in arclength) of the points from which a branch is interpolated across a branch
 /// point, in this order, until the error of the tips is below `ENOUGH` times their accuracy.
-const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
+const APART: [f64; 6] = [0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
 const ENOUGH: f64 = 0.1;
+
+/// From one spacing to the next, a third, errors of fourth order fall to 1/81; if they fall to
+/// less than this, rounding does not matter yet.
+const CONVERGES: f64 = 1.0 / 30.0;
 
 /// A critical point with the given accuracy of its tips, on at least so many `grids`.
 pub fn refine_critical(
@@ -207,57 +211,82 @@ struct Interpolated {
 /// Interpolates a branch across a branch point at this fraction. There the singular matrix
 /// leaves the component along the neutral mode undetermined to rounding; but the branch is
 /// smooth, and points on both sides are well determined. None if there is no point on one side:
-/// at an end of the range, or near a fold.
+/// at an end of the range.
 fn interpolate_across(
     equations: &mut Equations,
     critical: &Critical,
     fraction: f64,
     accuracy: f64,
 ) -> Option<Interpolated> {
+    let mut best: Option<Interpolated> = None;
+    let mut last: Option<(Values, f64)> = None;
+    for apart in APART {
+        let Some(mut now) = interpolated(equations, critical, fraction, apart) else {
+            continue;
+        };
+        let fourth = now.error;
+        if let Some((values, before)) = last {
+            // Then those of sixth order fall at least as much.
+            let fall = fourth / before;
+            if fall < CONVERGES {
+                now.error = fourth.min(fall * now.values.distance(&values));
+            }
+        }
+        last = Some((now.values.clone(), fourth));
+        if best.as_ref().is_none_or(|best| now.error < best.error) {
+            best = Some(now);
+        }
+        if best.as_ref().is_some_and(|best| best.error < ENOUGH * accuracy) {
+            break;
+        }
+    }
+    best
+}
+
+/// The same from points `apart`, in planes across the tangent: next to a fold the branch is not
+/// smooth over the parameter. The error is that of the fourth order, the values are of the sixth.
+fn interpolated(
+    equations: &mut Equations,
+    critical: &Critical,
+    fraction: f64,
+    apart: f64,
+) -> Option<Interpolated> {
     // Weights of values at -3, -2, -1, 1, 2, 3: for the value at 0 and the slope to sixth
     // order, and, from four of them, for the value at 0 to fourth order.
     const SIXTH: [f64; 3] = [0.75, -0.3, 0.05];
     const FOURTH: [f64; 3] = [2.0 / 3.0, -1.0 / 6.0, 0.0];
     const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
-    let mut best: Option<Interpolated> = None;
-    for apart in APART {
-        let unit = apart * critical.tangent.fraction;
-        let mut values_at = |side: f64| {
-            let increments = &critical.tangent.increments;
-            let at = fraction + side * unit;
-            let moved = equations.moved(&critical.state, at, increments, side * apart);
-            let point = equations.correct(&moved.ok()?, at, None).ok()?;
-            Values::of(equations, &point.state, at).ok()
-        };
-        let pairs = [1.0, 2.0, 3.0].into_iter();
-        let pairs: Option<Vec<[Values; 2]>> = pairs
-            .map(|k| Some([values_at(-k)?, values_at(k)?]))
-            .collect();
-        let Some(pairs) = pairs else {
-            continue;
-        };
-        let sum = |weights: [f64; 3], sign: f64| {
-            let parts = pairs.iter().zip(weights);
-            let parts = parts.flat_map(|([before, after], weight)| {
-                [(sign * weight, before.clone()), (weight, after.clone())]
-            });
-            Values::sum(&parts.collect::<Vec<_>>())
-        };
-        let values = Values {
-            fraction,
-            ..sum(SIXTH, 1.0)
-        };
-        let error = values.distance(&sum(FOURTH, 1.0));
-        if best.as_ref().is_none_or(|best| error < best.error) {
-            best = Some(Interpolated {
-                values,
-                error,
-                slope: sum(SLOPE.map(|weight| weight / unit), -1.0),
-            });
-        }
-        if error < ENOUGH * accuracy {
-            break;
-        }
-    }
-    best
+    let tangent = &critical.tangent;
+    let mut values_at = |side: f64| {
+        let distance = side * apart;
+        let at = critical.fraction + distance * tangent.fraction;
+        let moved = equations.moved(&critical.state, at, &tangent.increments, distance);
+        let point = equations.correct(&moved.ok()?, at, Some(tangent)).ok()?;
+        Values::of(equations, &point.state, point.fraction).ok()
+    };
+    let pairs = [1.0, 2.0, 3.0].into_iter();
+    let pairs: Option<Vec<[Values; 2]>> = pairs
+        .map(|k| Some([values_at(-k)?, values_at(k)?]))
+        .collect();
+    let pairs = pairs?;
+    let sum = |weights: [f64; 3], sign: f64| {
+        let parts = pairs.iter().zip(weights);
+        let parts = parts.flat_map(|([before, after], weight)| {
+            [(sign * weight, before.clone()), (weight, after.clone())]
+        });
+        Values::sum(&parts.collect::<Vec<_>>())
+    };
+    let along = sum(SLOPE, -1.0);
+    let slope = Values::sum(&[(1.0 / along.fraction, along)]);
+    let at_fraction = |weights: [f64; 3]| {
+        let across = sum(weights, 1.0);
+        let shift = fraction - across.fraction;
+        Values::sum(&[(1.0, across), (shift, slope.clone())])
+    };
+    let values = at_fraction(SIXTH);
+    Some(Interpolated {
+        error: values.distance(&at_fraction(FOURTH)),
+        values,
+        slope,
+    })
 }
