@@ -55,6 +55,9 @@ pub struct Critical {
     /// respect to arclength along the tangent.
     pub which: usize,
     pub slope: f64,
+    /// Error of the fraction of a fold due to rounding of the forces: they balance along the
+    /// neutral mode to rounding only.
+    pub rounding: f64,
 }
 
 /// The critical points between two points of a branch, the second of them `step` along the
@@ -189,10 +192,13 @@ impl Search<'_, '_> {
         let parts = vector.iter().zip(deflated.forcing.iter());
         let forcing: f64 = parts.map(|(v, d)| v * d).sum();
         let most = (dot(&deflated.rate, &deflated.rate) * dot(&mode, &mode)).sqrt();
+        let fold = forcing.abs() > FORCED * most.max(slope.abs());
         Critical {
-            kind: match forcing.abs() > FORCED * most.max(slope.abs()) {
-                true => Kind::Fold,
-                false => Kind::Branching,
+            kind: if fold { Kind::Fold } else { Kind::Branching },
+            rounding: if fold {
+                deflated.noise / forcing.abs()
+            } else {
+                0.0
             },
             state: deflated.state,
             fraction: deflated.fraction,

@@ -32,6 +32,8 @@ pub struct Deflated {
     pub forcing: DVector<f64>,
     /// Derivative of the forces with respect to the parameter.
     pub rate: Field,
+    /// Forces along the modes below this are ignored as rounding.
+    pub noise: f64,
 }
 
 impl Equations<'_> {
@@ -50,9 +52,9 @@ impl Equations<'_> {
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        // An error in the length of a stiff segment causes a large force: a converged
-        // state with such segments is corrected once more.
-        let mut corrected = self.leaves.at(fraction)?.stiffest() * STIFF > 1.0;
+        // An error in the length of a stiff segment causes a large force, and the parameter of a
+        // fold is known better than the shape: a converged state is corrected once more.
+        let mut corrected = false;
         for _ in 0..=ITERATIONS + 1 {
             let linear = match finished {
                 true => self.linearise_softened(&mut state, fraction)?,
@@ -67,6 +69,7 @@ impl Equations<'_> {
                     h: solved.h,
                     forcing: DVector::from_vec(rate.multipliers),
                     rate: linear.rate,
+                    noise: linear.noise,
                     modes: solved.modes,
                 });
             }

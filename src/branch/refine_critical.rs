@@ -144,7 +144,7 @@ impl Softening {
         }
         // Near a fold the parameter depends quadratically on arclength.
         let of_value = (rounding / critical.steepness()).max(growth * along * along);
-        table.rounding = table.rounding.max(growth * of_value);
+        table.rounding = (table.rounding).max(growth * (of_value + critical.rounding));
         Ok((values, growth))
     }
 
@@ -236,7 +236,10 @@ fn interpolate_across(
         if best.as_ref().is_none_or(|best| now.error < best.error) {
             best = Some(now);
         }
-        if best.as_ref().is_some_and(|best| best.error < ENOUGH * accuracy) {
+        if best
+            .as_ref()
+            .is_some_and(|best| best.error < ENOUGH * accuracy)
+        {
             break;
         }
     }
