@@ -74,6 +74,7 @@ pub fn locate(
         equations,
         from: a,
         soft: &soft,
+        exactly: false,
     };
     let ends = [search.at(0.0)?, search.at(step)?];
     if ends[1].deflated.state.shift_to(&b.state) > ARRIVES * step {
@@ -114,6 +115,8 @@ struct Search<'s, 'a> {
     equations: &'s mut Equations<'a>,
     from: &'s Point,
     soft: &'s [Field],
+    /// The parameter of a fold is known better than its shape.
+    exactly: bool,
 }
 
 struct Sample {
@@ -132,7 +135,7 @@ impl Search<'_, '_> {
         let (state, fraction) = (&self.from.state, self.from.fraction);
         let fraction = fraction + distance * t.fraction;
         let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
-        let deflated = (self.equations).deflated(&moved, fraction, t, self.soft)?;
+        let deflated = (self.equations).deflated(&moved, fraction, t, self.soft, self.exactly)?;
         let eigen = deflated.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
@@ -227,6 +230,7 @@ impl Critical {
             equations,
             from: &from,
             soft: &self.soft,
+            exactly: self.kind == Kind::Fold,
         };
         let (mut distance, mut slope) = (0.0, self.slope);
         let mut best = search.at(distance)?;

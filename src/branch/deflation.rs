@@ -39,22 +39,23 @@ pub struct Deflated {
 impl Equations<'_> {
     /// The point of the branch in a plane, where the matrix may be singular:
     /// it is bordered by the mass matrix times `modes`; components that remain
-    /// undetermined are left unchanged.
+    /// undetermined are left unchanged. `exactly`: once converged, it is corrected once more.
     pub fn deflated(
         &mut self,
         state: &State,
         fraction: f64,
         normal: &Tangent,
         modes: &[Field],
+        exactly: bool,
     ) -> Result<Deflated, Stuck> {
         let (mut state, mut fraction) = (state.clone(), fraction);
         let border = self.momenta(modes);
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        // An error in the length of a stiff segment causes a large force, and the parameter of a
-        // fold is known better than the shape: a converged state is corrected once more.
-        let mut corrected = false;
+        // An error in the length of a stiff segment causes a large force: a converged
+        // state with such segments is corrected once more.
+        let mut corrected = !exactly && self.leaves.at(fraction)?.stiffest() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
             let linear = match finished {
                 true => self.linearise_softened(&mut state, fraction)?,
