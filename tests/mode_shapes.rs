@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::motion::{discrete, off_cosine, rest, three_veins};
+use common::motion::{beam, discrete, off_cosine, released, rest, three_veins};
+use common::vibration::Linear;
 use common::*;
 use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
 use leafdyn::internals::modes;
@@ -106,4 +107,38 @@ fn shapes_are_orthonormal() {
             close("product", product, f64::from(u8::from(a == b)), 1e-9);
         }
     }
+}
+
+/// Leapfrog with steps of `h` vibrates at 2/h asin(omega h/2) where the
+/// semi-discrete equations have the frequency omega: let go in the shape of a
+/// mode, every number follows the cosine of that frequency.
+fn assert_vibrates(name: &str, scenario: &Scenario, state: &State, wanted: &[usize]) {
+    const SIZE: f64 = 1e-6;
+    let leaf = Leaf::new(scenario);
+    let grid = discrete(&leaf, state.segments());
+    let linear = Linear::new(&grid, &Physics::new(&leaf), state);
+    let modes = linear.modes();
+    let fastest = modes.frequencies[modes.frequencies.len() - 1];
+    for &mode in wanted {
+        let omega = modes.frequencies[mode];
+        let h = 1.5 / fastest;
+        let start = linear.displaced(state, modes.modes.column(mode).into(), SIZE);
+        let worst = off_cosine(&leaf, (state, &start), (omega, h), (SIZE, 100));
+        assert!(worst < 1e-5, "{name}, mode {mode}: {worst:.1e}");
+    }
+}
+
+#[test]
+fn a_beam_in_motion() {
+    let beam = beam(0.0016, [1.0 / 0.0016, 1.0 / 0.00416]);
+    let leaf = Leaf::new(&beam);
+    assert_vibrates("beam", &beam, &released(&leaf, 12), &[0, 3, 20, 40]);
+}
+
+/// Bent, twisted, coupled and joined, under a load.
+#[test]
+fn a_leaf_in_motion() {
+    let mut leaf = three_veins();
+    leaf.dynamics.gravity = Schedule::constant([1.0, -2.0, -3.0]);
+    assert_vibrates("leaf", &leaf, &rest(&leaf, 6), &[0, 5, 30, 60, 90]);
 }

@@ -77,6 +77,21 @@ fn timoshenko_beams_with_all_modes_in_space() {
     }
 }
 
+/// A grid makes frequencies wrong by the square of its segments' length.
+#[test]
+fn frequencies_of_one_grid_converge_in_second_order() {
+    for [r2, s2, bending @ ..] in table::<6>(TIMOSHENKO) {
+        let beam = beam(r2, [1.0 / r2, 1.0 / s2]);
+        let errors = [32, 64].map(|segments| {
+            let leaf = settled(&beam, &with_on(segments, 4));
+            [0, 2].map(|k| modes_of(&leaf)[k].frequency().unwrap() - bending[k / 2])
+        });
+        for k in 0..2 {
+            close("order", order(errors[0][k], errors[1][k]), 2.0, 0.02);
+        }
+    }
+}
+
 /// Ever softer in bending.
 #[test]
 fn a_hanging_chain() {

@@ -143,22 +143,6 @@ impl Linear {
         }
     }
 
-    /// Only these freedoms of every node, of its turn (0 to 2) and shift (3 to 5).
-    pub fn only(&self, wanted: &[usize]) -> Linear {
-        let mut chosen = Vec::new();
-        for [turn, shift] in self.freedoms.iter().flatten() {
-            let of = |c: &usize| if *c < 3 { turn + c } else { shift + c - 3 };
-            chosen.extend(wanted.iter().map(of));
-        }
-        let part = |m: &DMatrix<f64>| m.select_rows(&chosen).select_columns(&chosen);
-        Linear {
-            freedoms: Vec::new(),
-            strains: part(&self.strains),
-            coupling: part(&self.coupling),
-            per_root_mass: part(&self.per_root_mass),
-        }
-    }
-
     /// Stiffness over mass, symmetric.
     pub fn scaled(&self, stiffness: &DMatrix<f64>) -> DMatrix<f64> {
         let root = &self.per_root_mass;
@@ -178,27 +162,6 @@ impl Linear {
         };
         // Transposed on the way, twice.
         times(&times(stiffness))
-    }
-
-    /// The lowest frequencies, by inverse iteration: they do not suffer from the
-    /// rounding of the high ones.
-    pub fn lowest(&self, wanted: usize) -> Vec<f64> {
-        let stiffness = self.scaled(&(&self.strains + &self.coupling));
-        let count = stiffness.nrows();
-        let factor = stiffness.cholesky().unwrap();
-        let spread = |r: usize, c: usize| ((r + 1) as f64 * (c + 1) as f64 * 0.618).fract() - 0.5;
-        let mut modes = DMatrix::from_fn(count, 2 * wanted + 2, spread);
-        let mut frequencies = Vec::new();
-        for _ in 0..30 {
-            let base = modes.qr().q();
-            modes = factor.solve(&base);
-            let inverse = base.transpose() * &modes;
-            let all = (0.5 * (&inverse + inverse.transpose())).symmetric_eigenvalues();
-            frequencies = all.iter().map(|inverse| inverse.sqrt().recip()).collect();
-            frequencies.sort_by(f64::total_cmp);
-        }
-        frequencies.truncate(wanted);
-        frequencies
     }
 
     /// Frequencies and modes.
