@@ -175,6 +175,19 @@ impl Linear {
         Modes { frequencies, modes }
     }
 
+    /// A shape, given by increments of all nodes, in the numbering of the freedoms.
+    pub fn numbered(&self, shape: &[[f64; 6]]) -> DVector<f64> {
+        let mut numbered = DVector::zeros(self.strains.nrows());
+        for (freedoms, increment) in self.freedoms.iter().zip(shape) {
+            for (part, at) in freedoms.iter().flatten().enumerate() {
+                numbered
+                    .rows_mut(*at, 3)
+                    .copy_from_slice(&increment[3 * part..][..3]);
+            }
+        }
+        numbered
+    }
+
     /// The state displaced by `size` times a mode, whose largest entry is one.
     pub fn displaced(&self, state: &State, mode: DVector<f64>, size: f64) -> State {
         let factor = size / mode.amax();
