@@ -169,7 +169,7 @@ fn json_goes_alone_to_standard_output_and_the_reason_to_standard_error() {
 fn bad_requests_are_refused_before_anything_is_written() {
     all_refused(
         "check",
-        "leaf.toml --intervals 0 => --intervals 0
+        "leaf.toml --intervals 0 => --intervals 0: allowed are
         leaf.toml --intervals 5000 => 1 to 4096
         leaf.toml --tolerance -1 => tolerance
         leaf.toml --tolerance 1 => tolerance
@@ -177,7 +177,6 @@ fn bad_requests_are_refused_before_anything_is_written() {
         leaf.toml --segments 8 => --segments
         leaf.toml --method shooting => --method
         leaf.toml --out leaf.toml/out => --out DIR
-        absent.toml => absent.toml
-        => SCENARIO",
+        absent.toml => absent.toml",
     );
 }

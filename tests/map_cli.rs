@@ -211,9 +211,6 @@ fn bad_requests_are_refused_before_anything_is_written() {
         "map leaf.toml",
         "=> --vary
         --vary stiffness.torsion=1 => has no ..
-        --vary stiffness.twist=1..2 => unknown key
-        --vary load.gravity=1..2 => give an index
-        --vary load.gravity[2]=-1..1log => one sign
         --vary stiffness.torsion[5]=1..2 => 5 entries
         --vary rest.twist=0..1:2000 --vary rest.bend_2=0..1:2000 => at most 1000000",
     );
@@ -227,7 +224,7 @@ fn bad_requests_are_refused_before_anything_is_written() {
         --set method.steps=1 => method.step and method.segments
         --cell-seconds 0 => cell-seconds
         --tolerance 1 => tolerance
-        --shard 3/2 => I/K
+        --shard 3/2 => --shard <I/K>
         --shard 1/2 --draw a.csv => --draw
         --set leaf.rods=0 => rods
         --out leaf.toml/out => --out DIR",

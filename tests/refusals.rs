@@ -1,41 +1,15 @@
-//! What scripts and terminals get of a refusal: with `--json` one JSON object, and
-//! never a control character.
+//! What scripts and terminals get of failures: one JSON object, and never a control character.
+//! That refusals of requests are such objects is tested where the requests are.
 
 mod workplace;
 
 use std::fs;
 
-use workplace::{Json, Run, Workplace, contains, pairs};
-
-/// Requests, and what is said of them.
-const REFUSED: &str = "
-    relax absent.toml => absent.toml: cannot be read
-    relax leaf.toml --segments few => invalid value 'few' for '--segments <N>'
-    relax => <SCENARIO>
-    relax leaf.toml --write pdf => pdf: must be some of
-    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
-    relax leaf.toml --out plain/out => plain is not a folder
-    check leaf.toml --intervals 0 => --intervals 0: allowed are
-    simulate leaf.toml --resume => cannot resume
-    trace leaf.toml --vary leaf.rods=1..2 => a whole number has nothing between
-    map leaf.toml --vary stiffness.torsion=1 => has no ..
-    map leaf.toml --vary rest.twist=0..1 --shard 3/2 => --shard <I/K>
-    chart leaf.toml --seconds 0 => --seconds 0: must be
-";
+use workplace::{Json, Run, Workplace, contains};
 
 #[test]
-fn every_refusal_is_one_json_object() {
+fn help_is_the_same_with_json() {
     let place = Workplace::new();
-    place.write("plain", "");
-    for (arguments, part) in pairs(REFUSED) {
-        let run = place.refuses(format!("{arguments} --json"), part);
-        let refused = run.json();
-        let keys: Vec<&String> = refused.as_object().unwrap().keys().collect();
-        assert_eq!(keys, ["error", "exit_status"], "{arguments}");
-        // To people it says the same.
-        let said = format!("error: {}", refused["error"].text());
-        assert_eq!(run.err.trim_end(), said);
-    }
     let help = place.ok("relax --help --json").out;
     assert!(help.starts_with("Find how a leaf"));
 }

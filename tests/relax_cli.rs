@@ -79,11 +79,9 @@ fn bad_requests_are_refused_before_anything_is_written() {
         "leaf.toml --method newton => newton
         leaf.toml --method newton => semi-implicit
         leaf.toml --method implicit => semi-implicit
-        absent.toml => absent.toml
-        leaf.toml --tolerance 0 => tolerance
-        leaf.toml --tolerance -1 => tolerance
-        leaf.toml --segments few => --segments
-        => SCENARIO
+        absent.toml => absent.toml: cannot be read
+        leaf.toml --segments few => invalid value 'few' for '--segments <N>'
+        leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
         leaf.toml --modes 101 => --modes
         leaf.toml --modes -1 => --modes
         leaf.toml --modes all => --modes

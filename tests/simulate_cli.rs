@@ -282,7 +282,6 @@ fn bad_requests_are_refused_before_anything_is_written() {
         leaf.toml --out leaf.toml/out => --out DIR
         leaf.toml --resume => cannot resume: there is no out/small/checkpoint.json; leave out --resume
         leaf.toml --set dynamics.start=1 => start
-        absent.toml => absent.toml
-        => SCENARIO",
+        absent.toml => absent.toml",
     );
 }

@@ -100,7 +100,6 @@ fn what_cannot_be_followed_is_refused() {
         dynamics.density=1..2 => no equilibrium
         solve.tolerance=1e-3..1e-6 => changes no leaf
         load.gravity[2]=1..1 => the same
-        load.gravity=0..1 => give an index
         stiffness.axial=100..-5 => greater than 0
         load.gravity[2]=0..1 --points 1 => 2 or more
         load.gravity[2]=0..1 --cross-section -1 => greater than 0

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 pub use pairs::pairs;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 /// A folder to run in, with a small leaf in `leaf.toml`.
@@ -129,8 +129,8 @@ impl Workplace {
         command.spawn().unwrap()
     }
 
-    /// A run that is refused: status 2, the message, nothing printed but JSON that
-    /// says the same, and nothing written.
+    /// A run that is refused: status 2, the message, nothing printed but one JSON object
+    /// that says the same, and nothing written.
     #[track_caller]
     pub fn refuses(&self, arguments: impl AsRef<str>, message: &str) -> Run {
         let (arguments, before) = (arguments.as_ref(), self.names("."));
@@ -139,8 +139,10 @@ impl Workplace {
         match arguments.contains("--json") {
             true => {
                 let refused = run.json();
-                assert_eq!(refused["exit_status"], 2, "{arguments}");
-                assert!(refused["error"].as_str().unwrap().contains(message));
+                let said = format!("error: {}", refused["error"].text());
+                assert_eq!(run.err.trim_end(), said);
+                let object = json!({ "error": refused["error"], "exit_status": 2 });
+                assert_eq!(refused, object, "{arguments}");
             }
             false => assert_eq!(run.out, "", "{arguments}"),
         }
@@ -219,11 +221,14 @@ pub fn contains(text: &str, parts: &[&str]) {
 }
 
 /// Asks for what every line of a table names, `arguments => message`: each is
-/// refused in a folder of its own.
+/// refused in a folder of its own, to people and to scripts.
 #[track_caller]
 pub fn all_refused(common: &str, table: &str) {
     for (arguments, message) in pairs(table) {
-        Workplace::new().refuses(format!("{common} {arguments}"), message);
+        let place = Workplace::new();
+        for json in ["", "--json"] {
+            place.refuses(format!("{common} {arguments} {json}"), message);
+        }
     }
 }
 
