@@ -1,9 +1,9 @@
 //! A family of made-up measurements, each built to leave certain combinations of numbers
-//! open: they are named exactly, and nothing else is.
+//! open: they are named exactly, and nothing else is; what is open has no interval.
 
 mod common;
 
-use common::fit::{fitted, request};
+use common::fit::{VEIN, fitted, request};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::FitOutcome;
@@ -158,9 +158,29 @@ fn all_that_is_open_is_named_and_nothing_else() {
             for parameter in &found.parameters {
                 let open = open.concat().contains(&parameter.key.as_str());
                 assert_eq!(parameter.determined, !open, "{parameter:?}; {said}");
-                // Never an interval for what is not known.
-                assert!(!open || parameter.low.is_none() || parameter.high.is_none());
+                // Never an interval for what is not known, always for what is.
+                let bounded = parameter.low.is_some() && parameter.high.is_some();
+                assert_eq!(bounded, !open, "{parameter:?}; {said}");
             }
         }
     }
+}
+
+/// Of frequencies alone only the ratio of stiffness and mass is felt.
+#[test]
+fn a_ratio_that_alone_is_felt_is_named() {
+    let flat = VEIN.replace("[0.0, 0.0, -0.5]", "[0.0, 0.0, 0.0]");
+    let slender = flat.replace(", rotary_inertia = 1e-4", ", section_radius = 1e-2");
+    let data = "frequency_1\n0.6\n0.61\n0.59\n";
+    let stiffness = "stiffness.bending_2+stiffness.bending_3+stiffness.torsion";
+    let free = [stiffness, "dynamics.density"];
+    let found = fitted(&request(base(&slender, RIGID), &[data], &free));
+    assert_eq!(found.outcome, FitOutcome::Undetermined);
+    let [open] = found.undetermined.as_slice() else {
+        panic!("{:?}", found.undetermined);
+    };
+    let mut parts = open.values();
+    assert!(parts.all(|part| (part - 1.0).abs() < 1e-3), "{open:?}");
+    let mut says = found.says.iter();
+    assert!(says.any(|said| said.contains("only as their ratio")));
 }
