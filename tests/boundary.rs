@@ -1,5 +1,6 @@
 //! The boundary of stability over two numbers: curves known in closed form or by
-//! collocation, all along.
+//! collocation, all along, and the leaves on their sides: equilibria of the index that they
+//! tell, or what the stable leaf of the one side comes to rest as beyond.
 
 mod common;
 
@@ -8,7 +9,7 @@ use std::f64::consts::PI;
 use common::branch::{text, weak_veins};
 use common::plane::{follow, followed};
 use common::*;
-use leafdyn::study::{Boundary, BoundaryCurve, BoundaryPoint};
+use leafdyn::study::{Boundary, BoundaryCurve, BoundaryPoint, LeafBeside};
 
 /// The only curve, which goes from one end of the second range to the other.
 #[track_caller]
@@ -31,6 +32,22 @@ fn ends(curve: &BoundaryCurve) -> [&BoundaryPoint; 2] {
 /// By what part the first number of a point is off.
 fn off(point: &BoundaryPoint, wanted: f64) -> f64 {
     (point.values[0] / wanted - 1.0).abs()
+}
+
+/// Distance of its tip from the axis.
+fn off_axis(tip: DVec3) -> f64 {
+    tip.y.hypot(tip.z)
+}
+
+/// The tip of the leaf that a relaxation from arcs finds at both numbers.
+fn tip_at_rest(text: &str, entries: &str) -> DVec3 {
+    tip(&relaxed(base(text, entries).scenario(), &to(1e-8)))
+}
+
+/// The leaves on either side of a curve.
+#[track_caller]
+fn beside(curve: &BoundaryCurve) -> &[LeafBeside; 2] {
+    curve.beside.as_slice().try_into().expect("two leaves")
 }
 
 /// That along the curve the first number is what it must be at the second, within this part
@@ -58,6 +75,37 @@ fn euler_over_the_bending_stiffness() {
     let (load, stiffness) = ("load.tip_force[0]=0..-5.5", "stiffness.bending_3=0.5..2");
     let found = follow(ROD, &strip, load, stiffness);
     is("Euler", only(&found), |ei| -0.25 * PI * PI * ei, 1e-8);
+}
+
+/// A column is straight on one side of Euler's load, buckled on the other; across the next
+/// load straight with one more way to buckle.
+#[test]
+fn columns_on_both_sides_of_their_loads() {
+    let strip = format!("{RIGID}; stiffness.bending_2=1000.0");
+    for (number, load) in ["0..-10", "-10..-30"].iter().enumerate() {
+        let load = format!("load.tip_force[0]={load}");
+        let found = follow(ROD, &strip, &load, "stiffness.bending_3=0.8..1.2");
+        assert_eq!(found.curves.len(), 1);
+        let [low, high] = beside(&found.curves[0]);
+        let critical = |leaf: &LeafBeside| ((0.5 + number as f64) * PI).powi(2) * leaf.values[1];
+        assert!(-low.values[0] < critical(low), "{:?}", low.values);
+        assert!(-high.values[0] > critical(high), "{:?}", high.values);
+        assert_eq!([low.index, high.index], [number, 2 * number]);
+        assert!(low.fallen_from.is_none());
+        assert_eq!(high.fallen_from.is_some(), number == 0);
+        assert!(off_axis(low.tips[0]) < 1e-9);
+        let [load, ei] = high.values;
+        let set = format!("{strip}; load.tip_force=[{load:?},0,0]; stiffness.bending_3={ei:?}");
+        match number {
+            0 => {
+                let (tip, wanted) = (high.tips[0], tip_at_rest(ROD, &set));
+                assert!(off_axis(tip) > 0.1, "{tip}");
+                assert!((tip.x - wanted.x).abs() < 2e-3, "{tip} {wanted}");
+                assert!((off_axis(tip) - off_axis(wanted)).abs() < 2e-3);
+            }
+            _ => assert!(off_axis(high.tips[0]) < 1e-9),
+        }
+    }
 }
 
 /// P (1 + P/GA - P/EA) = pi^2/4 EI, over EA and over its logarithm.
@@ -220,9 +268,10 @@ fn a_hanging_curved_rod_over_its_curvature() {
 }
 
 /// A column that is pushed askew folds instead of branching; the folds meet in a cusp where
-/// it is straight, and go on at its other side.
+/// it is straight, and go on at its other side. Between them a column that leans away from the
+/// push stays so, beyond them it has snapped to the other side.
 #[test]
-fn folds_of_a_column_pushed_askew_meet_in_a_cusp() {
+fn a_column_pushed_askew_snaps_beyond_folds_that_meet_in_a_cusp() {
     let strip = "stiffness.bending_2=1000; stiffness.axial=1000; stiffness.shear_2=1000; \
                  stiffness.shear_3=1000; load.tip_force=[-2.8, 0, 0]";
     let (across, along) = ("load.tip_force[1]=1..-1", "load.tip_force[0]=-4..-2");
@@ -236,6 +285,30 @@ fn folds_of_a_column_pushed_askew_meet_in_a_cusp() {
     let [across, along] = cusps[0].values;
     assert!(across.abs() < 1e-8, "{across}");
     assert!((along / (-0.25 * PI * PI) - 1.0).abs() < 1e-8, "{along}");
+
+    let [low, beyond] = beside(&found.curves[0]);
+    assert_eq!([low.index, beyond.index], [0, 0]);
+    assert!(low.fallen_from.is_none() && beyond.fallen_from.is_some());
+    // The curve is the same on both sides of the axis: how far from it at this load?
+    let edge = |load: f64| {
+        let pairs = points.windows(2);
+        let mut passed = pairs.filter_map(|pair| {
+            let [a, b] = [0, 1].map(|k| pair[k].values);
+            let part = (load - a[1]) / (b[1] - a[1]);
+            let inside = (0.0..=1.0).contains(&part);
+            inside.then(|| (a[0] + part * (b[0] - a[0])).abs())
+        });
+        passed.next().unwrap()
+    };
+    let [inside, outside] = [low, beyond].map(|leaf| leaf.values);
+    assert!(inside[0].abs() < edge(inside[1]), "{inside:?}");
+    assert!(outside[0].abs() > edge(outside[1]), "{outside:?}");
+    assert!(low.tips[0].y * beyond.tips[0].y < 0.0);
+    assert!(beyond.tips[0].y * beyond.values[0] > 0.0);
+    let [side, load] = beyond.values;
+    let set = format!("{strip}; load.tip_force=[{load:?},{side:?},0]");
+    let wanted = tip_at_rest(ROD, &set);
+    assert!(beyond.tips[0].distance(wanted) < 2e-3, "{wanted}");
 }
 
 /// A column buckles in both directions at once where it is equally stiff in both: at the end
@@ -260,15 +333,22 @@ fn crossings_are_where_their_errors_say() {
 }
 
 /// Following the undulation boundary and verifying its points takes few matrices, 24.4 a point,
-/// the first trace among them: work must not grow unnoticed.
+/// the first trace among them: work must not grow unnoticed. The leaf waves beyond, however
+/// close behind it another mode becomes unstable.
 #[test]
-fn points_of_the_undulation_boundary_take_few_factorizations() {
+fn the_undulation_boundary_takes_few_factorizations_and_leaves_wave_beyond() {
     let (text, across) = (text("study/undulation"), "stiffness.torsion=0.9..1:2log");
     let along = format!("{}=1..0.4:50log", weak_veins());
     let found = follow(&text, "load.gravity=[0,0,0]", &along, across);
     let points: usize = found.curves.iter().map(|curve| curve.points.len()).sum();
     assert!(points >= 6, "{points}");
     assert!(found.factorizations <= 25 * points);
+    let [flat, waving] = beside(&found.curves[0]);
+    let height = |leaf: &LeafBeside| largest(leaf.curves.iter().flatten().map(|x| x.z.abs()));
+    assert_eq!([flat.index, waving.index], [0, 0]);
+    assert!(flat.values[0] > waving.values[0]);
+    assert!(height(flat) < 1e-9, "{:e}", height(flat));
+    assert!(height(waving) > 1e-3, "{:e}", height(waving));
 }
 
 /// Over ranges so wide that grids move points at a given value of the second number, then of the
