@@ -1,5 +1,7 @@
 //! How far a stable leaf is from losing its stability: pushes and the energy of the lowest
-//! pass against columns and the elastica, and against relaxations under such forces.
+//! pass against columns and the elastica, and against relaxations under such forces. Next to
+//! symmetric bifurcations, where coarse grids bear more, the energy vanishes like the square
+//! of the distance.
 
 mod common;
 mod workplace;
@@ -12,11 +14,18 @@ use leafdyn::relax::{Fate, Loss, Margin, Push};
 use leafdyn::study::relax_with_margin;
 use workplace::{Json, Workplace, timeless};
 
-fn found(scenario: &Scenario, tolerance: f64) -> (Equilibrium, Margin) {
-    let options = at_every_node(tolerance);
-    let leaf = relax_with_margin(scenario, &options, &mut |_| {}).unwrap();
+/// Euler's load of a clamped column.
+const EULER: f64 = 0.25 * PI * PI;
+
+/// A leaf to 1e-8, and its margin.
+fn found(scenario: &Scenario) -> (Equilibrium, Margin) {
+    let leaf = relax_with_margin(scenario, &at_every_node(1e-8), &mut |_| {}).unwrap();
     let margin = leaf.margin.clone().unwrap();
     (leaf, margin)
+}
+
+fn margin(scenario: &Scenario) -> Margin {
+    found(scenario).1
 }
 
 fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
@@ -50,10 +59,10 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
         let load = format!("load.gravity=[{:?}, 0, 0]", -weight);
         let column = rod(&format!("{RIGID}; stiffness.bending_2=2.0; {load}"));
         let right = match weight {
-            0.0 => 0.25 * PI * PI,
+            0.0 => EULER,
             weight => standing(weight),
         };
-        let (_, margin) = found(&column, 1e-8);
+        let margin = margin(&column);
         let down = push(&margin, "-x");
         is_at(down, right);
         let lost = (down.kind, down.then);
@@ -69,8 +78,8 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
 fn an_extensible_column_gives_way_at_the_load_of_reissner() {
     let stiffness = set_stiffness(50.0, f64::INFINITY);
     let column = rod(&format!("{stiffness}; stiffness.bending_2=2"));
-    let right = 25.0 * (1.0 - (1.0 - 4.0 * 0.25 * PI * PI / 50.0).sqrt());
-    is_at(push(&found(&column, 1e-8).1, "-x"), right);
+    let right = 25.0 * (1.0 - (1.0 - 4.0 * EULER / 50.0).sqrt());
+    is_at(push(&margin(&column), "-x"), right);
 }
 
 /// Load of a column beyond Euler's.
@@ -99,7 +108,7 @@ fn across(tip: f64) -> f64 {
 fn a_buckled_column_snaps_as_the_elastica() {
     let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
     let column = rod(&format!("{strip}; load.tip_force=[{:?}, 0, 0]", -LOAD));
-    let (leaf, margin) = found(&column, 1e-8);
+    let (leaf, margin) = found(&column);
     let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
     let least = &margin.pushes[0];
     is_at(least, fold().0);
@@ -167,7 +176,7 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
     let beyond = relaxed(&bent(-1.000001 * most), &Options::default());
     let barriers = PARTS.map(|part| {
         let force = (1.0 - part) * most;
-        let (leaf, margin) = found(&bent(force), 1e-8);
+        let (leaf, margin) = found(&bent(force));
         let barrier = margin.barrier.as_ref().unwrap_or_else(|| panic!("{part}"));
         let right = |from: f64, to: f64| {
             let tip = bisect(from, to, |tip| across(tip).abs() - force);
@@ -200,7 +209,7 @@ fn the_barrier_of_a_clamped_arch_vanishes_at_its_fold() {
     let fold = -trace.branches[0].critical().next().unwrap().1.value;
     vanish_as_at_a_fold(PARTS.map(|part| {
         let load = format!("load.gravity=[0, {:?}, 0]", (part - 1.0) * fold);
-        let (leaf, margin) = found(&rod(&format!("{arch}; {load}")), 1e-8);
+        let (leaf, margin) = found(&rod(&format!("{arch}; {load}")));
         assert_eq!(leaf.stable(), Some(true));
         let barrier = margin.barrier.unwrap_or_else(|| panic!("{part}"));
         let (energy, error) = (barrier.energy, barrier.error.unwrap());
@@ -217,7 +226,7 @@ fn passes_next_to_a_fold_are_not_overstepped() {
     let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50; rest.bend_3=0.5");
     let energies = [1.1, 1.2, 1.269, 1.34, 1.382, 1.3964, 1.4035].map(|force| {
         let column = rod(&format!("{strip}; load.tip_force=[-3, {:?}, 0]", -force));
-        let (leaf, margin) = found(&column, 1e-8);
+        let (leaf, margin) = found(&column);
         assert!(leaf.tips[0].y < 0.0, "{force}");
         let barrier = margin.barrier.unwrap_or_else(|| panic!("{force}"));
         let (energy, error) = (barrier.energy, barrier.error.unwrap());
@@ -230,6 +239,98 @@ fn passes_next_to_a_fold_are_not_overstepped() {
         let [[f, e, w], [g, h, v]] = [pair[0], pair[1]];
         let trapezium = 0.5 * (g - f) * (w + v);
         close("change", h - e, trapezium, 0.01 * (h - e));
+    }
+}
+
+/// Distances from a symmetric bifurcation, as parts of its load.
+const NEAR: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
+
+/// A clamped strip, or a round column, under a load along it.
+fn column(load: f64, round: bool) -> Scenario {
+    let other = if round { 1.0 } else { 50.0 };
+    let load = format!("load.tip_force=[{:?}, 0, 0]", -load);
+    rod(&format!("{RIGID}; stiffness.bending_2={other:?}; {load}"))
+}
+
+#[test]
+fn below_its_load_a_column_gives_way_at_what_is_left_of_it() {
+    for (round, part) in [(true, 0.1), (false, 0.02), (true, 0.01)] {
+        let found = margin(&column((1.0 - part) * EULER, round));
+        let least = &found.pushes[0];
+        let (force, error) = (least.force.unwrap(), least.error.unwrap());
+        assert_eq!(least.direction.to_string(), "-x");
+        assert_eq!(least.kind, Loss::BranchPoint);
+        close(&format!("{part}"), force, part * EULER, error);
+        assert!(error < 1e-4 * force, "{part}: {force} within {error}");
+        assert!(found.barrier.is_none(), "{found:?}");
+    }
+}
+
+/// The energy of the straight column above that of the elastica under a load P: with the sine
+/// k of half of its tip's angle K(k) = sqrt P, its tip is at 2 E/K - 1, and the first integral
+/// theta'^2 = 2 P (cos theta - cos alpha) makes the difference P (4 - 2 k^2 - 4 E/K).
+fn barrier(load: f64) -> f64 {
+    let k = elastica_modulus(load);
+    let [first, second] = elliptic(k);
+    load * (4.0 - 2.0 * k * k - 4.0 * second / first)
+}
+
+#[test]
+fn beyond_its_load_the_barrier_of_a_strip_is_that_of_the_elastica() {
+    for part in NEAR {
+        let load = (1.0 + part) * EULER;
+        let found = margin(&column(load, false)).barrier;
+        let found = found.unwrap_or_else(|| panic!("{part}"));
+        let (energy, error) = (found.energy, found.error.unwrap());
+        // The closed form is a difference of numbers of the order of the load.
+        close(
+            &format!("{part}"),
+            energy,
+            barrier(load),
+            error + 1e-14 * load,
+        );
+        assert!(error < 1e-6 * energy);
+        assert!((found.saddle.tip.x - 1.0).abs() < 1e-9);
+    }
+}
+
+/// A round one can be turned without a force.
+#[test]
+fn a_buckled_round_column_has_no_margin() {
+    let found = margin(&column(1.02 * EULER, true));
+    assert!(found.barrier.is_none() && found.pushes.is_empty());
+    assert!(found.remark.unwrap().contains("cannot be told from zero"));
+}
+
+/// Axial stiffness, and the load under which a column that is clamped at both ends buckles:
+/// P (1 - P/H) = 4 pi^2.
+const AXIAL: f64 = 1000.0;
+
+fn shortened(beyond: f64) -> Scenario {
+    let load = 0.5 * AXIAL * (1.0 - (1.0 - 16.0 * PI * PI / AXIAL).sqrt());
+    let tip = 1.0 - (1.0 + beyond) * load / AXIAL;
+    let stiffness = set_stiffness(AXIAL, f64::INFINITY);
+    rod(&format!(
+        "stiffness.torsion=50; stiffness.bending_2=50; {stiffness}; \
+         tip.held='clamped'; tip.position=[{tip:?}, 0, 0]"
+    ))
+}
+
+/// Held at both ends, from 10 to 0.5 % beyond: H/2 times the square of the strain beyond, but
+/// for terms of the next order.
+#[test]
+fn a_column_that_is_shortened_has_a_barrier() {
+    for beyond in [-0.02, -0.005] {
+        let found = margin(&shortened(beyond));
+        assert!(found.barrier.is_none(), "{beyond}: {found:?}");
+        assert!(found.remark.unwrap().contains("the tip is held"));
+    }
+    let relative = NEAR.map(|beyond| {
+        let found = margin(&shortened(beyond)).barrier;
+        found.unwrap_or_else(|| panic!("{beyond}")).energy / (beyond * beyond)
+    });
+    for pair in relative.windows(2) {
+        assert!((pair[0] / pair[1] - 1.0).abs() < 0.01, "{relative:?}");
     }
 }
 
