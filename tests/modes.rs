@@ -1,12 +1,12 @@
-//! The lowest modes of leaves at rest: known frequencies, none left out, as
-//! many unstable ones as there are, and the leaf does vibrate so.
+//! The lowest modes of leaves at rest: known frequencies, errors that hold, none left out, as
+//! many unstable ones as there are.
 
 mod common;
 
 use std::f64::consts::PI;
 
 use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, three_veins};
-use common::random::{cases, leaves};
+use common::random::{cases, drawn, leaves};
 use common::vibration::Linear;
 use common::*;
 use leafdyn::internals::leaf::{Leaf, State};
@@ -112,6 +112,39 @@ fn a_hanging_chain() {
         let found = extrapolate(&softer.map(|pair| pair[k]), 0.5);
         close("frequency", found / known[k], 1.0, within);
     }
+}
+
+/// Of random leaves, unless LEAFDYN_LEAVES asks for others, against the same leaf to 1e-10, with
+/// and without more grids for the modes' shapes.
+#[test]
+fn stated_errors_of_eigenvalues_are_bounds() {
+    let count = asked("LEAFDYN_LEAVES", 30);
+    let mut compared = 0;
+    for (k, leaf) in drawn(leaves(), count).iter().enumerate() {
+        let relaxed = |tolerance, mode_shapes| {
+            let options = Options {
+                modes: 4,
+                mode_shapes,
+                ..to(tolerance)
+            };
+            relaxed(leaf, &options)
+        };
+        let listed = |leaf: &Equilibrium| leaf.stability.modes.clone().unwrap_or_default();
+        let best = relaxed(1e-10, true);
+        for (tolerance, shapes) in [(1e-3, false), (1e-3, true), (1e-5, false), (1e-6, true)] {
+            let found = relaxed(tolerance, shapes);
+            if (found.tips[0] - best.tips[0]).length() > 10.0 * tolerance {
+                continue;
+            }
+            for (mode, best) in listed(&found).iter().zip(listed(&best)) {
+                let (error, left) = (mode.error.unwrap(), best.error.unwrap());
+                let what = format!("leaf {k} to {tolerance:e}, shapes {shapes}");
+                close(&what, mode.eigenvalue, best.eigenvalue, error + left);
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 10 * count, "{compared}");
 }
 
 /// All eigenvalues, ascending, by a dense method, and the matrix made from the
