@@ -5,8 +5,8 @@ mod workplace;
 
 use std::collections::HashMap;
 
-use serde_json::Value;
-use workplace::{Json, Workplace, all_refused, contains};
+use serde_json::{Value, json};
+use workplace::{Json, Workplace, all_refused, contains, pairs};
 
 const FILES: &str = "chart.csv chart.json chart.png chart.svg";
 
@@ -44,6 +44,8 @@ fn chart(place: &Workplace, leaf: &str, methods: &str) -> (Vec<Row>, Value) {
 }
 
 const TWO: &str = "leaf.toml --set leaf.rods=2";
+
+const THREE: &str = "semi-implicit,semi-implicit-grid,shooting-from-rest";
 
 fn of<'r>(rows: &'r [Row], method: &str) -> Vec<&'r Row> {
     rows.iter().filter(|row| row["method"] == method).collect()
@@ -83,8 +85,7 @@ fn a_leaf_is_charted_and_written_down() {
 #[test]
 fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
     let place = Workplace::new();
-    let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
-    let (rows, chart) = chart(&place, TWO, methods);
+    let (rows, chart) = chart(&place, TWO, THREE);
     assert_eq!(chart["scenario"], "small");
     assert_eq!(chart["rods"], 2);
     assert_eq!(chart["threads"], 1);
@@ -186,8 +187,7 @@ fn tolerances_are_kept_and_estimates_are_bounds() {
 fn all_but_times_is_the_same_every_time() {
     let place = Workplace::new();
     let two = || {
-        let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
-        let (mut rows, _) = chart(&place, TWO, methods);
+        let (mut rows, _) = chart(&place, TWO, THREE);
         let timed = |column: &str| column.starts_with("seconds") || column == "runs";
         for row in &mut rows {
             row.retain(|column, _| !timed(column) && column != "pareto");
@@ -260,9 +260,8 @@ fn what_a_method_cannot_do_is_told_and_the_others_are_charted() {
 #[test]
 fn profiles_with_knots_anywhere_have_a_reference_at_every_station() {
     let knots = "stiffness.bending_2={at=[0.0,0.3,0.37,1.0],value=[1.0,0.9,0.3,0.2]}";
-    let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
     let leaf = format!("{TWO} --set {knots}");
-    let (rows, chart) = chart(&Workplace::new(), &leaf, methods);
+    let (rows, chart) = chart(&Workplace::new(), &leaf, THREE);
     assert_eq!(chart["reference"]["confirmed"], true);
     let grids = of(&rows, "semi-implicit-grid");
     let errors = [1, 7].map(|k| number(grids[k], "true_error").unwrap());
@@ -317,29 +316,62 @@ fn peers_stand_beside_our_own_methods() {
     contains(&place.picture("out/chart"), &parts);
 }
 
+/// Columns of the table over the number of veins.
+const OF_RODS: &str = "rods,method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
+                       factorizations,force_evaluations,true_error,error_estimate,outcome";
+
+#[test]
+fn cost_is_charted_against_the_number_of_veins() {
+    let place = Workplace::new();
+    let how = "--seconds 0.05 --rods 3,2 --tolerance 1e-3";
+    let run = place.run(format!("chart {TWO} --methods {THREE} {how}"));
+    run.ends(0).says(&[
+        "  veins    to a tolerance of 1e-3\n",
+        "semi-implicit, extrapolated, N = 2: ",
+        ", N = 3: ",
+        "chart_rods.csv, chart_rods.svg, chart_rods.png",
+    ]);
+    place.picture("out/small/chart_rods");
+    place.read("out/small/chart.csv");
+    let rows = rows(&place, "out/small/chart_rods.csv", OF_RODS);
+    let who = rows.iter().map(|row| [&row["method"][..], &row["rods"]]);
+    let wanted = THREE.split(',').flat_map(|it| [[it, "2"], [it, "3"]]);
+    assert!(who.eq(wanted), "{rows:?}");
+    for row in &rows {
+        assert!(number(row, "true_error").unwrap() <= 1e-3, "{row:?}");
+        assert_eq!(row["outcome"], "converged");
+    }
+    let chart = place.json("out/small/chart.json");
+    assert_eq!(chart["scaling"]["tolerance"], 1e-3);
+    assert_eq!(chart["scaling"]["unconfirmed"], json!([]));
+    assert_eq!(chart["scaling"]["runs"].list().len(), 6);
+}
+
+/// Two joined veins buckle in one way; a single one may do so in any direction, so
+/// that shooting cannot confirm it.
+#[test]
+fn a_leaf_of_rods_alone_that_is_not_confirmed_is_a_failure() {
+    let asked = "chart leaf.toml --seconds 0.1 --methods semi-implicit-grid --write none \
+                 --set leaf.rods=2 --set leaf.fan=symmetric --set load.gravity=[0,0,0] \
+                 --set load.tip_force=[-12,0,0]";
+    for (rods, status, unconfirmed) in [("1", 1, json!([1])), ("2", 0, json!([]))] {
+        let chart = Workplace::new().told(status, format!("{asked} --rods {rods}"));
+        assert_eq!(chart["reference"]["confirmed"], true);
+        assert_eq!(chart["scaling"]["unconfirmed"], unconfirmed);
+    }
+}
+
 #[test]
 fn malformed_tables_are_refused_with_file_and_line() {
     let place = Workplace::new();
-    let short = "a,small,5,n=1,1,1e-2,converged\nb,small,5,n=1,1,1e-2";
-    for (header, rows, message) in [
-        (
-            PEERS,
-            "a,small,5,n=1,fast,1e-2,converged",
-            "2: seconds = \"fast\"",
-        ),
-        (PEERS, short, "3: 6 cells, not 7"),
-        (
-            PEERS,
-            "a,small,none,n=1,1,1e-2,converged",
-            "2: rods = \"none\"",
-        ),
-        (
-            "",
-            "no,such,columns",
-            "1: the first line must name the columns program, ",
-        ),
-    ] {
-        place.write("peers.csv", format!("{header}{rows}\n"));
+    let tables = "
+        PEERS a,small,5,n=1,fast,1e-2,converged => 2: seconds = \"fast\"
+        PEERS a,small,5,n=1,1,1e-2,converged b,small,5,n=1,1,1e-2 => 3: 6 cells, not 7
+        PEERS a,small,none,n=1,1,1e-2,converged => 2: rods = \"none\"
+        no,such,columns => 1: the first line must name the columns program,";
+    for (lines, message) in pairs(tables) {
+        let table = lines.replace(' ', "\n").replace("PEERS\n", PEERS);
+        place.write("peers.csv", table + "\n");
         let message = format!("peers.csv:{message}");
         place.refuses("chart leaf.toml --peers peers.csv", &message);
     }
