@@ -16,10 +16,11 @@ Needs python 3.11 and exudyn (here 1.13.6). One thread, exudyn's default.
 """
 import sys
 import time
+from functools import partial
 
 import numpy as np
 
-from leaf import Leaf, Refused, append, arguments, at_stations, distance, load, read_summary, sample
+from leaf import Leaf, Refused, arguments, at_stations, conclude, load, read_summary, sample, status
 
 # This file has the name of the package: look for that elsewhere.
 sys.path.pop(0)
@@ -119,30 +120,17 @@ def coordinates(place, rotation):
 def solve(options):
     """Builds and solves, prints what came of it; true if it converged."""
     leaf = Leaf(load(options.scenario, options.set))
-    summary = read_summary(options.compare, leaf) if options.compare else None
+    summary = read_summary(options.compare, leaf)
     began = time.perf_counter()
     model = Model(leaf, options.segments)
     built = time.perf_counter()
     outcome, remark = model.solve(options.load_steps, options.max_seconds)
     seconds = time.perf_counter() - built
     knob = f"n={options.segments}" + (f" load-steps={options.load_steps}" if options.load_steps > 1 else "")
-
-    print(f"{leaf.name}: {leaf.rods} rods, {knob}")
-    print(f"  outcome    {outcome} ({remark})")
-    print(f"  time       {seconds:.4f} s, after {built - began:.4f} s for building the model")
-    error = ""
-    if outcome == "converged":
-        nodes = model.positions()
-        for tip in nodes[: 1 if leaf.joined else None, :, -1]:
-            print(f"  tip        ({', '.join(f'{x:.10g}' for x in tip)})")
-        if summary:
-            away, other = distance(summary, at_stations(summary, nodes)), summary["wall_seconds"]
-            print(f"  leafdyn    {away:.2e} away at most (its own error estimate: {summary['error_estimate']})")
-            print(f"             {other:.4g} s; exudyn took {seconds / other:.3g} times as long")
-            error = f"{away:.3e}"
-    if options.csv:
-        append(options.csv, ["exudyn", leaf.name, leaf.rods, knob, f"{seconds:.4g}", error, outcome])
-    return outcome == "converged"
+    notes = [f"model      {built - began:.4f} s before, for building it"]
+    found = partial(at_stations, model.positions()) if outcome == "converged" else None
+    run = "exudyn", knob, outcome, remark, seconds
+    return conclude(options, leaf, summary, run, notes, found)
 
 
 def main():
@@ -152,12 +140,7 @@ def main():
     options = parser.parse_args()
     if options.segments < 3 or options.load_steps < 1:
         parser.error("--segments: at least 3; --load-steps: at least 1")
-    try:
-        converged = solve(options)
-    except Refused as refused:
-        print(f"error: {refused}", file=sys.stderr)
-        return 2
-    return 0 if converged else 1
+    return status(solve, options)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 import argparse
 import csv
 import json
+import sys
 import tomllib
 from pathlib import Path
 
@@ -160,7 +161,9 @@ def sample(quantity, sigma):
 
 
 def read_summary(folder, leaf):
-    """What leafdyn wrote for this scenario."""
+    """What leafdyn wrote for this scenario, if there is a folder."""
+    if folder is None:
+        return None
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -170,21 +173,40 @@ def read_summary(folder, leaf):
     return summary
 
 
-def distance(summary, positions):
-    """Largest distance of these positions [rod][axis][station] from leafdyn's."""
-    return np.linalg.norm(positions.swapaxes(1, 2) - summary["positions"], axis=2).max()
-
-
-def at_stations(summary, nodes):
-    """Positions [rod][axis][node] of evenly spaced nodes, at leafdyn's stations: cubics through four nodes."""
+def at_stations(nodes, stations):
+    """Positions [rod][axis][node] of evenly spaced nodes, at these stations: cubics through four nodes."""
     last = nodes.shape[2] - 1
-    at = np.array(summary["stations"]) * last
+    at = np.array(stations) * last
     first = np.clip(np.floor(at).astype(int) - 1, 0, last - 3)
     result = 0.0
     for i in range(4):
         others = [k for k in range(4) if k != i]
         result += np.prod([(at - first - k) / (i - k) for k in others], axis=0) * nodes[:, :, first + i]
     return result
+
+
+def conclude(options, leaf, summary, run, notes, positions):
+    """Prints what came of a run and appends its row; true if there is a leaf, whose positions [rod][axis][station] are
+    a function of the stations."""
+    program, knob, outcome, remark, seconds = run
+    print(f"{leaf.name}: {leaf.rods} rods, {knob}")
+    print(f"  outcome    {outcome} ({remark})")
+    print(f"  time       {seconds:.4g} s")
+    for note in notes:
+        print(f"  {note}")
+    error = ""
+    if positions:
+        for tip in positions([1.0])[: 1 if leaf.joined else None, :, 0]:
+            print(f"  tip        ({', '.join(f'{x:.10g}' for x in tip)})")
+        if summary:
+            here, there = positions(summary["stations"]).swapaxes(1, 2), summary["positions"]
+            away, other = np.linalg.norm(here - there, axis=2).max(), summary["wall_seconds"]
+            print(f"  leafdyn    {away:.2e} away at most ({summary['outcome']}; error estimate {summary['error_estimate']})")
+            print(f"             {other:.4g} s; {program} took {seconds / other:.3g} times as long")
+            error = f"{away:.3e}"
+    if options.csv:
+        append(options.csv, [program, leaf.name, leaf.rods, knob, f"{seconds:.4g}", error, outcome])
+    return bool(positions)
 
 
 def append(path, row):
@@ -205,3 +227,12 @@ def arguments(description):
     parser.add_argument("--compare", type=Path, metavar="DIR", help="what leafdyn wrote for the same leaf")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="appends one row to this table")
     return parser
+
+
+def status(solve, options):
+    """The exit status of a script that does this, which returns whether it succeeded."""
+    try:
+        return 0 if solve(options) else 1
+    except Refused as refused:
+        print(f"error: {refused}", file=sys.stderr)
+        return 2

@@ -36,13 +36,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from statistics import median
 
 import elastica
 import numpy as np
 from numba import njit
 
-from leaf import Leaf, Refused, append, arguments, at_stations, distance, load, read_summary, sample
+from leaf import Leaf, Refused, append, arguments, at_stations, conclude, load, read_summary, sample, status
 
 # Rods, elements a rod.
 CASES = [(1, 50), (1, 100), (1, 1000), (5, 50), (35, 50)]
@@ -342,7 +343,7 @@ def rates(options):
 def relax(options):
     """Follows the damped motion until it rests, prints what came of it; true if it rests."""
     leaf = Leaf(load(options.scenario, options.set))
-    summary = read_summary(options.compare, leaf) if options.compare else None
+    summary = read_summary(options.compare, leaf)
     motion = Motion(leaf, options.segments, linear=not options.own_law)
     motion.run(motion.step)  # compiles
     motion.restart()
@@ -358,23 +359,11 @@ def relax(options):
             elif seconds > options.max_seconds:
                 outcome = "not-at-rest max-seconds"
     knob = f"n={options.segments}" + (" own-law" if options.own_law else "")
-
-    print(f"{leaf.name}: {leaf.rods} rods, {knob}, time step {motion.step:.3g}")
-    print(f"  outcome    {outcome} (kinetic energy {energy:.1e} after a time of {motion.time:.4g})")
-    print(f"  time       {seconds:.3f} s, {steps} steps")
-    error = ""
-    if outcome == "at-rest":
-        nodes = motion.positions()
-        for tip in nodes[: 1 if leaf.joined else None, :, -1]:
-            print(f"  tip        ({', '.join(f'{x:.10g}' for x in tip)})")
-        if summary:
-            away, other = distance(summary, at_stations(summary, nodes)), summary["wall_seconds"]
-            print(f"  leafdyn    {away:.2e} away at most (its own error estimate: {summary['error_estimate']})")
-            print(f"             {other:.4g} s; PyElastica took {seconds / other:.3g} times as long")
-            error = f"{away:.3e}"
-    if options.csv:
-        append(options.csv, ["pyelastica", leaf.name, leaf.rods, knob, f"{seconds:.4g}", error, outcome])
-    return outcome == "at-rest"
+    remark = f"kinetic energy {energy:.1e} after a time of {motion.time:.4g}"
+    notes = [f"steps      {steps} of {motion.step:.3g}"]
+    found = partial(at_stations, motion.positions()) if outcome == "at-rest" else None
+    run = "pyelastica", knob, outcome, remark, seconds
+    return conclude(options, leaf, summary, run, notes, found)
 
 
 def main():
@@ -395,12 +384,7 @@ def main():
     options.segments = 50 if options.segments is None else options.segments
     if options.segments < 3:
         parser.error("--segments: at least 3")
-    try:
-        good = relax(options) if options.relax else rates(options)
-    except Refused as refused:
-        print(f"error: {refused}", file=sys.stderr)
-        return 2
-    return 0 if good else 1
+    return status(relax if options.relax else rates, options)
 
 
 if __name__ == "__main__":

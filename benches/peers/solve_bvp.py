@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import solve_bvp
 
-from leaf import Leaf, Refused, append, arguments, distance, load, read_summary, sample
+from leaf import Leaf, Refused, arguments, conclude, load, read_summary, sample, status
 
 REASONS = {1: "max-nodes", 2: "singular-jacobian", 3: "boundary-conditions"}
 # Nodes of the first mesh; profiles add their knots.
@@ -126,9 +126,10 @@ def in_space(components, directors):
     return (components[:, :, None] * directors).sum(axis=1)
 
 
-def solve(leaf, options):
+def solve(options):
     """Runs solve_bvp, prints what came of it; true if it converged."""
-    summary = read_summary(options.compare, leaf) if options.compare else None
+    leaf = Problem(load(options.scenario, options.set))
+    summary = read_summary(options.compare, leaf)
     if options.from_leaf:
         sigma, guess = leaf.from_leaf(options.compare)
     else:
@@ -153,30 +154,18 @@ def solve(leaf, options):
     seconds = time.perf_counter() - began
     outcome = "converged" if converged else f"not-converged {reason}"
     knob = f"tol={options.tol:g}" + (" from-leaf" if options.from_leaf else "")
-
-    print(f"{leaf.name}: {leaf.rods} rods, {18 * leaf.rods} functions, {knob}")
-    print(f"  outcome    {outcome} ({message})")
-    print(f"  time       {seconds:.3f} s")
-    error = ""
+    notes = [f"functions  {18 * leaf.rods}"]
     if found is not None:
-        r, d, _, _ = leaf.split(found.y)
+        d = leaf.split(found.y)[1]
         with np.errstate(all="ignore"):
             lost = np.abs(np.einsum("nik...,njk...->nij...", d, d) - np.eye(3)[:, :, None]).max()
-        print(f"  mesh       {len(found.x)} nodes")
-        print(f"  directors  orthonormal to {lost:.1e}")
-    if converged:
-        for tip in r[: 1 if leaf.joined else None, :, -1] * leaf.unit:
-            print(f"  tip        ({', '.join(f'{x:.10g}' for x in tip)})")
-    if converged and summary:
-        here = leaf.split(found.sol(np.array(summary["stations"])))[0] * leaf.unit
-        error = distance(summary, here)
-        estimate, other = summary["error_estimate"], summary["wall_seconds"]
-        print(f"  leafdyn    {error:.2e} away at most (its own error estimate: {estimate}; {summary['outcome']})")
-        print(f"             {other:.4g} s; solve_bvp took {seconds / other:.3g} times as long")
-    if options.csv:
-        cell = error if error == "" else f"{error:.3e}"
-        append(options.csv, ["solve_bvp", leaf.name, leaf.rods, knob, f"{seconds:.4g}", cell, outcome])
-    return converged
+        notes += [f"mesh       {len(found.x)} nodes", f"directors  orthonormal to {lost:.1e}"]
+
+    def positions(stations):
+        return leaf.split(found.sol(np.array(stations)))[0] * leaf.unit
+
+    run = "solve_bvp", knob, outcome, message, seconds
+    return conclude(options, leaf, summary, run, notes, positions if converged else None)
 
 
 def main():
@@ -187,12 +176,7 @@ def main():
     options = parser.parse_args()
     if options.from_leaf and not options.compare:
         parser.error("--from-leaf needs --compare")
-    try:
-        converged = solve(Problem(load(options.scenario, options.set)), options)
-    except Refused as refused:
-        print(f"error: {refused}", file=sys.stderr)
-        return 2
-    return 0 if converged else 1
+    return status(solve, options)
 
 
 if __name__ == "__main__":
