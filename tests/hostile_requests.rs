@@ -15,13 +15,7 @@ name = "leaf"
 leaf = { rods = 5, length = 2.0, fan = "paper" }
 load = { gravity = [0.0, 0.0, -1.0] }
 coupling = { y = 1.0, z = 1.0 }
-[stiffness]
-torsion = 1.0
-bending_2 = { at = [0.0, 0.2, 0.5, 1.0], value = [1.0, 0.5, 0.7, 0.2] }
-bending_3 = 1.0
-axial = 100.0
-shear_2 = 100.0
-shear_3 = 100.0
+stiffness = { torsion = 1.0, bending_2 = { at = [0.0, 0.2, 0.5, 1.0], value = [1.0, 0.5, 0.7, 0.2] }, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
 "#;
 
 /// A folder with it.

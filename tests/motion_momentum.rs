@@ -17,17 +17,8 @@ use leafdyn::simulate::{self, Refused, Simulation};
 /// until t = 2.5 and fall until t = 5. The loaded end is the tip.
 const SPAGHETTI: &str = r#"
     name = "flying-spaghetti"
-    [leaf]
-    rods = 1
-    length = 10.0
-    fan = [-0.9272952180016123]
-    [stiffness]
-    torsion = 500.0
-    bending_2 = 500.0
-    bending_3 = 500.0
-    axial = 1e4
-    shear_2 = 1e4
-    shear_3 = 1e4
+    leaf = { rods = 1, length = 10.0, fan = [-0.9272952180016123] }
+    stiffness = { torsion = 500.0, bending_2 = 500.0, bending_3 = 500.0, axial = 1e4, shear_2 = 1e4, shear_3 = 1e4 }
     [dynamics]
     density = 1.0
     rotary_inertia = 10.0

@@ -294,31 +294,11 @@ pub fn leaf(name: &str, rods: usize) -> String {
     format!(
         r#"
 name = "{name}"
-
-[leaf]
-rods = {rods}
-length = 1.0
-fan = "paper"
-joined = true
-
-[stiffness]
-torsion = 1.0
-bending_2 = 1.0
-bending_3 = 1.0
-axial = 100.0
-shear_2 = 100.0
-shear_3 = 100.0
-
-[coupling]
-x = 0.0
-y = 1.0
-z = 1.0
-
-[load]
-gravity = [0.0, 0.0, -1.0]
-
-[solve]
-tolerance = 1e-6
+leaf = {{ rods = {rods}, length = 1.0, fan = "paper", joined = true }}
+stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }}
+coupling = {{ x = 0.0, y = 1.0, z = 1.0 }}
+load = {{ gravity = [0.0, 0.0, -1.0] }}
+solve = {{ tolerance = 1e-6 }}
 "#
     )
 }
