@@ -116,7 +116,7 @@ fn clearly_stable_leaves_cost_one_factorization() {
 /// The flat leaf that waves beyond a2/a3 = 0.087 at a1 = 2.42, and 0.0694 at 4.76.
 fn flat(bending: f64, torsion: f64, modes: usize) -> Equilibrium {
     let flat = scenario("study/undulation", &weightless(bending, torsion));
-    settled(&flat, &Options { modes, ..to(1e-4) })
+    settled(&flat, &with_modes(modes, to(1e-4)))
 }
 
 /// Short waves, which 32 segments make stiffer by more than the lowest eigenvalue is: it
@@ -144,8 +144,7 @@ fn a_flat_leaf_waves_where_its_eigenvalues_say_so() {
 fn a_neutral_mode_is_no_doubt() {
     let column = column(1.3 * EULER, 1e3, 1.0);
     for modes in [0, 1, 3] {
-        let options = Options { modes, ..to(1e-6) };
-        let leaf = settled(&column, &options);
+        let leaf = settled(&column, &with_modes(modes, to(1e-6)));
         assert!(leaf.doubts.is_empty());
         assert!(*leaf.accuracy.segments.last().unwrap() <= 256);
     }

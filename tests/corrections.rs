@@ -38,11 +38,8 @@ fn one_coarse_grid_or_two_tell_what_shooting_does() {
     ] {
         let leaf = scenario(name, overrides);
         let what = format!("{name} {overrides}");
-        let shot = Options {
-            method: Method::ShootingFromRest { intervals: None },
-            ..to(1e-11)
-        };
-        let shot = found(&leaf, &shot);
+        let shooting = Method::ShootingFromRest { intervals: None };
+        let shot = found(&leaf, &by(shooting, to(1e-11)));
         for tolerance in TOLERANCES {
             let corrected = found(&leaf, &to(tolerance));
             let segments = &corrected.accuracy.segments;

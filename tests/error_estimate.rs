@@ -28,11 +28,7 @@ impl Verdict {
     /// itself uncertain by its own estimate: with an eigenvalue, for which grids are
     /// extrapolated and nothing is taken off.
     fn judge(&mut self, name: &str, scenario: &Scenario) {
-        let truth = Options {
-            modes: 1,
-            ..at_every_node(1e-10)
-        };
-        let truth = relaxed(scenario, &truth);
+        let truth = relaxed(scenario, &with_modes(1, at_every_node(1e-10)));
         if !truth.outcome.is_success() {
             let outcome = truth.outcome;
             return self.wrong.push(format!("{name} at 1e-10: {outcome:?}"));

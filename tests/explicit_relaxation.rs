@@ -14,21 +14,11 @@ const CLOSE: f64 = 1e-8;
 const EXPLICIT: Method = Method::Explicit { segments: None };
 
 fn explicit(options: Options) -> Options {
-    Options {
-        method: EXPLICIT,
-        ..options
-    }
+    by(EXPLICIT, options)
 }
 
 fn rest(scenario: &Scenario, method: Method, segments: Option<usize>) -> Equilibrium {
-    let method = method.on_grid(segments);
-    settled(
-        scenario,
-        &Options {
-            method,
-            ..Options::default()
-        },
-    )
+    settled(scenario, &by(method.on_grid(segments), Options::default()))
 }
 
 #[track_caller]

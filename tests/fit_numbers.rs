@@ -34,11 +34,8 @@ fn exact_data_give_the_exact_numbers() {
 #[test]
 fn frequencies_give_stiffness_and_mass() {
     let truth = base(VEIN, "stiffness.bending_2=1.7; stiffness.bending_3=0.6");
-    let modes = Options {
-        modes: 2,
-        ..to(1e-8)
-    };
-    let modes = relaxed(truth.scenario(), &modes).stability.modes.unwrap();
+    let found = relaxed(truth.scenario(), &with_modes(2, to(1e-8)));
+    let modes = found.stability.modes.unwrap();
     let hertz = |k: usize| modes[k].frequency().unwrap() / std::f64::consts::TAU;
     let (header, [one, two]) = (
         "frequency_1,frequency_2,sd_frequency_1,sd_frequency_2",

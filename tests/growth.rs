@@ -165,10 +165,8 @@ fn relaxation_and_shooting_agree_on_lists_and_profiles() {
 fn explicit_motion_agrees() {
     for entry in GROWN {
         let scenario = fan(entry);
-        let explicit = Options {
-            method: Method::Explicit { segments: Some(16) },
-            ..Options::default()
-        };
+        let explicit = Method::Explicit { segments: Some(16) };
+        let explicit = by(explicit, Options::default());
         let [explicit, implicit] =
             [explicit, on(16)].map(|how| relaxed(&scenario, &how).shape.rods);
         let apart = apart(&scenario, &explicit, &implicit).position;

@@ -302,10 +302,8 @@ fn held_leaves_move_between_their_holders() {
         for (a, b) in explicit.iter().zip(&semi_implicit) {
             assert!(apart(a, b) < 1e-3, "{how}, t = {}: {}", a.time, apart(a, b));
         }
-        let [a, b] = [Method::Explicit { segments: None }, Method::default()].map(|method| {
-            let options = Options { method, ..to(1e-7) };
-            settled(&held_rod(how, loads), &options)
-        });
+        let [a, b] = [Method::Explicit { segments: None }, Method::default()]
+            .map(|method| settled(&held_rod(how, loads), &by(method, to(1e-7))));
         close("energy", a.energy.unwrap(), b.energy.unwrap(), 1e-7);
     }
 }

@@ -26,10 +26,7 @@ fn with(count: usize) -> Options {
 
 /// On one grid.
 fn with_on(segments: usize, count: usize) -> Options {
-    Options {
-        method: Method::default().on_grid(Some(segments)),
-        ..with(count)
-    }
+    by(Method::default().on_grid(Some(segments)), with(count))
 }
 
 #[track_caller]
@@ -122,11 +119,8 @@ fn stated_errors_of_eigenvalues_are_bounds() {
     let mut compared = 0;
     for (k, leaf) in drawn(leaves(), count).iter().enumerate() {
         let relaxed = |tolerance, mode_shapes| {
-            let options = Options {
-                modes: 4,
-                mode_shapes,
-                ..to(tolerance)
-            };
+            let mut options = with_modes(4, to(tolerance));
+            options.mode_shapes = mode_shapes;
             relaxed(leaf, &options)
         };
         let listed = |leaf: &Equilibrium| leaf.stability.modes.clone().unwrap_or_default();
@@ -209,10 +203,7 @@ fn eigenvalues_are_those_of_a_dense_method() {
 /// The three veins brought to rest by motion have the same modes.
 #[test]
 fn the_explicit_method_tells_the_same_modes() {
-    let explicit = Options {
-        method: Method::Explicit { segments: None },
-        ..with(4)
-    };
+    let explicit = by(Method::Explicit { segments: None }, with(4));
     let leaf = fig04(3);
     let (implicit, explicit) = (settled(&leaf, &with(4)), settled(&leaf, &explicit));
     for (a, b) in modes_of(&implicit).iter().zip(modes_of(&explicit)) {
@@ -320,10 +311,7 @@ fn no_modes_without_a_potential_or_rest_or_request() {
     assert!(settled(&rollup, &with(3)).stability.modes.is_none());
     let unasked = settled(&fig04(2), &Options::default());
     assert!(unasked.stability.modes.is_none());
-    let without_shapes = Options {
-        mode_shapes: false,
-        ..with(3)
-    };
+    let without_shapes = with_modes(3, Options::default());
     assert_eq!(modes_of(&settled(&fig04(3), &without_shapes)).len(), 3);
     let many = relax(&fig04(1), &with(101), &mut |_| {});
     assert!(many.unwrap_err().to_string().contains("modes = 101"));

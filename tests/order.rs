@@ -7,12 +7,8 @@ use common::*;
 
 /// Positions at the stations of the coarsest grid, solved on one grid.
 fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
-    let options = Options {
-        // Iterated to rounding.
-        tolerance: Some(1e-12),
-        ..on(coarsest * times)
-    };
-    let leaf = settled(scenario, &options);
+    // To rounding.
+    let leaf = settled(scenario, &iterated(1e-12, coarsest * times));
     // Every grid halves the one before, kinks or not.
     for (i, sigma) in leaf.shape.stations.iter().step_by(times).enumerate() {
         assert!((sigma - i as f64 / coarsest as f64).abs() < 1e-15);

@@ -255,10 +255,7 @@ fn other_leaves_are_solved_in_space() {
         disturbance: Some(1),
         ..SemiImplicit::default()
     };
-    let disturbed = Options {
-        method: disturbed.into(),
-        ..Options::default()
-    };
+    let disturbed = by(disturbed.into(), Options::default());
     for options in [keeping(Options::default()), disturbed] {
         assert!(!relaxed(&leaf, &options).model.planar);
     }

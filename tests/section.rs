@@ -81,11 +81,8 @@ fn a_taper_is_followed_exactly() {
     let integral = 0.3 * PI / 64.0 * integral;
     common::close("integral", bending.integral(1.0) / integral, 1.0, 1e-13);
     let relaxed = settle(&leaf, 1e-9);
-    let shooting = Options {
-        method: Method::Shooting { intervals: None },
-        ..to(1e-9)
-    };
-    let shot = common::relaxed(&leaf, &shooting);
+    let shooting = Method::Shooting { intervals: None };
+    let shot = common::relaxed(&leaf, &by(shooting, to(1e-9)));
     let apart = (tip(&relaxed) - tip(&shot)).length();
     assert!(apart < 2e-9 && tip(&relaxed).z < -0.01, "{apart:e}");
 }

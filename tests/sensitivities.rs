@@ -227,11 +227,7 @@ fn they_are_those_of_whole_relaxations() {
     for number in 0..asked("LEAFDYN_LEAVES", LEAVES) {
         let (text, wanted) = random(number);
         let base = base(&text, "");
-        let options = Options {
-            modes: 2,
-            tolerance: Some(1e-9),
-            ..on(12)
-        };
+        let options = with_modes(2, iterated(1e-9, 12));
         let (leaf, found) = derivatives(&base, &wanted, &options);
         assert_eq!(found.len(), wanted.len());
         for (key, found) in keys(&wanted).iter().zip(&found) {
@@ -301,10 +297,7 @@ fn an_eigenvalue_that_splits_has_no_derivative() {
         "stiffness.torsion",
     ];
     let base = base(text, "");
-    let options = Options {
-        modes: 3,
-        ..common::to(1e-8)
-    };
+    let options = with_modes(3, common::to(1e-8));
     let found = derivatives(&base, &wanted, &options).1;
     let [bending, weight, torsion] = found.as_slice() else {
         panic!("{found:?}");

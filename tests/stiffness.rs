@@ -13,11 +13,7 @@ fn at_most_twelve_steps_on_the_first_grid_and_the_work_is_pinned() {
     for stiffness in STIFFNESSES {
         for rods in [5, 21] {
             let leaf = paper_leaf(rods, [1.0; 3], [stiffness; 3], 1.0);
-            let options = Options {
-                tolerance: Some(1e-6),
-                ..on(8)
-            };
-            let leaf = settled(&leaf, &options);
+            let leaf = settled(&leaf, &iterated(1e-6, 8));
             let steps = leaf.work.steps;
             assert!(steps <= 12, "h = {stiffness}, N = {rods}: {steps} steps");
             if rods == 5 {

@@ -143,6 +143,24 @@ pub fn on(segments: usize) -> Options {
     }
 }
 
+/// Relaxing on one grid, with iterations to a tolerance.
+pub fn iterated(tolerance: f64, segments: usize) -> Options {
+    Options {
+        tolerance: Some(tolerance),
+        ..on(segments)
+    }
+}
+
+/// By this method.
+pub fn by(method: Method, options: Options) -> Options {
+    Options { method, ..options }
+}
+
+/// With so many modes of vibration.
+pub fn with_modes(modes: usize, options: Options) -> Options {
+    Options { modes, ..options }
+}
+
 /// Relaxing to a tolerance that every node keeps.
 pub fn at_every_node(tolerance: f64) -> Options {
     Options {
@@ -157,10 +175,7 @@ fn with(options: Options, change: impl Fn(&mut SemiImplicit)) -> Options {
         panic!("{:?}", options.method);
     };
     change(&mut method);
-    Options {
-        method: method.into(),
-        ..options
-    }
+    by(method.into(), options)
 }
 
 /// Stopping at a saddle.
@@ -198,10 +213,7 @@ pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
 /// Relaxes on one grid.
 #[track_caller]
 pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> Equilibrium {
-    let options = Options {
-        tolerance: Some(1e-9),
-        ..on(segments)
-    };
+    let options = iterated(1e-9, segments);
     match keep_unstable {
         true => settled(scenario, &keeping(options)),
         false => settled(scenario, &options),

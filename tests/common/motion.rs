@@ -4,13 +4,13 @@ use glam::DVec3;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
 use leafdyn::internals::relax::start;
-use leafdyn::relax::{Equilibrium, Options};
+use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 use leafdyn::simulate::{self, Frame, Simulation};
 
 pub use leafdyn::simulate::Scheme;
 
-use crate::common::{largest, nodes, on, paper_leaf, settled};
+use crate::common::{iterated, largest, nodes, paper_leaf, settled};
 
 /// Linear from zero at time 0 to `value` at time `until`, then constant.
 pub fn ramp(until: f64, value: [f64; 3]) -> Schedule<[f64; 3]> {
@@ -119,11 +119,7 @@ pub fn discrete(leaf: &Leaf, segments: usize) -> DiscreteLeaf {
 /// The equilibrium at time 0, to rounding.
 pub fn rest(scenario: &Scenario, segments: usize) -> State {
     let resting = at_beginning(scenario);
-    let options = Options {
-        tolerance: Some(1e-12),
-        ..on(segments)
-    };
-    state_of(scenario, &settled(&resting, &options))
+    state_of(scenario, &settled(&resting, &iterated(1e-12, segments)))
 }
 
 /// The state of a result on one grid.
