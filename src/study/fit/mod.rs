@@ -7,7 +7,6 @@
 
 mod candidates;
 mod case;
-mod change;
 mod coarse;
 mod data;
 mod derivatives;
