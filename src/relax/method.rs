@@ -118,9 +118,6 @@ impl Method {
     }
 
     /// The same method with the given settings.
-    ///
-    /// # Errors
-    /// If the method does not have one of the settings.
     pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
         let Settings {
             segments,

@@ -98,9 +98,6 @@ pub struct Simulation {
 
 impl Simulation {
     /// The leaf at time 0.
-    ///
-    /// # Errors
-    /// If a request cannot be met.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)

@@ -217,9 +217,6 @@ impl Check {
 }
 
 /// Relaxes a leaf, solves its boundary-value problem from there, and compares.
-///
-/// # Errors
-/// Requests that cannot be met, as in [`relax::relax`].
 pub fn check(
     scenario: &Scenario,
     options: &CheckOptions,

@@ -64,9 +64,6 @@ impl From<Equilibrium> for Answer {
 
 impl Answer {
     /// Relaxes a leaf.
-    ///
-    /// # Errors
-    /// Requests that the method does not support.
     pub fn relaxed(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
         relax::relax(scenario, options, &mut |_| {}).map(Answer::from)
     }
