@@ -209,6 +209,7 @@ pub mod simulate;
 pub mod study;
 mod tableau;
 pub mod undulation;
+mod words;
 
 #[cfg(feature = "cli")]
 pub use figure::view;

@@ -7,12 +7,12 @@ pub use shot::Shot;
 use serde::Serialize;
 
 use super::judge::{common, fine_grid, index_at, timed, with_nodes_of};
-use super::words::words;
 use crate::bvp::{self, Solution, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
+use crate::words::words;
 use shot::relaxation;
 
 /// Rotations may differ by this many times the tolerance (in radians) before
@@ -46,24 +46,16 @@ pub enum Verdict {
     NotCompared(String),
 }
 
-/// The quantities compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Positions of the centerlines.
-    Position,
-    /// Rotations of the directors.
-    Rotation,
-    /// Stress resultants n.
-    Force,
-    /// Stress couples m.
-    Moment,
-}
-
 words! {
-    Quantity {
+    /// The quantities compared.
+    pub enum Quantity {
+        /// Positions of the centerlines.
         Position = "position",
+        /// Rotations of the directors.
         Rotation = "rotation",
+        /// Stress resultants n.
         Force = "force",
+        /// Stress couples m.
         Moment = "moment",
     }
 }
