@@ -89,95 +89,11 @@
 //!
 //! # From the equations to the result
 //!
-//! **The element** (`rod`, `rotation`). The nodes of a grid carry positions and unit
-//! quaternions. Each segment is oriented by the geodesic midpoint of its two nodal rotations
-//! and has an energy in the strains v = R^T (x1 - x0)/ds and u = log(q0^* q1)/ds. Its
-//! stationarity is the implicit midpoint rule on eqs (1) to (6). The force each segment
-//! carries is an additional unknown (the mixed form), eliminated segment by segment, so that
-//! the convergence of Newton's method does not depend on the stiffness in stretch and shear.
-//!
-//! **The leaf** (`leaf`). All last nodes are one shared point: the joint tip needs neither penalty
-//! nor multiplier. Gravity and coupling act at the nodes. Newton's equations are solved rod by
-//! rod: every rod's own block-tridiagonal matrix of 6 x 6 blocks (3 x 3 in the plane) is
-//! factorised in linear time and preconditions conjugate gradients for the coupled system. A
-//! sparse direct factorisation of the whole matrix serves where it is not positive definite.
-//!
-//! **The relaxation** ([`relax`]). Joined leaves start from circular arcs that meet in a
-//! point, free rods from their rest shapes, and perform a damped motion in linearly implicit
-//! Euler steps. While the energy has a direction of negative curvature, the time step is kept
-//! short enough to resolve the motion; otherwise it grows until the step is Newton's. Of a
-//! mirror-symmetric leaf one half is solved, and a leaf without loads out of its plane with
-//! three unknowns a node. The explicit method ([`relax::Method::Explicit`]) integrates the
-//! same motion in steps short enough for the fastest waves until the leaf is in a valley
-//! (basin of attraction) of its energy, and then descends with fictitious masses and damping.
-//!
-//! **Grids and the error** ([`relax::relax`]). The element is symmetric and the boundary
-//! conditions hold exactly at nodes, so that its error is a series in even powers of ds. The
-//! leaf settles on 8 segments a rod (on 4 where that is enough), then on twice as many, and so
-//! on, starting on each grid from a prediction by those before it, and Richardson
-//! extrapolation removes one term of the series with every grid. The error of the extrapolated
-//! leaf is estimated from its defect in the equations: these are integrated along the rods by
-//! a method of order 8, and the linear response of the leaf to the remaining jumps, times two,
-//! is the bound ([`relax::Accuracy::error_estimate`]); unfinished iterations and rounding are
-//! added. Where only the shape is requested the response is also subtracted (iterated defect
-//! correction). Grids are refined until the bound is below the tolerance. A column of the
-//! table that does not show its order of convergence is not extrapolated. Kinks of a profile
-//! are nodes of every grid.
-//!
-//! **Stability** ([`relax::Equilibrium::stable`]). The Hessian of the energy at rest is
-//! factorised as L D L^T; the number of negative pivots is that of its negative eigenvalues,
-//! the Morse index. Index zero means: stable. A leaf at rest at a saddle is displaced along
-//! its unstable mode and relaxed further; the saddle is returned in
-//! [`relax::Stability::saddle`]. The outcome of a run is a [`relax::Outcome`].
-//!
-//! **Undulation** ([`undulation`]). Half-waves of each vein out of the leaf's
-//! surface, counted between its inflections; the twist of its section; and the
-//! waves that the paper's linear theory predicts from the axial force it
-//! carries.
-//!
-//! **Modes** (`modes`). The lowest eigenvalues of K x = lambda M x with that Hessian and the
-//! masses of the leaf in motion: squared frequencies, or negative where the leaf is unstable.
-//! A Lanczos method computes them with one factorisation, and the pivots of a second one show
-//! whether any was missed. They are extrapolated over the grids as positions are
-//! ([`relax::Stability::modes`]).
-//!
-//! **The independent method** (`bvp`). The same equations (1) to (6) with (a) to (e) as a
-//! boundary-value problem: 13 functions per rod, integrated from the base by a Runge-Kutta
-//! method of order 8 together with their sensitivities; Newton's method satisfies the
-//! conditions at the tip, over as many intervals as the growth of perturbations needs
-//! (multiple shooting). It starts from a relaxed leaf or from arcs. [`study::check`] compares
-//! it with the relaxation; the two share neither grid nor element nor linear algebra.
-//!
-//! **Branches** ([`study::trace()`]). An equilibrium is continued in a number of its scenario
-//! by pseudo-arclength (`branch`), also through folds. Where its Morse index changes the
-//! matrix is singular; bordered by the modes that become neutral it is regular, and the
-//! singular point is computed to rounding on each grid, and extrapolated. Branches that cross
-//! there can be followed as well. [`study::boundary()`] continues singular points in a second
-//! number. [`study::all()`] searches for equilibria from many starts instead.
-//!
-//! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary ([`study::Vary`]),
-//! and in each cell every method's result is compared with the relaxed leaf confirmed by
-//! shooting: correct, another equilibrium, a saddle, less accurate than claimed, or none.
-//!
-//! **Speed against accuracy** ([`study::chart()`]). Every method runs over a range of its
-//! accuracy parameter, in turns with all others, and is judged by its true error: the distance
-//! from the relaxed leaf at the best tolerance, confirmed by shooting.
-//!
-//! # Layout
-//!
-//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and `rotation`, `rod`, `leaf`,
-//! [`shape`], [`undulation`], `bvp`, `motion`, `modes`, [`relax`], `branch`, [`simulate`],
-//! [`study`], `report` (console, JSON, tables), `figure`, [`files`]: each module depends only
-//! on those named before it.
-//!
-//! `motion` integrates the dimensionless motion of a leaf on the same grid in time: by an
-//! explicit method with short, cheap steps, or by a semi-implicit one for any stiffness. Both
-//! implement the trait `motion::Method`, keep the balance of energy, and can be saved and
-//! restored to the last bit.
-//!
-//! [`simulate`] integrates the motion of a scenario's leaf for its duration, from the initial
-//! state of the scenario, and returns a [`simulate::Frame`] at every output. A
-//! [`files::Recording`] writes these to files as they are computed, and can stop and resume.
+//! `docs/methods.md` describes the methods: the element and its grids, the relaxation, the error
+//! bound ([`relax::Accuracy::error_estimate`]), stability, modes, the boundary-value problem
+//! with which [`study::check()`] confirms a result, branches, and motion in time.
+//! `docs/how-to-read.md` explains the numbers of a result, `docs/architecture.md` the modules of
+//! this crate.
 
 #![warn(missing_docs)]
 
@@ -209,6 +125,7 @@ pub mod simulate;
 pub mod study;
 mod tableau;
 pub mod undulation;
+mod words;
 
 #[cfg(feature = "cli")]
 pub use figure::view;

@@ -130,9 +130,6 @@ impl Request {
     }
 
     /// Checks that it takes no more than is [`allowed`].
-    ///
-    /// # Errors
-    /// If it takes more.
     pub fn weigh(self) -> Result<(), TooMuch> {
         let (needed, allowed) = (self.bytes(), allowed());
         match needed > allowed {

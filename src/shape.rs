@@ -105,9 +105,6 @@ pub fn weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
 
 /// Serializes tips as the key `tip`, which is null if there are several; these follow as
 /// the key `tips`.
-///
-/// # Errors
-/// Those of the serializer.
 pub fn serialize_tips<S: Serializer>(tips: &[DVec3], serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Keys<'a> {
@@ -124,9 +121,6 @@ pub fn serialize_tips<S: Serializer>(tips: &[DVec3], serializer: S) -> Result<S:
 }
 
 /// Serializes the positions at all stations, a list per rod.
-///
-/// # Errors
-/// Those of the serializer.
 pub fn serialize_positions<S: Serializer>(
     rods: &[RodShape],
     serializer: S,

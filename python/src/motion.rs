@@ -87,17 +87,10 @@ impl Motion {
         step: Option<f64>,
         tolerance: Option<f64>,
     ) -> PyResult<Self> {
-        let scheme = match method {
-            None => None,
-            Some("explicit") => Some(Scheme::Explicit),
-            Some("semi-implicit") => Some(Scheme::SemiImplicit),
-            Some(other) => {
-                let message = format!("method = {other}: must be one of explicit, semi-implicit");
-                return Err(PyValueError::new_err(message));
-            }
-        };
+        let scheme = method.map(str::parse::<Scheme>).transpose();
         let options = Options {
-            scheme,
+            scheme: scheme
+                .map_err(|unknown| PyValueError::new_err(format!("method = {unknown}")))?,
             segments,
             step,
             tolerance,

@@ -1,9 +1,12 @@
-//! The first point of a branch: the equilibrium that a relaxation found.
+//! The first points of branches: the equilibrium that a relaxation found, and those beside a
+//! branch point.
 
-use super::equations::Stuck;
+use super::critical::Critical;
+use super::equations::{Equations, Stuck, reversed};
 use super::family::Family;
 use super::follow::Grids;
-use super::{Point, prolonged};
+use super::refine::refine;
+use super::{Point, Tangent, prolonged};
 use crate::leaf::{DiscreteLeaf, Grid, System};
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
@@ -16,6 +19,9 @@ const SAME_LEAF: f64 = 0.02;
 
 /// A relaxation on fewer segments counts as one on this many.
 const COARSEST: usize = 8;
+
+/// Distances from the branch point at which the other branch is sought, in this order.
+const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// The first point of a branch and its grid: the equilibrium `rest`, found with these
 /// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
@@ -93,4 +99,40 @@ fn search<'a>(
         grid = grid.refined();
         discrete = DiscreteLeaf::new(leaf, grid.clone());
     }
+}
+
+/// The first points of the branches that cross at `critical` in the plane of
+/// the first of its neutral modes, one on either side: as near as possible, but so far from the
+/// branch point that finer grids have them too, with this accuracy of their tips.
+pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
+    let across = critical.across(equations);
+    let (family, grid) = (equations.leaves.family, equations.grid().clone());
+    [across.clone(), reversed(across)]
+        .iter()
+        .filter_map(|direction| {
+            let mut nearest = None;
+            for away in AWAY {
+                let Ok(point) = first_point(equations, critical, direction, away) else {
+                    continue;
+                };
+                if refine(family, &grid, &point, accuracy).is_ok() {
+                    return Some(point);
+                }
+                nearest = nearest.or(Some(point));
+            }
+            nearest
+        })
+        .collect()
+}
+
+fn first_point(
+    equations: &mut Equations,
+    critical: &Critical,
+    direction: &Tangent,
+    away: f64,
+) -> Result<Point, Stuck> {
+    let increments = &direction.increments;
+    let fraction = critical.fraction + away * direction.fraction;
+    let state = equations.moved(&critical.state, fraction, increments, away)?;
+    equations.correct(&state, fraction, Some(direction))
 }

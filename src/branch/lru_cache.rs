@@ -13,9 +13,6 @@ impl<K, V, const MOST: usize> Default for LruCache<K, V, MOST> {
 
 impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
     /// The value of a key, computed by `make` if it is not cached.
-    ///
-    /// # Errors
-    /// Those of `make`.
     pub fn at<E>(&mut self, key: K, make: impl FnOnce() -> Result<V, E>) -> Result<&V, E> {
         let known = self.0.iter().position(|(other, _)| *other == key);
         let found = match known.and_then(|index| self.0.remove(index)) {

@@ -40,10 +40,9 @@ mod refine_critical;
 mod refined;
 mod states;
 mod step;
-mod switch;
 mod walk;
 
-pub use begin::begin;
+pub use begin::{begin, switch};
 pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
@@ -52,7 +51,6 @@ pub use follow::{Followed, Grids};
 pub(crate) use refine::{on_finer, refine_at};
 pub(crate) use refine_critical::NEARLY_RIGID;
 pub use refined::{Doubt, Refined};
-pub use switch::switch;
 pub use walk::{End, Walk, walk};
 
 use crate::relax::prolong::prolong as prolonged;

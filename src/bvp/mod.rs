@@ -43,7 +43,6 @@ mod dop853;
 mod equations;
 mod intervals;
 mod march;
-mod neutral;
 mod newton;
 mod propagate;
 mod solution;

@@ -68,9 +68,7 @@ fn kinds(list: &str) -> Result<Kinds, String> {
         return Ok(Kinds(Vec::new()));
     }
     let kind = |word: &str| {
-        let mut all = Kind::ALL.into_iter();
-        let found = all.find(|kind| kind.word() == word.trim());
-        found.ok_or_else(|| {
+        word.trim().parse().map_err(|_| {
             let words = Kind::ALL.map(Kind::word).join(", ");
             format!("{word}: must be some of {words}, with commas between them, or none")
         })

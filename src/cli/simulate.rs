@@ -45,10 +45,7 @@ pub struct Simulate {
 
 /// Parses the names of methods.
 fn method_parser() -> impl TypedValueParser<Value = Scheme> {
-    let methods = [Scheme::Explicit, Scheme::SemiImplicit];
-    let named = move |word: String| methods.into_iter().find(|method| method.name() == word);
-    PossibleValuesParser::new(methods.map(Scheme::name))
-        .try_map(move |word| named(word).ok_or("is no method"))
+    PossibleValuesParser::new(Scheme::ALL.map(Scheme::word)).try_map(|word| word.parse::<Scheme>())
 }
 
 impl Simulate {

@@ -9,6 +9,7 @@ use crate::figure::view::{Shape, vtk};
 use crate::figure::{Drawing, png, svg};
 use crate::report::Document;
 use crate::scenario::Scenario;
+use crate::words::words;
 
 /// A file of a result: its name, which does not change between releases, and its content.
 /// A figure is two files.
@@ -91,64 +92,39 @@ pub trait Written: Serialize + Sync + Sized + 'static {
     }
 }
 
-/// A kind of file, as listed by `--write`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The result itself.
-    Json,
-    /// Tables; large ones as NumPy arrays.
-    Csv,
-    /// Vector figures.
-    Svg,
-    /// Raster figures.
-    Png,
-    /// A page that shows the leaf in space.
-    Html,
-    /// For ParaView.
-    Vtk,
-    /// For Blender.
-    Glb,
-    /// A film.
-    Gif,
+words! {
+    /// A kind of file, as listed by `--write`.
+    pub enum Kind {
+        /// The result itself.
+        Json = "json",
+        /// Tables; large ones as NumPy arrays.
+        Csv = "csv",
+        /// Vector figures.
+        Svg = "svg",
+        /// Raster figures.
+        Png = "png",
+        /// A page that shows the leaf in space.
+        Html = "html",
+        /// For ParaView.
+        Vtk = "vtk",
+        /// For Blender.
+        Glb = "glb",
+        /// A film.
+        Gif = "gif",
+    }
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Kind; 8] = [
-        Kind::Json,
-        Kind::Csv,
-        Kind::Svg,
-        Kind::Png,
-        Kind::Html,
-        Kind::Vtk,
-        Kind::Glb,
-        Kind::Gif,
-    ];
-
     /// Those that need a motion as a film.
     pub const FILMS: [Kind; 4] = [Kind::Html, Kind::Vtk, Kind::Glb, Kind::Gif];
 
     /// Those that are written by default.
     pub const USUAL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
 
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Kind::Json => "json",
-            Kind::Csv => "csv",
-            Kind::Svg => "svg",
-            Kind::Png => "png",
-            Kind::Html => "html",
-            Kind::Vtk => "vtk",
-            Kind::Glb => "glb",
-            Kind::Gif => "gif",
-        }
-    }
-
     /// The kind of a file, by the extension of its name.
     pub fn of(file: &str) -> Kind {
         let end = file.rsplit('.').next();
-        let named = Kind::ALL.into_iter().find(|kind| Some(kind.word()) == end);
+        let named = end.and_then(|end| end.parse().ok());
         named.unwrap_or(match end {
             Some("vtp" | "pvd") => Kind::Vtk,
             _ => Kind::Csv,

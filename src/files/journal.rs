@@ -76,9 +76,6 @@ pub struct Journal {
 
 impl Journal {
     /// Begins or continues a file: writes it with the known rows and opens it for more.
-    ///
-    /// # Errors
-    /// If it cannot be written.
     pub fn open(
         folder: &Path,
         name: &str,
@@ -93,9 +90,6 @@ impl Journal {
     }
 
     /// Appends rows with a single write.
-    ///
-    /// # Errors
-    /// If they cannot be written.
     pub fn append(&mut self, request: &MapRequest, rows: &[MapRow]) -> Result<(), FileError> {
         let written = lines(request, rows).and_then(|bytes| self.file.write_all(&bytes));
         written.map_err(|reason| FileError::write(&self.path, reason))
@@ -103,9 +97,6 @@ impl Journal {
 }
 
 /// Writes a complete file of rows.
-///
-/// # Errors
-/// If it cannot be written.
 pub fn write_rows(
     folder: &Path,
     name: &str,

@@ -193,9 +193,6 @@ pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8
 
 /// Writes a result into `folder`, which is created if missing, as files of these kinds,
 /// and returns their paths. Files of other kinds are not changed.
-///
-/// # Errors
-/// If one cannot be written.
 pub fn write_all<R: Written>(
     folder: &Path,
     document: &Document<R>,
@@ -253,9 +250,6 @@ fn write_shapes(
 }
 
 /// Writes a complete table into `folder`, which is created if missing.
-///
-/// # Errors
-/// If it cannot be written.
 pub fn write_table(folder: &Path, name: &str, rows: &[u8]) -> Result<PathBuf, FileError> {
     atomic::make_folder(folder)?;
     write_named(folder, name, |out| out.write_all(rows))

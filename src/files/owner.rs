@@ -52,9 +52,6 @@ fn without_dots(path: PathBuf) -> PathBuf {
 }
 
 /// Refuses a folder that holds results of a scenario in another file.
-///
-/// # Errors
-/// If it does.
 pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
     for name in FILES.into_iter().flatten() {
         let file = folder.join(name);

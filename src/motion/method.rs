@@ -130,9 +130,6 @@ pub trait Method {
     fn steps(&self) -> usize;
 
     /// Advances to exactly `until`.
-    ///
-    /// # Errors
-    /// If the motion is not reliable any more.
     fn advance(&mut self, until: f64) -> Result<(), Stopped>;
 
     /// The present state, with positions and velocities at the same instant.

@@ -7,45 +7,33 @@ use crate::relax::method::Method;
 use crate::relax::saddle::Saddle;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
+use crate::words::words;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Outcome {
-    /// At rest in a stable equilibrium, within the tolerance.
-    Converged,
-    /// As `Converged`, but a saddle was reached before: the leaf was pushed off along the
-    /// unstable mode and came to rest elsewhere.
-    ConvergedAfterSaddle,
-    /// At rest within the tolerance in an unstable equilibrium, as allowed by the options.
-    Saddle,
-    /// At rest, but the finest grid allowed does not reach the tolerance.
-    ToleranceNotReached,
-    /// The step limit was reached before rest.
-    NotAtRest,
-    /// The equations are singular: at a bifurcation, or where the leaf can move
-    /// without resistance.
-    Singular,
-    /// Energy grew beyond what the method allows, or a value was not finite.
-    Diverged,
+words! {
+    /// How a run ended.
+    pub enum Outcome {
+        /// At rest in a stable equilibrium, within the tolerance.
+        Converged = "converged",
+        /// As `Converged`, but a saddle was reached before: the leaf was pushed off along the
+        /// unstable mode and came to rest elsewhere.
+        ConvergedAfterSaddle = "converged-after-saddle",
+        /// At rest within the tolerance in an unstable equilibrium, as allowed by the options.
+        Saddle = "saddle",
+        /// At rest, but the finest grid allowed does not reach the tolerance.
+        ToleranceNotReached = "tolerance-not-reached",
+        /// The step limit was reached before rest.
+        NotAtRest = "not-at-rest",
+        /// The equations are singular: at a bifurcation, or where the leaf can move
+        /// without resistance.
+        Singular = "singular",
+        /// Energy grew beyond what the method allows, or a value was not finite.
+        Diverged = "diverged",
+    }
 }
 
 impl Outcome {
-    /// The name used in `summary.json`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Outcome::Converged => "converged",
-            Outcome::ConvergedAfterSaddle => "converged-after-saddle",
-            Outcome::Saddle => "saddle",
-            Outcome::ToleranceNotReached => "tolerance-not-reached",
-            Outcome::NotAtRest => "not-at-rest",
-            Outcome::Singular => "singular",
-            Outcome::Diverged => "diverged",
-        }
-    }
-
     /// Whether the leaf is at rest, to the tolerance or not.
     pub fn is_at_rest(self) -> bool {
         self.is_success() || self == Outcome::ToleranceNotReached

@@ -1,9 +1,6 @@
 //! The methods by which a leaf is brought to rest, each with its own options.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Serialize, Serializer};
+use crate::words::read_and_write;
 
 /// How a leaf is brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -89,12 +86,7 @@ impl Method {
     /// The method of this name, with default options. Names of earlier releases are accepted
     /// too.
     pub fn named(word: &str) -> Option<Method> {
-        let word = match word {
-            "multiple-shooting" => "shooting",
-            "relaxed-shooting" => "shooting-from-rest",
-            word => word,
-        };
-        Method::ALL.into_iter().find(|method| method.word() == word)
+        word.parse().ok()
     }
 
     /// Segments per rod of a fixed grid, if the method has one.
@@ -118,9 +110,6 @@ impl Method {
     }
 
     /// The same method with the given settings.
-    ///
-    /// # Errors
-    /// If the method does not have one of the settings.
     pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
         let Settings {
             segments,
@@ -176,17 +165,7 @@ impl From<SemiImplicit> for Method {
     }
 }
 
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.word())
-    }
-}
-
-impl Serialize for Method {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
-    }
-}
+read_and_write!(Method);
 
 /// Settings by name, whatever the method.
 #[derive(Clone, Copy, Debug, Default)]
@@ -210,22 +189,6 @@ pub struct Unfit {
     pub value: Option<usize>,
     /// Why, and what to change.
     pub why: &'static str,
-}
-
-/// An unknown method name.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{found}: must be one of {}", Method::ALL.map(Method::word).join(", "))]
-pub struct UnknownMethod {
-    /// The name.
-    pub found: String,
-}
-
-impl FromStr for Method {
-    type Err = UnknownMethod;
-
-    fn from_str(text: &str) -> Result<Self, UnknownMethod> {
-        Method::named(text).ok_or_else(|| UnknownMethod { found: text.into() })
-    }
 }
 
 #[cfg(test)]

@@ -42,6 +42,7 @@ pub use crate::bvp::Correction;
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
+pub use crate::words::UnknownWord as UnknownMethod;
 pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
@@ -50,7 +51,7 @@ pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
 pub(crate) use level::Level;
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
-pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
+pub use method::{Method, SemiImplicit, Settings, Unfit};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
 pub(crate) use number::Number;
 pub use options::{

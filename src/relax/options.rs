@@ -93,9 +93,6 @@ pub const MOST_MODES: usize = 100;
 pub const MAX_INTERVALS: usize = 4096;
 
 /// Checks that a tolerance is in range.
-///
-/// # Errors
-/// If it is not.
 pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
     match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         true => Ok(()),

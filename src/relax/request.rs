@@ -109,9 +109,6 @@ impl<'a> Relaxation<'a> {
     }
 
     /// Runs the relaxation.
-    ///
-    /// # Errors
-    /// As [`Scenario::relax`].
     pub fn run(mut self) -> Result<Equilibrium, RelaxError> {
         relax(self.scenario, &self.options, &mut self.progress)
     }

@@ -1,12 +1,37 @@
-//! The text report of a map.
+//! A map as text, and its rows as CSV, written and read.
 
-use std::fmt::Write;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
 
-use crate::study::{Map, MapOutcome};
+use csv::StringRecord;
 
+use super::FileError;
 use super::numbers::{brief, seconds};
-use super::table::{labelled, lay_out};
+use super::table::{csv_without_header, labelled, lay_out};
 use super::words::map_shows;
+use crate::study::{Map, MapOutcome, MapRequest, MapRow};
+
+/// The columns after those of the varied keys.
+const COLUMNS: [&str; 15] = [
+    "method",
+    "outcome",
+    "detail",
+    "index",
+    "tip_x",
+    "tip_y",
+    "tip_z",
+    "energy",
+    "error",
+    "error_estimate",
+    "margin_waves",
+    "margin_amplitude",
+    "twist",
+    "seconds",
+    "reference",
+];
 
 /// Most jumps that are listed.
 const JUMPS: usize = 5;
@@ -87,4 +112,94 @@ fn counts(map: &Map) -> Vec<String> {
         lines.push(line);
     }
     lines
+}
+
+/// `map.csv`: one row per cell and method.
+pub fn map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(&table(&map.request, &map.rows)?)
+}
+
+fn header(request: &MapRequest) -> StringRecord {
+    let keys = request.axes.iter().map(|axis| axis.keys.to_string());
+    keys.chain(COLUMNS.map(String::from)).collect()
+}
+
+/// The header and all rows.
+pub fn table(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
+    let mut table = csv_without_header(Vec::new());
+    table.write_record(&header(request))?;
+    let mut bytes = table.into_inner().map_err(|error| error.into_error())?;
+    bytes.extend(lines(request, rows)?);
+    Ok(bytes)
+}
+
+/// The rows alone, each a whole line.
+pub fn lines(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
+    let mut table = csv_without_header(Vec::new());
+    for row in rows {
+        // The columns of the axes, then those of the row.
+        table.serialize((request.texts(row.cell), row))?;
+    }
+    table.into_inner().map_err(|error| error.into_error())
+}
+
+/// Reads the rows of a file. Header lines may repeat, as in concatenated files. An
+/// unterminated last line, as left by a killed run, is ignored.
+pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileError> {
+    let bytes = fs::read(file).map_err(|reason| FileError::read(file, reason))?;
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n');
+    let bytes = &bytes[..whole.map_or(0, |end| end + 1)];
+    let cells: HashMap<Vec<String>, usize> = (0..request.cells())
+        .map(|cell| (request.texts(cell), cell))
+        .collect();
+    let header = header(request);
+    let mut table = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(bytes);
+    let mut rows = Vec::new();
+    for (count, record) in table.records().enumerate() {
+        let refuse = |line: u64, why: String| {
+            let change = "give the same --vary as when it was made, or another --out DIR";
+            let file = file.display();
+            FileError(format!(
+                "{file}:{line}: is no row of this map: {why}; {change}"
+            ))
+        };
+        let record = record.map_err(|error| refuse(count as u64 + 1, error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if record == header {
+            continue;
+        }
+        if count == 0 {
+            let wanted = header.iter().collect::<Vec<_>>().join(", ");
+            return Err(refuse(line, format!("the columns are not {wanted}")));
+        }
+        let row = row(&record, &header, request, &cells);
+        rows.push(row.map_err(|why| refuse(line, why))?);
+    }
+    Ok(rows)
+}
+
+fn row(
+    record: &StringRecord,
+    header: &StringRecord,
+    request: &MapRequest,
+    cells: &HashMap<Vec<String>, usize>,
+) -> Result<MapRow, String> {
+    if record.len() != header.len() {
+        return Err(format!("it has {} columns", record.len()));
+    }
+    let place = record.iter().take(request.axes.len());
+    let place: Vec<String> = place.map(String::from).collect();
+    let Some(&cell) = cells.get(&place) else {
+        return Err(format!("it has no cell {}", place.join(", ")));
+    };
+    match record.deserialize::<MapRow>(Some(header)) {
+        Ok(row) => Ok(MapRow { cell, ..row }),
+        Err(error) => Err(match error.kind() {
+            csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
+            _ => error.to_string(),
+        }),
+    }
 }

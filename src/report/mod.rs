@@ -5,13 +5,11 @@ pub mod base64;
 mod boundary;
 mod centerlines;
 mod chart;
-mod chart_table;
 mod check;
 mod error;
 mod fit;
 pub mod json;
 mod map;
-mod map_table;
 mod margin;
 pub mod numbers;
 mod relax;
@@ -21,7 +19,6 @@ mod sensitivity;
 mod simulate;
 pub mod table;
 mod trace;
-mod trace_table;
 pub mod words;
 
 use serde::Serialize;
@@ -33,18 +30,17 @@ pub use boundary::{
     boundary_table, is_special, lines as boundary_lines, report as boundary_report, sides,
 };
 pub use centerlines::{centerlines, modes_table};
-pub use chart::report as chart_report;
-pub use chart_table::{chart_table, scaling_table};
+pub use chart::{chart_table, report as chart_report, scaling_table};
 pub use check::report as check_report;
 pub use error::FileError;
 pub use fit::{fitted, report as fit_report, table as fit_table};
-pub use map::{Work as MapWork, report as map_report};
-pub use map_table::{lines, map_table, read_rows, table};
+pub use map::{Work as MapWork, lines, map_table, read_rows, report as map_report, table};
 pub use relax::{lines as relax_lines, report as relax_report};
 pub use sensitivity::table as sensitivity_table;
 pub use simulate::{lines as simulate_lines, report as simulate_report};
-pub use trace::{error_location, lines as trace_lines, report as trace_report, slope_unit};
-pub use trace_table::trace_table;
+pub use trace::{
+    error_location, lines as trace_lines, report as trace_report, slope_unit, trace_table,
+};
 
 /// A result with its input, as JSON: the content of a verb's file, and the output of
 /// `--json`.

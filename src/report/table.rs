@@ -37,9 +37,6 @@ pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
 
 /// Writes rows as CSV without a header; each may be a tuple of tuples and arrays, whose
 /// elements are its cells.
-///
-/// # Errors
-/// Those of `out`.
 pub fn append_csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
@@ -60,9 +57,6 @@ pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
 /// One table of several results, each given as its scenario's file, its exit status and
 /// its JSON, whose scalar values are the cells. Columns are named by their keys, those of
 /// nested objects by both keys (`work_steps`); lists are left out, except tips.
-///
-/// # Errors
-/// If a text is not JSON.
 pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut columns: Vec<String> = Vec::new();
     let mut rows: Vec<HashMap<String, String>> = Vec::new();

@@ -150,17 +150,4 @@ impl Rod {
         ];
         triples.into_iter().flatten().chain([&self.rest_stretch])
     }
-
-    /// The same, to be changed.
-    pub(crate) fn profiles_mut(&mut self) -> impl Iterator<Item = &mut Profile> {
-        let triples = [
-            &mut self.couple_stiffness,
-            &mut self.force_stiffness,
-            &mut self.rest_curvature,
-        ];
-        triples
-            .into_iter()
-            .flatten()
-            .chain([&mut self.rest_stretch])
-    }
 }

@@ -125,24 +125,6 @@ impl Profile {
         }
     }
 
-    /// The numbers that it is given by; none for a section.
-    pub(crate) fn numbers(&self) -> &[f64] {
-        match self {
-            Profile::Constant(value) => std::slice::from_ref(value),
-            Profile::Linear { value, .. } => value,
-            Profile::Section { .. } => &[],
-        }
-    }
-
-    /// The same, to be changed.
-    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
-        match self {
-            Profile::Constant(value) => std::slice::from_mut(value),
-            Profile::Linear { value, .. } => value,
-            Profile::Section { .. } => &mut [],
-        }
-    }
-
     /// Folds values that include the extremes.
     fn fold(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
@@ -154,7 +136,8 @@ impl Profile {
                 let values = section.samples(*property).map(|value| factor * value);
                 values.fold(start, with)
             }
-            _ => self.numbers().iter().copied().fold(start, with),
+            Profile::Constant(value) => with(start, *value),
+            Profile::Linear { value, .. } => value.iter().copied().fold(start, with),
         }
     }
 }

@@ -37,6 +37,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
+use crate::words::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;
@@ -45,23 +46,20 @@ const SEGMENTS: usize = 16;
 const EXPLICIT_SECONDS: f64 = 2e-8;
 const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
 
-/// The method of time integration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// [`Explicit`]: short, very cheap steps. Not for rigid rods.
-    Explicit,
-    /// [`SemiImplicit`]: steps as long as accuracy allows, for any stiffness.
-    SemiImplicit,
+words! {
+    /// The method of time integration.
+    pub enum Scheme {
+        /// [`Explicit`]: short, very cheap steps. Not for rigid rods.
+        Explicit = "explicit",
+        /// [`SemiImplicit`]: steps as long as accuracy allows, for any stiffness.
+        SemiImplicit = "semi-implicit",
+    }
 }
 
 impl Scheme {
     /// The name used on the command line and in `summary.json`.
     pub fn name(self) -> &'static str {
-        match self {
-            Scheme::Explicit => "explicit",
-            Scheme::SemiImplicit => "semi-implicit",
-        }
+        self.word()
     }
 }
 
@@ -98,9 +96,6 @@ pub struct Simulation {
 
 impl Simulation {
     /// The leaf at time 0.
-    ///
-    /// # Errors
-    /// If a request cannot be met.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)

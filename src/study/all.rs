@@ -92,9 +92,6 @@ impl Serialize for Found {
 /// and to the equilibrium, stable or not, that Newton's method finds. No number of
 /// starts can prove that there are no other equilibria. If `limit` is reached, the result is
 /// what has been found until then.
-///
-/// # Errors
-/// Requests that cannot be met.
 pub fn all(
     scenario: &Scenario,
     how: SemiImplicit,

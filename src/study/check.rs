@@ -6,13 +6,13 @@ pub use shot::Shot;
 
 use serde::Serialize;
 
-use super::judge::{fine_grid, index_at, nearest_indices, timed, with_nodes_of};
-use super::words::words;
+use super::judge::{common, fine_grid, index_at, timed, with_nodes_of};
 use crate::bvp::{self, Solution, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
+use crate::words::words;
 use shot::relaxation;
 
 /// Rotations may differ by this many times the tolerance (in radians) before
@@ -46,24 +46,16 @@ pub enum Verdict {
     NotCompared(String),
 }
 
-/// The quantities compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Positions of the centerlines.
-    Position,
-    /// Rotations of the directors.
-    Rotation,
-    /// Stress resultants n.
-    Force,
-    /// Stress couples m.
-    Moment,
-}
-
 words! {
-    Quantity {
+    /// The quantities compared.
+    pub enum Quantity {
+        /// Positions of the centerlines.
         Position = "position",
+        /// Rotations of the directors.
         Rotation = "rotation",
+        /// Stress resultants n.
         Force = "force",
+        /// Stress couples m.
         Moment = "moment",
     }
 }
@@ -138,10 +130,13 @@ impl Check {
     }
 
     fn compare(&mut self) {
-        self.along = match self.solution() {
-            Some(solution) => differences(&self.relaxed, solution),
-            None => Vec::new(),
+        let rods = self.differences();
+        let stations = 0..rods.first().map_or(0, Vec::len);
+        let largest = |i| {
+            let rods = rods.iter().map(|along: &Vec<Difference>| along[i]);
+            rods.fold(Difference::default(), Difference::max)
         };
+        self.along = stations.map(largest).collect();
         self.difference = self.along.iter().copied().reduce(Difference::max);
         self.within_estimates = self.differs_within_estimates();
         self.verdict = self.judge();
@@ -184,24 +179,30 @@ impl Check {
 
     /// The place at which a quantity differs most.
     pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
-        let solution = self.solution()?;
-        let indices = nearest_indices(&self.stations, &solution.stations);
-        let rods = self
-            .relaxed
-            .shape
-            .rods
-            .iter()
-            .zip(&solution.rods)
-            .enumerate();
-        let found = rods.flat_map(|(rod, (a, b))| {
-            let nodes = a.nodes.iter().zip(&indices).zip(&self.stations);
-            nodes.map(move |((a, &index), &sigma)| {
-                let difference = quantity.of(&Difference::of(a, &b.nodes[index]));
-                (difference, Place { rod, sigma })
-            })
+        let rods = self.differences().into_iter().enumerate();
+        let found = rods.flat_map(|(rod, along)| {
+            let along = along.into_iter().zip(&self.stations);
+            along.map(move |(found, &sigma)| (quantity.of(&found), Place { rod, sigma }))
         });
         let farther = |a: (f64, Place), b: (f64, Place)| if b.0 > a.0 { b } else { a };
         found.reduce(farther).map(|(_, place)| place)
+    }
+
+    /// Differences of each rod at each station of the relaxed leaf, which are among those of the
+    /// solution: matched by station, since another grid with as many segments may divide the
+    /// panels between knots differently. Empty without a solution.
+    fn differences(&self) -> Vec<Vec<Difference>> {
+        let Some(solution) = self.solution() else {
+            return Vec::new();
+        };
+        let both = common(&self.stations, &solution.stations);
+        let rods = self.relaxed.shape.rods.iter().zip(&solution.rods);
+        rods.map(|(a, b)| {
+            let both = both.iter();
+            both.map(|&(i, j)| Difference::of(&a.nodes[i], &b.nodes[j]))
+                .collect()
+        })
+        .collect()
     }
 
     /// Distance of positions up to which the shapes count as the same, in
@@ -217,9 +218,6 @@ impl Check {
 }
 
 /// Relaxes a leaf, solves its boundary-value problem from there, and compares.
-///
-/// # Errors
-/// Requests that cannot be met, as in [`relax::relax`].
 pub fn check(
     scenario: &Scenario,
     options: &CheckOptions,
@@ -282,22 +280,6 @@ fn shoot(
         found,
         wall_seconds,
     }
-}
-
-/// Largest differences over all rods at each station of the relaxed leaf, which
-/// are among those of the solution: matched by station, since another grid with as many
-/// segments may divide the panels between knots differently.
-fn differences(relaxed: &Equilibrium, solution: &Solution) -> Vec<Difference> {
-    let leaf = &relaxed.shape;
-    let rods = || leaf.rods.iter().zip(&solution.rods);
-    let indices = nearest_indices(&leaf.stations, &solution.stations);
-    (indices.into_iter().enumerate())
-        .map(|(i, index)| {
-            rods()
-                .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[index]))
-                .fold(Difference::default(), Difference::max)
-        })
-        .collect()
 }
 
 #[cfg(test)]

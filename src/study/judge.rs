@@ -64,9 +64,6 @@ impl From<Equilibrium> for Answer {
 
 impl Answer {
     /// Relaxes a leaf.
-    ///
-    /// # Errors
-    /// Requests that the method does not support.
     pub fn relaxed(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
         relax::relax(scenario, options, &mut |_| {}).map(Answer::from)
     }
@@ -213,19 +210,6 @@ pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
     common
 }
 
-/// For each station the index of the nearest one in an ascending list.
-pub fn nearest_indices(stations: &[f64], list: &[f64]) -> Vec<usize> {
-    let nearest = |&station: &f64| {
-        let after = list.partition_point(|&other| other < station);
-        let before = after.saturating_sub(1);
-        match list.get(after) {
-            Some(other) if other - station < station - list[before] || after == 0 => after,
-            _ => before,
-        }
-    };
-    stations.iter().map(nearest).collect()
-}
-
 /// The nodes of a grid and those of `others` that are not among them.
 pub fn with_nodes_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
     let shared: Vec<usize> = common(others, grid).into_iter().map(|(i, _)| i).collect();
@@ -243,16 +227,16 @@ pub fn union(mut stations: Vec<f64>) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
     use crate::shape::NodeState;
 
-    /// One straight rod, stretched.
-    fn answer(stations: &[f64], x: impl Fn(f64) -> f64) -> Answer {
+    /// One rod with its nodes here and without rotation.
+    pub fn rod(stations: &[f64], length: f64, position: impl Fn(f64) -> DVec3) -> Answer {
         let node = |&sigma: &f64| NodeState {
-            position: x(sigma) * DVec3::X,
+            position: position(sigma),
             rotation: DQuat::IDENTITY,
             v: DVec3::X,
             u: DVec3::ZERO,
@@ -264,7 +248,7 @@ mod tests {
             remark: None,
             stations: stations.to_vec(),
             rods: vec![RodShape {
-                length: 1.0,
+                length,
                 nodes: stations.iter().map(node).collect(),
             }],
             energy: 0.0,
@@ -273,6 +257,10 @@ mod tests {
             undulation: Undulation::default(),
             work: Work::default(),
         }
+    }
+
+    fn answer(stations: &[f64], x: impl Fn(f64) -> f64) -> Answer {
+        rod(stations, 1.0, |sigma| x(sigma) * DVec3::X)
     }
 
     #[test]
@@ -300,6 +288,5 @@ mod tests {
         let others = [0.0, 0.2, 0.5 + 1e-16, 1.0];
         let all = with_nodes_of(&stations, &others);
         assert_eq!(all, [0.0, 0.2, 0.3, 0.5, 1.0]);
-        assert_eq!(nearest_indices(&others, &all), [0, 1, 3, 4]);
     }
 }

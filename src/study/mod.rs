@@ -11,8 +11,8 @@ mod margin;
 mod sensitivity;
 mod trace;
 mod vary;
-mod words;
 
+pub use crate::words::UnknownWord;
 pub use all::{All, Found, IN_VAIN, all};
 pub use boundary::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, CurveEnd, LeafBeside,
@@ -38,4 +38,3 @@ pub use trace::{
     TraceRequest, TraceShow, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};
-pub use words::UnknownWord;

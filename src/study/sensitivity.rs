@@ -24,9 +24,6 @@ pub enum SensitivityError {
 /// Relaxes the leaf of `base` and computes the derivatives of its tip, its energy and its lowest
 /// eigenvalue with respect to these numbers of its scenario, as
 /// [`Equilibrium::sensitivities`]; none if the leaf is not at rest.
-///
-/// # Errors
-/// Requests that cannot be met.
 pub fn relax_with_sensitivities(
     base: &Base,
     keys: &[Keys],

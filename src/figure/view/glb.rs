@@ -30,9 +30,6 @@ const ARRAY: u32 = 34962;
 const ELEMENT_ARRAY: u32 = 34963;
 
 /// A leaf at rest.
-///
-/// # Errors
-/// Those of `out`.
 pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let radius = RADIUS * equilibrium.shape.longest();
     let curves = &equilibrium.shape.curves;
@@ -40,9 +37,6 @@ pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// A moving leaf.
-///
-/// # Errors
-/// Those of `out`.
 pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let film = &record.film;
     let last = film.len().saturating_sub(1);

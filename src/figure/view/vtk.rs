@@ -20,9 +20,6 @@ struct Array<'a>(&'a str, usize, Vec<f64>);
 
 /// A leaf at rest: per node its vein, place along it, directors, strains, forces and
 /// moments, and the radius where sections are given.
-///
-/// # Errors
-/// Those of `out`.
 pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let nodes = || shape.rods.iter().flat_map(|rod| &rod.nodes);
@@ -48,9 +45,6 @@ pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io
 
 /// Centrelines alone, with the vein, the place along it and the radius where sections
 /// are given.
-///
-/// # Errors
-/// Those of `out`.
 pub fn curves(
     curves: &[Vec<DVec3>],
     stations: &[f64],
@@ -73,25 +67,15 @@ pub(crate) fn part(list: &str, number: usize) -> String {
     format!("{}_vtp/{number:05}.vtp", stem.display())
 }
 
-/// The list of this name.
+/// The list of this name: shapes by time, or by a number that varies in its place.
 pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Result<()> {
-    let files = shapes.iter().enumerate();
-    let files: Vec<_> = files.map(|(k, shape)| (shape.0, part(name, k))).collect();
-    series(&files, out)
-}
-
-/// Lists files by time, or by a number that varies in its place.
-///
-/// # Errors
-/// Those of `out`.
-pub fn series(files: &[(f64, String)], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
         out,
         "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>"
     )?;
-    for (time, file) in files {
-        let file = escaped(file);
+    for (k, shape) in shapes.iter().enumerate() {
+        let (time, file) = (shape.0, escaped(&part(name, k)));
         writeln!(
             out,
             "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>"

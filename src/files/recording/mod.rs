@@ -83,9 +83,6 @@ impl Recording {
     /// Begins the files of a simulation in `folder`, which is created if missing, with the
     /// current state of the leaf. Without tables and figures nothing is written during
     /// the run, and there is nothing to resume.
-    ///
-    /// # Errors
-    /// If they cannot be written.
     pub fn begin(
         folder: &Path,
         simulation: &mut Simulation,
@@ -167,9 +164,6 @@ impl Recording {
     }
 
     /// Adds an output: the current state of `simulation`.
-    ///
-    /// # Errors
-    /// If it cannot be written.
     pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), FileError> {
         self.moments.push(Moment::of(frame, self.joined));
         let Some([motion, energy]) = &mut self.growing else {

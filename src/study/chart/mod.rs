@@ -63,9 +63,6 @@ pub enum ChartError {
 }
 
 /// Charts speed against accuracy for a leaf. Everything runs on one thread.
-///
-/// # Errors
-/// Requests that cannot be met.
 pub fn chart(
     scenario: &Scenario,
     options: &ChartOptions,

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use crate::relax::Method;
 use crate::scenario::Scenario;
-use crate::study::words::read_and_write;
+use crate::words::read_and_write;
 
 /// A method for an equilibrium, with one setting for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

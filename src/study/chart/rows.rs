@@ -185,13 +185,11 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
 
 #[cfg(test)]
 mod tests {
-    use glam::{DQuat, DVec3};
+    use glam::DVec3;
 
     use super::super::plan;
     use super::*;
-    use crate::relax::Work;
-    use crate::shape::{NodeState, RodShape};
-    use crate::undulation::Undulation;
+    use crate::study::judge::tests::rod;
 
     const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
@@ -207,27 +205,13 @@ mod tests {
     /// Straight but for a shift of its tip; the estimate is relative to the length
     /// of 2.
     fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Answer {
-        let node = |sigma: f64| NodeState {
-            position: DVec3::new(2.0 * sigma, 0.0, shift * sigma),
-            rotation: DQuat::IDENTITY,
-            v: DVec3::X,
-            u: DVec3::ZERO,
-            n: DVec3::ZERO,
-            m: DVec3::ZERO,
-        };
         Answer {
             outcome,
             remark: Some("why".into()),
-            stations: STATIONS.to_vec(),
-            rods: vec![RodShape {
-                length: 2.0,
-                nodes: STATIONS.map(node).to_vec(),
-            }],
-            energy: 0.0,
-            index: None,
             error_estimate: estimate.map(|estimate| 2.0 * estimate),
-            undulation: Undulation::default(),
-            work: Work::default(),
+            ..rod(&STATIONS, 2.0, |sigma| {
+                DVec3::new(2.0 * sigma, 0.0, shift * sigma)
+            })
         }
     }
 

@@ -8,9 +8,6 @@ use crate::study::judge::{Answer, timed};
 
 /// Runs a cell; also returns the time from the checked scenario to the result,
 /// in seconds.
-///
-/// # Errors
-/// If the contender does not support the request.
 pub fn run(cell: &Cell) -> Result<(Answer, f64), RelaxError> {
     let (tolerance, segments) = match cell.knob {
         Setting::Tolerance(tolerance) => (Some(tolerance), None),

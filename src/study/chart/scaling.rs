@@ -37,9 +37,6 @@ pub struct ScalingRow {
 /// Measures all contenders on these leaves, from few veins to many, at one
 /// tolerance. A contender on one grid gets the coarsest that is accurate
 /// enough.
-///
-/// # Errors
-/// Requests that cannot be met.
 pub fn scaling(
     leaves: &[Scenario],
     tolerance: f64,

@@ -1,11 +1,8 @@
 //! A leaf at rest under the conditions of one experiment, its predictions for the data, and
 //! their derivatives.
 
-use std::sync::{Arc, OnceLock};
-
 use glam::DVec3;
 
-use super::change::Change;
 use super::data::{Experiment, Measured, Origin, Traced};
 use super::quantity::{Kind, Quantity};
 use super::responses::Responses;
@@ -15,7 +12,6 @@ use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
-use crate::scenario::Scenario;
 use crate::study::Keys;
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
@@ -28,10 +24,6 @@ pub(super) struct Case {
     pub measured: Vec<Measured>,
     pub traced: Vec<Traced>,
     pub origin: Option<Origin>,
-    /// Derivatives of its scenario with respect to each free number, if they are constant.
-    pub changes: OnceLock<Option<Vec<Change>>>,
-    /// Its scenario with the initial values of the free numbers.
-    pub start: OnceLock<Arc<Scenario>>,
     /// Whether it differs from the other experiments by loads only: it then has the same
     /// derivatives with respect to the free numbers.
     pub loaded_only: bool,
@@ -99,8 +91,6 @@ impl Case {
             measured: experiment.measured,
             traced: Vec::new(),
             origin: experiment.origin,
-            changes: OnceLock::new(),
-            start: OnceLock::new(),
         }
     }
 

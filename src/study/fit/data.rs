@@ -165,9 +165,6 @@ impl<'t> Table<'t> {
 
 impl Data {
     /// Adds a file of measured data; `veins` is the number of rods.
-    ///
-    /// # Errors
-    /// If the format is wrong.
     pub fn read(&mut self, text: &str, file: &str, veins: usize) -> Result<(), FitError> {
         let table = Table::of(text, file)?;
         match table.header.contains(&"rod") {
@@ -235,9 +232,6 @@ impl Data {
 }
 
 /// Candidate experiments: like those made, but without measured values.
-///
-/// # Errors
-/// If the format of the table is wrong.
 pub fn candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
     experiments(&Table::of(text, file)?, true, 0)
 }

@@ -1,16 +1,18 @@
 //! Derivatives of the components of a point with respect to the free numbers.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use super::case::{CaseAt, Compared, Component};
-use super::change::Change;
 use super::model::{Model, Point};
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
 use crate::scenario::Scenario;
+
+/// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
+pub(super) type Change = Vec<(f64, Scenario)>;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
@@ -39,16 +41,10 @@ impl Model<'_> {
         let of = &self.cases[case];
         let fixed = self.values(of, theta);
         let first = fixed.len() - theta.len();
-        // With unchanged numbers all cases have the same scenario.
-        let here: OnceLock<Option<Arc<Scenario>>> = OnceLock::new();
         let made: Vec<_> = (0..theta.len())
             .map(|k| {
-                let (fixed, here) = (&fixed, &here);
+                let fixed = &fixed;
                 move |value: f64| -> Option<Scenario> {
-                    if value == fixed[first + k].1 {
-                        let here = here.get_or_init(|| self.scenario(of, theta).ok());
-                        return here.as_deref().cloned();
-                    }
                     let mut values = fixed.clone();
                     values[first + k].1 = value;
                     Some(self.base.at(&values).ok()?.scenario)
@@ -63,10 +59,7 @@ impl Model<'_> {
                 linear: free.keys.is_linear(),
             })
             .collect();
-        let changes = || -> Option<Vec<Change>> {
-            let changes = numbers.iter().map(|number| number.rate().map(Arc::new));
-            changes.collect()
-        };
+        let changes = || -> Option<Vec<Change>> { numbers.iter().map(Number::rate).collect() };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
         let leaf = &found.at.levels[0].leaf.leaf;
         let own: Vec<Change>;
@@ -76,11 +69,7 @@ impl Model<'_> {
             let changes = changes.ok_or_else(at_limit)?;
             shared.get_or_init(|| rates(leaf, changes))
         } else {
-            let found = match self.linear {
-                true => of.changes.get_or_init(changes).clone(),
-                false => changes(),
-            };
-            own = found.ok_or_else(at_limit)?;
+            own = changes().ok_or_else(at_limit)?;
             own_rates = rates(leaf, &own);
             &own_rates
         };

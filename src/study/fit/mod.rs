@@ -7,7 +7,6 @@
 
 mod candidates;
 mod case;
-mod change;
 mod coarse;
 mod data;
 mod derivatives;
@@ -95,9 +94,6 @@ pub struct FitRequest {
 
 impl FitRequest {
     /// Reads candidate experiments from a table like that of experiments.
-    ///
-    /// # Errors
-    /// If the format is wrong.
     pub fn read_candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
         data::candidates(text, file)
     }

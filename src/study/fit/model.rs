@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::FitError;
 use super::case::{Case, CaseAt, Component};
-use super::change::{Addition, Change};
 use super::data::{Data, Experiment, Measured, Origin};
+use super::derivatives::Change;
 use super::free::Coordinate;
 use super::quantity::Kind;
 use crate::newton::Work;
@@ -35,8 +35,6 @@ pub(super) struct Model<'a> {
     pub linear: bool,
     /// The derivatives of scenarios with respect to the free numbers, if common to all.
     pub changes: Arc<OnceLock<Option<Vec<Change>>>>,
-    /// The same as increments.
-    pub additions: Arc<OnceLock<Option<Vec<Addition>>>>,
 }
 
 /// The leaves of all experiments.
@@ -150,7 +148,6 @@ impl<'a> Model<'a> {
             grids: Grids::AsNeeded,
             linear: is_linear(coordinates),
             changes: Arc::default(),
-            additions: Arc::default(),
         })
     }
 
@@ -164,41 +161,10 @@ impl<'a> Model<'a> {
 
     /// The scenario of an experiment.
     pub(super) fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Arc<Scenario>, FitError> {
-        if let Some(scenario) = self.by_additions(case, theta) {
-            return Ok(Arc::new(scenario));
+        match self.base.at(&self.values(case, theta)) {
+            Ok(varied) => Ok(Arc::new(varied.scenario)),
+            Err(refused) => Err(FitError::Data(format!("{}{refused}", case.place()))),
         }
-        let values = self.values(case, theta);
-        let made = self.base.at(&values).map(|varied| varied.scenario);
-        let made = made.map_err(|refused| FitError::Data(format!("{}{refused}", case.place())))?;
-        let made = Arc::new(made);
-        if self.starts(theta) {
-            return Ok(Arc::clone(case.start.get_or_init(|| made)));
-        }
-        Ok(made)
-    }
-
-    /// Whether the numbers are the initial ones.
-    fn starts(&self, theta: &[f64]) -> bool {
-        (self.coordinates.iter().zip(theta)).all(|(free, theta)| free.start == *theta)
-    }
-
-    /// The same if all scenarios are linear in the free numbers, with the same derivatives.
-    fn by_additions(&self, case: &Case, theta: &[f64]) -> Option<Scenario> {
-        let start = case.start.get()?;
-        let changes = self.changes.get()?.as_ref()?;
-        if !case.loaded_only {
-            return None;
-        }
-        let additions = self.additions.get_or_init(|| {
-            let additions = changes.iter().map(|change| Addition::new(change));
-            additions.collect()
-        });
-        let mut scenario = Scenario::clone(start);
-        let steps = self.coordinates.iter().zip(theta);
-        for ((free, theta), addition) in steps.zip(additions.as_ref()?) {
-            addition.add(&mut scenario, free.value(*theta) - free.value(free.start));
-        }
-        Some(scenario)
     }
 
     /// The leaves at rest, relaxed from their usual starts.

@@ -5,23 +5,16 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::newton::Work;
-use crate::study::words::words;
-
-/// How a fit ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FitOutcome {
-    /// At a minimum, and the data determine every free number.
-    Converged,
-    /// Not at a minimum.
-    NotConverged,
-    /// At a minimum, but some number or combination of numbers is not determined.
-    Undetermined,
-}
+use crate::words::words;
 
 words! {
-    FitOutcome {
+    /// How a fit ended.
+    pub enum FitOutcome {
+        /// At a minimum, and the data determine every free number.
         Converged = "converged",
+        /// Not at a minimum.
         NotConverged = "not-converged",
+        /// At a minimum, but some number or combination of numbers is not determined.
         Undetermined = "undetermined",
     }
 }

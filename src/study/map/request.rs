@@ -44,9 +44,6 @@ pub struct MapRefused(String);
 impl MapRequest {
     /// Validates the request. Default `methods`: all, explicit motion only if
     /// its time step is set or varies.
-    ///
-    /// # Errors
-    /// If no such map can be made.
     pub fn new(
         base: Base,
         axes: Vec<Vary>,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::relax::Method;
 use crate::study::judge::Answer;
-use crate::study::words::{read_and_write, words};
+use crate::words::{read_and_write, words};
 
 /// The methods that are compared, in the order of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -60,80 +60,62 @@ impl PartialOrd for MapMethod {
     }
 }
 
-/// Outcome of a method.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum MapOutcome {
-    /// At rest in the reference equilibrium, within both error estimates.
-    Right,
-    /// At rest in another equilibrium, not known to be unstable.
-    OtherEquilibrium,
-    /// At rest in an unstable equilibrium.
-    Saddle,
-    /// In the same equilibrium, but further from the reference than both
-    /// error estimates allow.
-    Inaccurate,
-    /// Not at rest, or not within the tolerance.
-    NotConverged,
-    /// Values grew without bound, or no step lowered the energy.
-    Diverged,
-    /// The method or the format refuses such a leaf.
-    #[default]
-    Refused,
-    /// The time limit was exceeded.
-    OutOfTime,
+words! {
+    /// Outcome of a method.
+    #[derive(Default, PartialOrd, Ord, Hash)]
+    pub enum MapOutcome {
+        /// At rest in the reference equilibrium, within both error estimates.
+        Right = "right",
+        /// At rest in another equilibrium, not known to be unstable.
+        OtherEquilibrium = "other-equilibrium",
+        /// At rest in an unstable equilibrium.
+        Saddle = "saddle",
+        /// In the same equilibrium, but further from the reference than both
+        /// error estimates allow.
+        Inaccurate = "inaccurate",
+        /// Not at rest, or not within the tolerance.
+        NotConverged = "not-converged",
+        /// Values grew without bound, or no step lowered the energy.
+        Diverged = "diverged",
+        /// The method or the format refuses such a leaf.
+        #[default]
+        Refused = "refused",
+        /// The time limit was exceeded.
+        OutOfTime = "out-of-time",
+    }
 }
 
 /// An answer at rest within the tolerance, or an outcome and a sentence that say why there
 /// is none.
 pub type Found = Result<Answer, (MapOutcome, String)>;
 
-/// Reliability of the reference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Confidence {
-    /// Relaxation and shooting from there agree within both error estimates,
-    /// and so do their numbers of negative eigenvalues.
-    Confirmed,
-    /// They do not: the reference is the shooting solution if that is a stable
-    /// equilibrium, otherwise the relaxed leaf.
-    Unconfirmed,
-    /// The relaxation did not come to rest.
-    #[default]
-    None,
-}
-
-/// What the figure of a map shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MapShow {
-    /// The outcome of each method.
-    #[default]
-    Outcomes,
-    /// The number of waves along the margins of stable answers.
-    Waves,
-}
-
-read_and_write!(MapMethod);
-
 words! {
-    MapOutcome {
-        Right = "right",
-        OtherEquilibrium = "other-equilibrium",
-        Saddle = "saddle",
-        Inaccurate = "inaccurate",
-        NotConverged = "not-converged",
-        Diverged = "diverged",
-        Refused = "refused",
-        OutOfTime = "out-of-time",
-    }
-    Confidence {
+    /// Reliability of the reference.
+    #[derive(Default, PartialOrd, Ord, Hash)]
+    pub enum Confidence {
+        /// Relaxation and shooting from there agree within both error estimates,
+        /// and so do their numbers of negative eigenvalues.
         Confirmed = "confirmed",
+        /// They do not: the reference is the shooting solution if that is a stable
+        /// equilibrium, otherwise the relaxed leaf.
         Unconfirmed = "unconfirmed",
+        /// The relaxation did not come to rest.
+        #[default]
         None = "none",
     }
-    MapShow {
+
+    /// What the figure of a map shows.
+    #[derive(Default)]
+    pub enum MapShow {
+        /// The outcome of each method.
+        #[default]
         Outcomes = "outcomes",
+        /// The number of waves along the margins of stable answers.
         Waves = "waves",
     }
 }
+
+read_and_write!(MapMethod);
 
 /// One method in one cell: a row of `map.csv`, in the order of its columns.
 /// Lengths except the tip's coordinates are relative to the longest rod.

@@ -72,9 +72,6 @@ const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any 
 
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
-///
-/// # Errors
-/// Requests that cannot be met.
 pub fn relax_with_margin(
     scenario: &Scenario,
     options: &Options,

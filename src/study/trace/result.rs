@@ -8,8 +8,8 @@ use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
-use crate::study::words::words;
 use crate::undulation::Undulation;
+use crate::words::words;
 
 /// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -114,36 +114,24 @@ impl TracePoint {
     }
 }
 
-/// What the figure of a trace shows against the number that varies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TraceShow {
-    /// A coordinate of the tip; of the first one if they are free.
-    TipX,
-    /// Its y.
-    TipY,
-    /// Its z.
-    TipZ,
-    /// A component of the reaction at held tips.
-    ReactionX,
-    /// Its y.
-    ReactionY,
-    /// Its z.
-    ReactionZ,
-    /// The potential energy.
-    Energy,
-    /// The mean twist of the veins, in radians.
-    Twist,
-}
-
 words! {
-    TraceShow {
+    /// What the figure of a trace shows against the number that varies.
+    pub enum TraceShow {
+        /// A coordinate of the tip; of the first one if they are free.
         TipX = "x",
+        /// Its y.
         TipY = "y",
+        /// Its z.
         TipZ = "z",
+        /// A component of the reaction at held tips.
         ReactionX = "reaction_x",
+        /// Its y.
         ReactionY = "reaction_y",
+        /// Its z.
         ReactionZ = "reaction_z",
+        /// The potential energy.
         Energy = "energy",
+        /// The mean twist of the veins, in radians.
         Twist = "twist",
     }
 }

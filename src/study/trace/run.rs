@@ -33,9 +33,6 @@ pub fn trace(
 }
 
 /// The same; `observe` is called with each branch as it was followed.
-///
-/// # Errors
-/// As above.
 pub fn trace_observed(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),

@@ -29,17 +29,11 @@ pub struct Varied {
 impl Base {
     /// Reads the file at `path`, with the entries `overrides` replaced
     /// (`KEY=VALUE`, as in `--set`, or `method.segments=16`).
-    ///
-    /// # Errors
-    /// If the scenario is invalid.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, VaryError> {
         Base::of_text(scenario::text(path)?, path.display().to_string(), overrides)
     }
 
     /// The same from a text; messages call it `file`.
-    ///
-    /// # Errors
-    /// If the scenario is invalid.
     pub fn of_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
         let mut knobs = Knobs::default();
         let mut of_scenario = Vec::new();

@@ -10,9 +10,30 @@ pub struct UnknownWord {
     pub allowed: Vec<&'static str>,
 }
 
-/// Defines `ALL` and `word()` for an enum, on which everything else is based.
+/// The word that replaces one of an earlier release; any other stays.
+pub fn current(word: &str) -> &str {
+    match word {
+        "multiple-shooting" => "shooting",
+        "relaxed-shooting" => "shooting-from-rest",
+        word => word,
+    }
+}
+
+/// Declares an enum by the words for its variants, with `ALL` and `word()`, on which everything
+/// else is based.
 macro_rules! words {
-    ($($type:ident { $($variant:ident = $word:literal),* $(,)? })*) => {$(
+    ($(
+        $(#[$about:meta])*
+        pub enum $type:ident {
+            $($(#[$of:meta])* $variant:ident = $word:literal,)*
+        }
+    )*) => {$(
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $type {
+            $($(#[$of])* $variant,)*
+        }
+
         impl $type {
             /// All of them.
             pub const ALL: [$type; [$($word),*].len()] = [$($type::$variant),*];
@@ -25,7 +46,7 @@ macro_rules! words {
             }
         }
 
-        $crate::study::words::read_and_write!($type);
+        $crate::words::read_and_write!($type);
     )*};
 }
 
@@ -39,13 +60,12 @@ macro_rules! read_and_write {
         }
 
         impl std::str::FromStr for $type {
-            type Err = $crate::study::words::UnknownWord;
+            type Err = $crate::words::UnknownWord;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
-                // The words of earlier releases are accepted for methods.
-                let word = $crate::relax::Method::named(text).map_or(text, |it| it.word());
+                let word = $crate::words::current(text);
                 let found = Self::ALL.into_iter().find(|it| it.word() == word);
-                found.ok_or_else(|| $crate::study::words::UnknownWord {
+                found.ok_or_else(|| $crate::words::UnknownWord {
                     found: text.into(),
                     allowed: Self::ALL.map(|it| it.word()).to_vec(),
                 })
@@ -67,4 +87,4 @@ macro_rules! read_and_write {
     };
 }
 
-pub(super) use {read_and_write, words};
+pub(crate) use {read_and_write, words};
