@@ -114,9 +114,10 @@ impl Request {
             factors.fold(each, u64::saturating_mul)
         };
         match self {
-            // 1750 measured for one rod of many segments, 2700 for many rods of few.
+            // Measured: 1750 for one rod of many segments and 2700 for many rods of few; 5600 for
+            // one rod with eigenvalues, which take up to 52 fields.
             Request::Grid { rods, segments } => {
-                product([rods, segments.saturating_add(1), 1], 2_700)
+                product([rods, segments.saturating_add(1), 1], 6_000)
             }
             Request::Branches { rods, segments } => product([rods, segments, 1], 27_000),
             // Measured: five matrices of (12 N)^2 numbers per interval.

@@ -14,7 +14,7 @@ fn what_takes_more_memory_than_is_allowed_is_refused() {
     workplace::all_refused(
         "relax leaf.toml",
         "
-        --segments 100000 --memory 100MB => 5 rods of 100000 segments would take about 1.4 GB of memory, and 100.0 MB are allowed: use fewer rods or segments, or raise the limit with --memory
+        --segments 100000 --memory 100MB => 5 rods of 100000 segments would take about 3.0 GB of memory, and 100.0 MB are allowed: use fewer rods or segments, or raise the limit with --memory
         --segments 1000 --memory 1e6 => and 1.0 MB are allowed
         --method shooting --memory 250kB => use fewer rods or intervals
         --method shooting --intervals 4000 --memory 500MB => shooting with 5 rods, intervals: 4000, would
@@ -42,7 +42,7 @@ fn as_much_as_is_allowed_is_used_and_no_more() {
     let place = Workplace::new();
     place.ok("relax leaf.toml --segments 100 --memory 10MB");
     // Refinement ends where memory does, and says so by its outcome.
-    let summary = place.told(1, "relax leaf.toml --tolerance 1e-11 --memory 600kB");
+    let summary = place.told(1, "relax leaf.toml --tolerance 1e-11 --memory 1300kB");
     assert_eq!(summary["outcome"], "tolerance-not-reached");
     let grids = summary["segments"].list();
     assert!(grids.iter().all(|n| n.count() <= 32), "{grids:?}");

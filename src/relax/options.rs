@@ -124,7 +124,7 @@ pub enum RelaxError {
     },
     /// Too many nodes.
     #[error(
-        "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (about 6 GB); use fewer rods or segments"
+        "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (7 to 24 GB); use fewer rods or segments"
     )]
     TooManyNodes {
         /// Number of rods.
