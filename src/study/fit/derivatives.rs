@@ -5,14 +5,11 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::case::{CaseAt, Compared, Component};
-use super::model::{Model, Point};
+use super::model::{Change, Model, Point};
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
 use crate::scenario::Scenario;
-
-/// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
-pub(super) type Change = Vec<(f64, Scenario)>;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;

@@ -8,13 +8,15 @@ use rayon::prelude::*;
 use super::FitError;
 use super::case::{Case, CaseAt, Component};
 use super::data::{Data, Experiment, Measured, Origin};
-use super::derivatives::Change;
 use super::free::Coordinate;
 use super::quantity::Kind;
 use crate::newton::Work;
 use crate::relax::{AtRest, Grids, Lost, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
+
+/// Derivative of a scenario with respect to a number: scenarios with finite-difference weights.
+pub(super) type Change = Vec<(f64, Scenario)>;
 
 /// Largest error of a prediction during a search, in standard deviations of its datum.
 pub(super) const INSIGNIFICANT: f64 = 0.05;
