@@ -163,8 +163,8 @@ fn every_summary_holds_the_version_and_the_scenario() {
 #[test]
 fn a_scenario_can_come_on_standard_input() {
     let place = Workplace::new();
-    let fed = |text: &str| {
-        let mut command = place.command("relax - --json --set leaf.rods=2");
+    let fed_to = |verb: &str, text: &str| {
+        let mut command = place.command(verb);
         let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
         let mut input = child.stdin.take().unwrap();
@@ -172,11 +172,21 @@ fn a_scenario_can_come_on_standard_input() {
         drop(input);
         Run::from(child.wait_with_output().unwrap())
     };
+    let fed = |text: &str| fed_to("relax - --json --set leaf.rods=2", text);
     contains(&fed("").ends(2).err, &["standard input: name is missing"]);
     let found = fed(&leaf("piped", 5)).ends(0).json();
     assert_eq!(found["scenario"], "piped");
     assert_eq!(found["rods"], 2);
     assert_eq!(place.json("out/piped/summary.json")["source"], "-");
+    // The same text is welcome to its folder, another is not, and neither is a file.
+    fed(&leaf("piped", 5)).ends(0);
+    let another = "is of another scenario, from standard input: name a folder with --out DIR";
+    for verb in ["relax -", "check -", "relax - --write svg"] {
+        contains(&fed_to(verb, &leaf("piped", 6)).ends(2).err, &[another]);
+    }
+    place.write("piped.toml", leaf("piped", 5));
+    place.refuses("relax piped.toml", another);
+    fed_to("relax - --out out/piped", &leaf("piped", 6)).ends(0);
 }
 
 #[test]
@@ -205,6 +215,19 @@ fn a_folder_belongs_to_one_scenario() {
         let summary = place.json("out/small/summary.json");
         assert_eq!(summary["source"], "../../other/leaf.toml");
         fs::remove_dir_all(place.path("out")).unwrap();
+    }
+    // Without JSON a hidden file says whose it is; what says nothing is left alone.
+    place.ok("relax leaf.toml --write csv");
+    place.ok("relax leaf.toml --write csv,svg --set leaf.rods=4");
+    let another = "out/small is of another scenario, in";
+    let run = place.refuses("relax other/leaf.toml --write svg", another);
+    contains(&run.err, &["/leaf.toml: name a folder with --out DIR"]);
+    place.ok("relax leaf.toml");
+    for foreign in ["not json", "{\"a\": 1}"] {
+        place.write("out/small/summary.json", foreign);
+        let why = "out/small/summary.json does not say of which scenario it is";
+        place.refuses("relax leaf.toml", why);
+        assert_eq!(place.read("out/small/summary.json"), foreign);
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use super::{Refusal, Status, show};
+use super::{Refusal, Status, show_report};
 
 /// Write a scenario to begin with: short, with every entry explained.
 ///
@@ -67,7 +67,9 @@ impl New {
             _ => format!("{path}: cannot be written: {reason}"),
         })?;
         let next = next.replace("FILE", &path.to_string());
-        show(format!("{path}: written; change it, then\n  leafdyn {next}\n").as_bytes())?;
+        show_report(&format!(
+            "{path}: written; change it, then\n  leafdyn {next}\n"
+        ))?;
         Ok(Status::Success)
     }
 }

@@ -248,9 +248,14 @@ impl Request {
         };
         if !selection.kinds.is_empty() {
             files::check_writable(&folder)?;
-            if self.out.is_none() || !single {
-                files::check_owner(&folder, &source)?;
+            let owner = files::owner(&source, &text);
+            let shared = self.out.is_none() || !single;
+            if shared {
+                files::check_owner(&folder, &owner)?;
             }
+            // JSON files do not hold the text of standard input.
+            let unnamed = source == "-" || !selection.kinds.contains(&Kind::Json);
+            files::claim_folder(&folder, &owner, shared && unnamed)?;
         }
         Ok(Job {
             overrides: &self.overrides,

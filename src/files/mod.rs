@@ -17,7 +17,7 @@ use rayon::prelude::*;
 pub use atomic::{abandon_unfinished, check_writable};
 pub use format::{Format, Kind, Written};
 pub use journal::{Journal, belongs, claim, write_rows};
-pub use owner::{check_owner, source};
+pub use owner::{check_owner, claim_folder, owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 

@@ -1,11 +1,12 @@
 //! The scenario whose results a folder holds: the JSON files in it name its file.
 
 use std::ffi::OsStr;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Component, Path, PathBuf, absolute};
 
-use super::Written;
+use super::{Written, write_table};
+use crate::checksum::Checksum;
 use crate::relax::Equilibrium;
 use crate::report::FileError;
 use crate::simulate::Record;
@@ -51,20 +52,62 @@ fn without_dots(path: PathBuf) -> PathBuf {
     plain
 }
 
-/// Refuses a folder that holds results of a scenario in another file.
-pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
+/// Hidden file that names the scenario where no JSON file does, or not enough.
+const OWNER: &str = ".scenario";
+
+/// What tells the scenario of a folder from others: its source and, if that is standard
+/// input, a checksum of its text.
+pub fn owner(source: &str, text: &str) -> String {
+    match source {
+        "-" => format!("- {}", Checksum::of(format_args!("{text}"))),
+        _ => source.to_string(),
+    }
+}
+
+/// Refuses a folder that holds results of another scenario than `owner`, or files of the
+/// same names that are no results.
+pub fn check_owner(folder: &Path, owner: &str) -> Result<(), FileError> {
+    let refuse = |file: &Path, why: &str| {
+        let change = "name a folder with --out DIR, or give this scenario another name";
+        Err(FileError::unfit(file, &format!("{why}: {change}")))
+    };
+    let named = fs::read_to_string(folder.join(OWNER)).ok();
+    let from_input = owner.starts_with("- ");
     for name in FILES.into_iter().flatten() {
         let file = folder.join(name);
-        let Some(other) = source_in(&file).filter(|other| other != source) else {
+        if !file.exists() {
             continue;
-        };
-        let other = folder.join(other);
-        let other = without_dots(absolute(&other).unwrap_or(other));
-        let change = "name a folder with --out DIR, or give this scenario another name";
-        let why = format!("is of another scenario, in {}: {change}", other.display());
-        return Err(FileError::unfit(&file, &why));
+        }
+        let other = source_in(&file);
+        match other.as_deref() {
+            None => return refuse(&file, "does not say of which scenario it is"),
+            // Standard input may be any: the hidden file says which.
+            Some("-") if from_input && named.is_some() => (),
+            Some(other) if other == owner => (),
+            Some(other) => return refuse(&file, &of_another(folder, other)),
+        }
     }
-    Ok(())
+    match named.as_deref().map(str::trim_end) {
+        Some(other) if other != owner => refuse(folder, &of_another(folder, other)),
+        _ => Ok(()),
+    }
+}
+
+/// Records the owner of a folder where JSON files will not, or replaces what is recorded.
+pub fn claim_folder(folder: &Path, owner: &str, needed: bool) -> Result<(), FileError> {
+    match needed || folder.join(OWNER).exists() {
+        true => write_table(folder, OWNER, format!("{owner}\n").as_bytes()).map(drop),
+        false => Ok(()),
+    }
+}
+
+fn of_another(folder: &Path, source: &str) -> String {
+    if source.starts_with('-') {
+        return "is of another scenario, from standard input".into();
+    }
+    let other = folder.join(source);
+    let other = without_dots(absolute(&other).unwrap_or(other));
+    format!("is of another scenario, in {}", other.display())
 }
 
 /// The source that a JSON file names, if any.

@@ -214,6 +214,11 @@ impl Entries {
         }
     }
 
+    /// Whether a factor changes any of its numbers, as far as it has some.
+    pub(crate) fn is_scalable(&self, part: Part) -> bool {
+        self.value_at(part).is_none_or(is_scalable)
+    }
+
     /// The whole value of a key after a part of it is replaced.
     fn changed(&self, part: Part, new: Value) -> Result<Value, String> {
         let whole = self.get(part.key);
@@ -303,6 +308,18 @@ fn multiply(value: &mut Value, factor: f64) -> Result<(), String> {
             "{} is no number to be scaled: write numbers first",
             shorten(&other.to_string())
         )),
+    }
+}
+
+/// Whether [`multiply`] changes it, or refuses it.
+fn is_scalable(value: &Value) -> bool {
+    match value {
+        Value::Array(list) => list.iter().any(is_scalable),
+        Value::Table(table) => {
+            let mut lists = table.iter().filter(|(name, _)| *name != "at");
+            lists.any(|(_, list)| is_scalable(list))
+        }
+        single => number(single).is_none_or(|number| number != 0.0 && number.is_finite()),
     }
 }
 

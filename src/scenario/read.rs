@@ -99,8 +99,8 @@ pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(ScenarioError::in_file(file, None, problem));
     }
-    let weight = Request::Scenario { bytes: bytes.len() };
-    (weight.weigh()).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    (Request::text(&bytes).weigh())
+        .map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();

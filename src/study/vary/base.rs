@@ -106,10 +106,11 @@ impl Base {
     /// The scenario with these values.
     ///
     /// # Errors
-    /// If it is invalid, or has no such entry.
+    /// If it is invalid, has no such entry, or does not change with these keys.
     pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
         let mut knobs = self.knobs;
         for (keys, value) in values {
+            self.check_factor(keys)?;
             for &target in keys.targets() {
                 if let Target::Knob(knob) = target {
                     knobs.set(knob, *value)?;
@@ -130,6 +131,20 @@ impl Base {
             scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
             knobs,
         })
+    }
+
+    /// Refuses factors with which nothing varies.
+    fn check_factor(&self, keys: &Keys) -> Result<(), VaryError> {
+        let fixed = |target: &Target| match (target, &self.entries) {
+            (Target::Entry(part), Some(entries)) => part.scale && !entries.is_scalable(*part),
+            _ => false,
+        };
+        match keys.targets().iter().all(fixed) {
+            true => Err(VaryError::Key(format!(
+                "{keys}: its numbers are 0 or infinite, which no factor changes: write others first"
+            ))),
+            false => Ok(()),
+        }
     }
 
     /// The scenario with these values, from the entries without parsing the text again;
