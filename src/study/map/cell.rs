@@ -19,9 +19,12 @@ use super::row::{Confidence, Found, MapMethod, MapOutcome, MapRow};
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
 
-/// Lower bound on the seconds per node on any machine: a grid is built and its solution
-/// started before the time limit is first checked.
-const LEAST_SECONDS: f64 = 1e-6;
+/// Lower bound on the seconds per node on any machine; three to six times as many are measured.
+/// A grid is built and its solution started before the time limit is first checked.
+const LEAST_SECONDS: f64 = 3e-6;
+
+/// Least segments a rod of a grid, or steps of shooting.
+const LEAST_SEGMENTS: usize = 4;
 
 /// What is needed to solve a cell's leaf.
 pub struct Cell<'a> {
@@ -48,8 +51,11 @@ impl<'a> Cell<'a> {
     ) -> Self {
         let scenario = &varied.scenario;
         let tolerance = tolerance.unwrap_or(scenario.tolerance);
-        let relaxed = within(limit, all, |limit| {
-            relaxed(scenario, Method::default(), tolerance, limit)
+        let rods = scenario.rods.len();
+        let relaxed = too_many(LEAST_SEGMENTS, rods, limit).unwrap_or_else(|| {
+            within(limit, all, |limit| {
+                relaxed(scenario, Method::default(), tolerance, limit)
+            })
         });
         let mut cell = Cell {
             scenario,
@@ -119,15 +125,13 @@ impl<'a> Cell<'a> {
         if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
             return self.relaxed.clone();
         }
-        let nodes = segments.map_or(0, |segments| segments.saturating_mul(scenario.rods.len()));
         let on_grid = match method {
             MapMethod::ExplicitMotion => true,
             MapMethod::ToRest(method) => !method.is_shooting(),
         };
-        if on_grid && nodes as f64 * LEAST_SECONDS > self.limit.as_secs_f64() {
-            let limit = self.limit.as_secs_f64();
-            let why = format!("{nodes} nodes take longer than {limit} s");
-            return (Err((MapOutcome::OutOfTime, why)), 0.0);
+        let segments_at_least = segments.filter(|_| on_grid).unwrap_or(LEAST_SEGMENTS);
+        if let Some(late) = too_many(segments_at_least, scenario.rods.len(), self.limit) {
+            return late;
         }
         within(self.limit, self.all, |limit| match method {
             MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, limit),
@@ -237,6 +241,14 @@ impl<'a> Cell<'a> {
             _ => distance > SAME_LEAF * longest(&self.scenario.rods),
         }
     }
+}
+
+/// The outcome on a grid that takes longer than the limit in any case.
+fn too_many(segments: usize, rods: usize, limit: Duration) -> Option<(Found, f64)> {
+    let (nodes, limit) = (segments.saturating_mul(rods), limit.as_secs_f64());
+    let late = nodes as f64 * LEAST_SECONDS > limit;
+    let why = || format!("{nodes} nodes take longer than {limit} s");
+    late.then(|| (Err((MapOutcome::OutOfTime, why())), 0.0))
 }
 
 /// Runs a method with a time limit; also returns the seconds it took.
