@@ -3,18 +3,14 @@
 
 mod convergence;
 
-pub use convergence::{Contraction, ROUNDING, at_saddle, converged, satisfies_lengths};
+use convergence::{BALANCED, NEUTRAL_STEP};
+pub use convergence::{Contraction, at_saddle, converged, rounding, satisfies_lengths};
 
 use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
 use crate::rotation;
 use serde::Serialize;
 use std::ops::Add;
-
-/// Increments below this (radians, lengths) are attributed to rounding in a neutral mode if no
-/// force or moment above the second number (A/L^2, A/L) is unbalanced.
-const NEUTRAL_STEP: f64 = 1e-5;
-const BALANCED: f64 = 1e-9;
 
 /// Shift of the matrix (times the mass matrix, in squared frequencies; the lowest of a clamped
 /// rod is 12) that lets Newton's method of a stiff leaf cross a region where its energy is not
@@ -266,7 +262,7 @@ impl Newton<'_> {
                     _ => Contraction::default().error_after_first(size, 0.0),
                 };
                 let tolerances = [previous_tolerance, tolerance];
-                let accuracy = (self.accuracy, ROUNDING);
+                let accuracy = (self.accuracy, rounding(leaf, &next, size, previous));
                 let remaining = converged(size, previous, tolerances, accuracy, first);
                 if let Some(remaining) = remaining
                     && satisfies_lengths(leaf, state, self.accuracy)

@@ -179,14 +179,22 @@ fn what_moves_and_why_it_failed_is_put_into_words() {
         let because = "the equations are singular (ratio of singular values 1.5e-12)";
         assert_eq!(why, format!("{because}: {text}"));
     }
+    let unbounded = |fixed| {
+        let sigma = 0.25;
+        Reason::Unbounded { sigma, fixed }.to_string()
+    };
     assert_eq!(
-        Reason::Unbounded { sigma: 0.25 }.to_string(),
+        unbounded(true),
         "integrated from the start, the leaf grows out of all bounds at 0.250 of its length: \
          use more intervals"
     );
+    // The program chose the number.
+    let other = "lower the load, or start from the relaxed leaf";
+    assert!(unbounded(false).ends_with(&format!("of its length: {other}")));
     let stuck = |growth| Reason::NoConvergence {
         correction: 2.5e-3,
         growth,
+        fixed: true,
     };
     assert_eq!(
         stuck(12.2).to_string(),

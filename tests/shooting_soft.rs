@@ -49,7 +49,7 @@ fn under_tension_only_many_intervals_succeed() {
         let failure = single.expect_err("no digit is left at the tip");
         match failure.reason {
             Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
-            Reason::Unbounded { sigma } => assert!((0.0..1.0).contains(&sigma)),
+            Reason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
             Reason::Singular(_) | Reason::TooMuch(_) => panic!("{}", failure.reason),
         }
         assert!(failure.reason.to_string().contains("use more intervals"));

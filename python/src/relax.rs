@@ -87,6 +87,7 @@ impl Asked {
             modes: self.modes,
             mode_shapes: self.mode_shapes,
             every_node: true,
+            stations: self.stations,
             ..Options::default()
         })
     }

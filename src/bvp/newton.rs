@@ -293,7 +293,11 @@ impl Newton<'_, '_, '_> {
             None => {
                 let growths = self.growth.iter().map(|growth| growth.log10());
                 let growth = growths.fold(0.0, f64::max);
-                Reason::NoConvergence { correction, growth }
+                Reason::NoConvergence {
+                    correction,
+                    growth,
+                    fixed: false,
+                }
             }
         }
     }

@@ -163,6 +163,8 @@ pub enum Reason {
     Unbounded {
         /// The sigma it reached.
         sigma: f64,
+        /// Whether the number of intervals was given.
+        fixed: bool,
     },
     /// Newton's method does not converge.
     NoConvergence {
@@ -170,6 +172,8 @@ pub enum Reason {
         correction: f64,
         /// Decimal logarithm of the largest growth over one interval.
         growth: f64,
+        /// Whether the number of intervals was given.
+        fixed: bool,
     },
     /// The equations are singular.
     Singular(Neutral),
@@ -185,24 +189,53 @@ impl From<TooMuch> for Reason {
 
 impl From<Unbounded> for Reason {
     fn from(Unbounded { sigma }: Unbounded) -> Self {
-        Reason::Unbounded { sigma }
+        Reason::Unbounded {
+            sigma,
+            fixed: false,
+        }
+    }
+}
+
+impl Reason {
+    /// Whether more intervals may help is known where their number is.
+    pub(super) fn with_intervals(mut self, given: bool) -> Self {
+        if let Reason::Unbounded { fixed, .. } | Reason::NoConvergence { fixed, .. } = &mut self {
+            *fixed = given;
+        }
+        self
+    }
+
+    /// What to change.
+    fn advice(&self) -> &'static str {
+        match *self {
+            Reason::Unbounded { fixed: true, .. } => "use more intervals",
+            Reason::NoConvergence {
+                fixed: true,
+                growth,
+                ..
+            } if growth > TOO_MUCH_GROWTH => "use more intervals",
+            _ => "lower the load, or start from the relaxed leaf",
+        }
     }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let advice = self.advice();
         match self {
-            Reason::Unbounded { sigma } => write!(
+            Reason::Unbounded { sigma, .. } => write!(
                 f,
-                "integrated from the start, the leaf grows out of all bounds at {sigma:.3} of its length: use more intervals"
+                "integrated from the start, the leaf grows out of all bounds at {sigma:.3} of its length: {advice}"
             ),
-            Reason::NoConvergence { correction, growth } if *growth > TOO_MUCH_GROWTH => write!(
+            Reason::NoConvergence {
+                correction, growth, ..
+            } if *growth > TOO_MUCH_GROWTH => write!(
                 f,
-                "Newton's method stops at corrections of {correction:.1e}; perturbations grow 10^{growth:.0} times over an interval: use more intervals"
+                "Newton's method stops at corrections of {correction:.1e}; perturbations grow 10^{growth:.0} times over an interval: {advice}"
             ),
             Reason::NoConvergence { correction, .. } => write!(
                 f,
-                "Newton's method stops at corrections of {correction:.1e}: lower the load, or start from the relaxed leaf"
+                "Newton's method stops at corrections of {correction:.1e}: {advice}"
             ),
             Reason::Singular(neutral) => write!(
                 f,

@@ -90,7 +90,7 @@ fn solve_once(
     let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
     let near = Trajectory::new(&equations, options.stations.to_vec(), states.collect());
     Err(Failure {
-        reason: end.reason,
+        reason: end.reason.with_intervals(options.intervals.is_some()),
         part: end.part,
         rods: near.shape(&equations),
         work: log.work,

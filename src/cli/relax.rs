@@ -144,6 +144,7 @@ impl Relax {
             modes: self.modes.unwrap_or(DEFAULT_MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
             every_node: true,
+            stations: job.selection.stations,
             ..Options::default()
         };
         let mut line = job.progress();

@@ -68,7 +68,11 @@ pub struct Snapshot {
 pub enum Stopped {
     /// Energy appeared without cause, or a value is not a number.
     #[error(
-        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter step, or {otherwise}"
+        "diverged at t = {time:.6e}: energy grew from nowhere {}; use a shorter step, or {otherwise}",
+        match .percent.is_finite() {
+            true => format!("by {percent:.0} % of all that moved"),
+            false => "beyond all numbers".into(),
+        }
     )]
     Diverged {
         /// Time.

@@ -3,7 +3,12 @@
 use crate::leaf::{DiscreteLeaf, State};
 
 /// An increment (radians, lengths) below this that does not decrease is due to rounding.
-pub const ROUNDING: f64 = 1e-9;
+const ROUNDING: f64 = 1e-9;
+
+/// Increments below this (radians, lengths) are attributed to rounding in a neutral mode if no
+/// force or moment above the second number (A/L^2, A/L) is unbalanced.
+pub const NEUTRAL_STEP: f64 = 1e-5;
+pub const BALANCED: f64 = 1e-9;
 
 /// Increments below this (radians, lengths) are used to measure quadratic convergence.
 const ASYMPTOTIC: f64 = 0.05;
@@ -75,6 +80,17 @@ pub fn converged(
     match size < rounding && rate > DECREASING {
         true => Some(size),
         false => (remaining <= accuracy && bounded).then_some(remaining),
+    }
+}
+
+/// The size of increments that are due to rounding if they do not decrease, at a `state`
+/// after an increment of this `size` and one of size `previous`: very soft veins turn by more
+/// where all forces are balanced, and their increments do not decrease at all.
+pub fn rounding(leaf: &DiscreteLeaf, state: &State, size: f64, previous: f64) -> f64 {
+    let turns = (ROUNDING..NEUTRAL_STEP).contains(&size) && size >= previous;
+    match turns && leaf.residual(state) < BALANCED {
+        true => NEUTRAL_STEP,
+        false => ROUNDING,
     }
 }
 

@@ -24,6 +24,9 @@ pub struct Options {
     /// Whether the leaf is requested at the nodes of the finest grid, not only at those of the
     /// coarsest (semi-implicit and explicit method).
     pub every_node: bool,
+    /// The number of equal parts of a vein at whose ends the tolerance must be kept, too: where
+    /// interpolation loses more, the leaf is solved with a smaller tolerance.
+    pub stations: Option<usize>,
     /// Time limit and cancellation: a run that is stopped ends not at rest.
     pub limit: Limit,
 }

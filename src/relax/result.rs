@@ -226,14 +226,16 @@ fn advice(run: &Run) -> String {
         .max_by(|&a, &b| bends(a).total_cmp(&bends(b)))
         .unwrap_or(0);
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
-    let softest = match stiffness.min_element() {
-        least if least == stiffness.x => "torsion",
-        least if least == stiffness.y => "bending_2",
-        _ => "bending_3",
-    };
     let loads = run.leaf.loads;
     let [weight, tip, moment] =
         [loads.gravity, loads.tip_force, loads.tip_moment].map(|load| load.length());
+    // Along the directors at the base a moment shows what it turns; forces turn by their arms.
+    let base = level.state.q[level.state.base(vein)];
+    let turned = match moment > weight.max(tip) {
+        true => (base.conjugate() * loads.tip_moment).abs() / stiffness,
+        false => stiffness.recip(),
+    };
+    let softest = ["torsion", "bending_2", "bending_3"][turned.max_position()];
     let load = match weight * run.leaf.rods() as f64 > tip {
         _ if moment > weight.max(tip) => "lower load.tip_moment",
         true => "lower load.gravity",

@@ -51,7 +51,7 @@ const MANY_NODES: usize = 50_000;
 const ROUNDING: f64 = 4e-15;
 
 /// Limit on nodes times force evaluations for a leaf to come to rest: some seconds.
-pub const BUDGET: usize = 4_000_000;
+pub const BUDGET: usize = 10_000_000;
 
 /// The state of a run.
 pub struct Run<'a, 'o> {

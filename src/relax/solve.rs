@@ -8,7 +8,9 @@ use crate::relax::level::Level;
 use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
 use crate::relax::modes;
-use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
+use crate::relax::options::{
+    MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
+};
 use crate::relax::plausible;
 use crate::relax::result;
 use crate::relax::run::{BUDGET, Run};
@@ -16,12 +18,49 @@ use crate::relax::segments::{check_segments, least, reducible};
 use crate::scenario::Scenario;
 use std::time::Instant;
 
+/// Factor on the tolerance of a leaf that does not keep it between the stations of its
+/// solution: interpolation errors decrease with the fourth power of the distance of nodes.
+const FOR_STATIONS: f64 = 1e-2;
+
 /// Brings a scenario's leaf to rest.
 ///
 /// # Errors
 /// Requests that cannot be met; everything that happens while solving is an
 /// [`Outcome`](crate::relax::Outcome) instead.
 pub fn relax(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let found = relax_once(scenario, options, progress)?;
+    let Some(parts) = options.stations else {
+        return Ok(found);
+    };
+    if found.keeps_tolerance_at(scenario, parts) {
+        return Ok(found);
+    }
+    let tolerance = found.accuracy.tolerance;
+    let sharper = Options {
+        tolerance: Some((FOR_STATIONS * tolerance).max(SMALLEST_TOLERANCE)),
+        ..options.clone()
+    };
+    let mut sharp = relax_once(scenario, &sharper, progress)?;
+    sharp.accuracy.tolerance = tolerance;
+    let same = sharp.stability.negative_eigenvalues == found.stability.negative_eigenvalues;
+    if !same || !sharp.keeps_tolerance_at(scenario, parts) {
+        return Ok(found);
+    }
+    sharp.wall_seconds += found.wall_seconds;
+    Ok(Equilibrium {
+        outcome: found.outcome,
+        remark: found.remark,
+        work: found.work + sharp.work,
+        ..sharp
+    })
+}
+
+/// Relaxes once, whatever the stations.
+fn relax_once(
     scenario: &Scenario,
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
@@ -67,7 +106,7 @@ pub fn relax(
 /// The coarsest and the finest grid of the second attempt, by continuation in loads and
 /// stiffness.
 const COARSEST_BY_STEPS: usize = 32;
-const FINEST_BY_STEPS: usize = 512;
+const FINEST_BY_STEPS: usize = 1024;
 
 /// Relaxes on nested grids, fine enough for forces and eigenvalues too; also returns the leaf
 /// on each grid that was extrapolated, from coarse to fine.
@@ -159,7 +198,10 @@ fn finished(
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
     // Near a bifurcation the Morse index on a grid may differ from that of the leaf.
     while let Some(finer) = modes::deciding_grid(&run, lowest.as_ref()) {
-        end = run.continue_on(finer);
+        let further = run.continue_on(finer);
+        // The grids before found rest; without this one the sign remains undecided.
+        let Ok(_) = further else { break };
+        end = further;
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
     }

@@ -26,10 +26,6 @@ impl Equilibrium {
     /// stay as they are.
     #[must_use]
     pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
-        let within = |leaf: &Equilibrium| {
-            let allowed = leaf.accuracy.tolerance * leaf.shape.longest();
-            (leaf.accuracy.error_estimate).is_none_or(|error| error <= allowed)
-        };
         let to = match parts {
             Some(parts) => equally_spaced(parts),
             None => finest(&self.shape),
@@ -38,7 +34,7 @@ impl Equilibrium {
             return self;
         }
         let mut there = self.clone().interpolated(scenario, to);
-        if within(&there) || !within(&self) {
+        if there.keeps_tolerance() || !self.keeps_tolerance() {
             return there;
         }
         if parts.is_none() {
@@ -49,6 +45,18 @@ impl Equilibrium {
             there.remark = Some(BETWEEN.into());
         }
         there
+    }
+
+    /// Whether the tolerance, if it is kept at the stations of the solution, is kept at the ends
+    /// of so many equal `parts`, too.
+    pub(super) fn keeps_tolerance_at(&self, scenario: &Scenario, parts: usize) -> bool {
+        let there = || self.clone().interpolated(scenario, equally_spaced(parts));
+        !self.keeps_tolerance() || there().keeps_tolerance()
+    }
+
+    fn keeps_tolerance(&self) -> bool {
+        let allowed = self.accuracy.tolerance * self.shape.longest();
+        (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
     }
 
     fn interpolated(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {

@@ -46,8 +46,12 @@ pub enum Refused {
     /// The time step is too short for the duration.
     #[error(
         "the time step of {step:.3e} makes {steps:.1e} steps, which take some {} days, and at most {} are allowed: \
-         use the semi-implicit method, softer rods, fewer segments, or a shorter duration",
-        (.seconds / DAY).ceil(), MOST_SECONDS / DAY
+         use {}",
+        (.seconds / DAY).ceil(), MOST_SECONDS / DAY,
+        match .given {
+            true => "a longer step, or leave it out",
+            false => "the semi-implicit method, softer rods, fewer segments, or a shorter duration",
+        }
     )]
     TooLong {
         /// The step.
@@ -56,6 +60,8 @@ pub enum Refused {
         steps: f64,
         /// Estimated duration.
         seconds: f64,
+        /// Whether the step was given.
+        given: bool,
     },
     /// The grid or the tolerance is invalid.
     #[error(transparent)]

@@ -42,6 +42,9 @@ use crate::words::words;
 /// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;
 
+/// No number of a motion is as large.
+const LARGEST_NUMBER: f64 = 1e100;
+
 /// Seconds per step and segment.
 const EXPLICIT_SECONDS: f64 = 2e-8;
 const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
@@ -163,6 +166,7 @@ impl Simulation {
                 step: simulation.step.unwrap_or_default(),
                 steps,
                 seconds,
+                given: options.step.is_some(),
             }),
             _ => Ok(simulation),
         }
@@ -262,12 +266,17 @@ impl Simulation {
         frame
     }
 
-    fn advance(&mut self) -> Result<Frame, Stopped> {
+    /// The time of an output, in the method's unit.
+    fn output_time(&self, number: usize) -> f64 {
         let (duration, interval) = self.physics.duration();
-        let until = match self.made + 1 >= self.outputs {
+        match number >= self.outputs {
             true => duration,
-            false => interval * (self.made + 1) as f64,
-        };
+            false => interval * number as f64,
+        }
+    }
+
+    fn advance(&mut self) -> Result<Frame, Stopped> {
+        let until = self.output_time(self.made + 1);
         let unit = self.physics.time;
         (self.method.advance(until)).map_err(|stopped| stopped.in_unit(unit))?;
         self.made += 1;
@@ -283,18 +292,19 @@ impl Simulation {
     }
 
     /// Restores the state at a call of [`Simulation::save`]; false if the
-    /// numbers do not fit, or one of them is not finite.
+    /// numbers do not fit, or cannot be those of a motion.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some((&made, numbers)) = numbers.split_first() else {
             return false;
         };
-        let finite = || numbers.iter().all(|number| number.is_finite());
+        let finite = || numbers.iter().all(|number| number.abs() < LARGEST_NUMBER);
         let fits =
             (0.0..=self.outputs as f64).contains(&made) && finite() && self.method.restore(numbers);
         if fits {
             self.made = made as usize;
         }
-        fits
+        let (_, interval) = self.physics.duration();
+        fits && (self.method.time() - self.output_time(self.made)).abs() < 0.5 * interval
     }
 }
 

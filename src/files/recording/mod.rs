@@ -117,7 +117,7 @@ impl Recording {
         let found = Checkpoint::read(folder, &recording.run)?;
         let state = found.state().filter(|state| simulation.restore(state));
         if state.is_none() {
-            let why = "it does not fit the leaf, or a number of it is not finite";
+            let why = "it does not fit the leaf, or a number of it is impossible";
             return Err(damaged(&folder.join(checkpoint::FILE_NAME), why));
         }
         let motion = folder.join(recording.form.file_name());

@@ -68,8 +68,8 @@ const GROWTH: (f64, f64) = (0.2, 2.0);
 /// Advice if energy grows, besides a shorter step, and if steps are too short.
 const OTHERWISE: &str = "dynamics.start = \"at-rest\"";
 const TOO_SHORT: &str = "use more segments a rod, or slower changes of the loads";
-const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid: \
-    use dynamics.start = \"at-rest\", or a stiffness less than inf";
+const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid, or nearly so: \
+    use dynamics.start = \"at-rest\", or a lower stiffness";
 
 /// Control of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]

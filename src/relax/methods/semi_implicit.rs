@@ -14,7 +14,7 @@
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{
-    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
+    Definite, Equations, Newton, Stop, Work, at_saddle, cg_tolerance, converged, rounding,
     satisfies_lengths,
 };
 use crate::relax::methods::damped_motion::Motion;
@@ -184,7 +184,8 @@ impl Relaxation<'_> {
                 motion.newton = size;
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
-                rest = converged(size, previous, tolerances, (accuracy, ROUNDING), first);
+                let rounding = rounding(leaf, &self.state, size, previous);
+                rest = converged(size, previous, tolerances, (accuracy, rounding), first);
             } else {
                 motion.newton = f64::INFINITY;
             }
