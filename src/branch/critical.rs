@@ -3,6 +3,7 @@
 use super::deflation::Deflated;
 use super::equations::{Equations, Stuck};
 use super::field::{combined, dot, plus, times};
+use super::states::{eigenvalue_rounding, stiffest_condensed};
 use super::{Point, Tangent};
 use crate::leaf::{Field, State};
 
@@ -215,6 +216,14 @@ impl Search<'_, '_> {
     }
 }
 
+/// Rounding error of the eigenvalues of the matrix, softened if there is such a one.
+fn rounding(equations: &mut Equations, fraction: f64) -> Result<f64, Stuck> {
+    let softened = equations.softened.as_mut();
+    let leaf = softened.unwrap_or(&mut equations.leaves).at(fraction)?;
+    let stiffest = stiffest_condensed(leaf);
+    Ok(eigenvalue_rounding(stiffest, leaf.segments()))
+}
+
 impl Critical {
     /// The same critical point on another grid or of a softened matrix, by a secant method from
     /// the known state.
@@ -232,6 +241,9 @@ impl Critical {
             soft: &self.soft,
             exactly: self.kind == Kind::Fold,
         };
+        // Shorter steps follow the rounding of the eigenvalue only.
+        let rounding = rounding(search.equations, self.fraction)?;
+        let least = (rounding / self.slope.abs()).max(ACCURACY);
         let (mut distance, mut slope) = (0.0, self.slope);
         let mut best = search.at(distance)?;
         let mut value = best.eigenvalues[self.which];
@@ -251,7 +263,7 @@ impl Critical {
                 true => best = next,
                 false => worse += 1,
             }
-            if step.abs() < ACCURACY || worse > 1 {
+            if step.abs() < least || worse > 1 {
                 break;
             }
         }

@@ -7,9 +7,10 @@ use super::family::{Family, Leaves};
 use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
-use super::states::stiffest_condensed;
+use super::states::{eigenvalue_rounding, stiffest_condensed};
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
+use rayon::prelude::*;
 
 /// Critical parameters with errors below this part of the range are exact.
 const EXACT: f64 = 1e-12;
@@ -120,13 +121,13 @@ impl Softening {
         let leaf = equations.leaves.at(critical.fraction)?;
         let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
         let mut stiffest = stiffest_condensed(leaf);
-        let segments = leaf.segments() as f64;
+        let segments = leaf.segments();
         let fold = critical.kind == Kind::Fold;
         let mut growth = 1.0;
         let values = match rigid {
             false => Values::of(equations, &critical.state, critical.fraction)?,
             true => {
-                let slope = critical.slope.abs() / (FINER * segments).powi(2);
+                let slope = critical.slope.abs() / (FINER * segments as f64).powi(2);
                 let found = self.unsoftened(family, equations, critical, slope)?;
                 table.softening = table.softening.max(found.fraction_error);
                 if fold {
@@ -137,7 +138,7 @@ impl Softening {
                 found.values
             }
         };
-        let rounding = f64::EPSILON * stiffest * segments * segments;
+        let rounding = eigenvalue_rounding(stiffest, segments);
         let along = rounding / critical.slope.abs();
         if fold {
             table.noise = table.noise.max(along);
@@ -177,16 +178,16 @@ fn extrapolated(
     critical: &Critical,
     softening: f64,
 ) -> Result<Unsoftened, Stuck> {
-    let mut found = Vec::new();
-    let mut near = critical.clone();
-    for k in (0..CUBIC.len()).rev() {
+    let softened = |k: usize| {
         let mut equations = Equations::new(family, grid.clone())?;
         let softening = softening * (k + 1) as f64;
         equations.softened = Some(Leaves::softened(family, grid.clone(), softening));
-        near = near.relocated(&mut equations)?;
-        found.push(Values::of(&mut equations, &near.state, near.fraction)?);
-    }
-    found.reverse();
+        let near = critical.relocated(&mut equations)?;
+        Values::of(&mut equations, &near.state, near.fraction)
+    };
+    let found: Result<Vec<Values>, Stuck> =
+        (0..CUBIC.len()).into_par_iter().map(softened).collect();
+    let found = found?;
     let by = |weights: [f64; 4]| {
         let parts: Vec<_> = weights.into_iter().zip(found.iter().cloned()).collect();
         Values::sum(&parts)

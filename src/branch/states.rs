@@ -33,6 +33,11 @@ pub fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
     stiffnesses.fold(0.0, f64::max)
 }
 
+/// Rounding error of an eigenvalue of the matrix of a leaf of this largest stiffness.
+pub fn eigenvalue_rounding(stiffest: f64, segments: usize) -> f64 {
+    f64::EPSILON * stiffest * (segments as f64).powi(2)
+}
+
 /// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
 pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
     let mut moved = state.clone();
