@@ -7,6 +7,7 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use common::*;
+use leafdyn::relax::{Outcome, relax};
 
 const RIGID: [f64; 3] = [f64::INFINITY; 3];
 
@@ -261,4 +262,97 @@ fn many_veins() {
     // straight ahead, at the height that 100 veins show to three digits.
     assert!(tip(&leaf).y.abs() < 0.003);
     close("z", tip(&leaf).z, tip(&stable(&fig04(100), 1e-6)).z, 1e-3);
+}
+
+/// Very soft veins turn by more than rounding where all forces are balanced to rounding. Whether
+/// they are stable, no grid tells.
+#[test]
+fn a_leaf_without_resistance_to_torsion() {
+    for torsion in [1e-7, 1e-8, 1e-9] {
+        let overrides = ["leaf.rods=4".into(), format!("stiffness.torsion={torsion}")];
+        let scenario = Scenario::read_with(&path("scenarios/paper/fig04.toml"), &overrides);
+        let scenario = scenario.unwrap();
+        let leaf = settle(&scenario, 1e-6);
+        let sharp = scenario.relaxation().tolerance(1e-8).run().unwrap();
+        let rests = [Outcome::Converged, Outcome::ToleranceNotReached];
+        assert!(rests.contains(&sharp.outcome), "{:?}", sharp.remark);
+        let told = [&leaf, &sharp].map(|it| it.accuracy.error_estimate.unwrap());
+        assert!((tip(&leaf) - tip(&sharp)).length() < told[0] + told[1]);
+    }
+}
+
+/// Found among leaves at the edge of what could be one: its motion is resolved on 512 segments
+/// only.
+#[test]
+fn a_leaf_that_needs_many_segments() {
+    let scenario = Scenario::from_toml(
+        r#"
+        name = "edge"
+        [leaf]
+        rods = 6
+        length = [1.5155463556927136, 1.660386420189775, 1.468892568813211, 1.2599155854912283, 1.490727837911322, 1.3647456914846212]
+        fan = "symmetric"
+        [stiffness]
+        torsion = 0.03508660525341855
+        bending_2 = { at = [0.0, 0.5073359708082478, 1.0], value = [24.454819987880366, 46.277173113147974, 0.45407062342642324] }
+        bending_3 = 6.294434231783438
+        axial = [14925.756765249987, 41678.179748491486, 311.2817295287977, 26418.555191739335, 298.2793761740473, 102.77626026313085]
+        shear_2 = [7408.662404670575, inf, 7.8511407131121365, 244.8024799134127, inf, 19815.41483627946]
+        shear_3 = [22830.51947844362, 9794.853968264044, 813.9931017528617, 20.477798995283134, 668.5948340845422, 7.807910577834681]
+        [rest]
+        bend_2 = [-0.3327020960375151, 11.021271781028744, 4.685292587281733, -14.511891705780604, -8.980623587728648, -2.4913582335709634]
+        stretch = [1.8230277792683507, 1.3414531492878137, 1.4190504304895781, 1.584127559031983, 1.6784324971192477, 1.3704453324633261]
+        [load]
+        gravity = [0.19848254629124962, 0.047280533807095085, 0.20432850601779637]
+        "#,
+    );
+    stable_within(40_000, &scenario.unwrap(), 1e-6);
+}
+
+/// Interpolation between the stations of the solution would lose the tolerance: the leaf is
+/// solved again, as often as that.
+#[test]
+fn stations_keep_the_tolerance() {
+    let scenario = Scenario::from_toml(
+        r#"
+        name = "wild"
+        [leaf]
+        rods = 5
+        length = 1.0
+        fan = [-0.6818300492623899, -0.32578787236603435, -0.06696011249292266, 0.7888598399641547, 1.2643070024880192]
+        [stiffness]
+        torsion = { at = [0.0, 0.5624792114016682, 1.0], value = [0.5521991789813508, 2.159670137597459, 4.123415875446259] }
+        bending_2 = [0.12256746059515733, 0.1617601439555148, 0.224098739719853, 0.10787397932802176, 8.991426245426776]
+        bending_3 = 6.515992890944755
+        axial = inf
+        shear_2 = [131.75083244909044, 13.682977672871683, 16042.860216673182, 11874.283978294618, inf]
+        shear_3 = [inf, 44.48980332577623, 214.79177212731926, 555.8310171797848, inf]
+        [rest]
+        twist = 5.42949225546819
+        bend_2 = 7.717503410725037
+        bend_3 = [1.952170120199444, -4.00064011463638, 9.768959029212258, -8.68372618767776, 2.5810621923890142]
+        stretch = [1.0842327367099334, 1.077343828143547, 1.0379370305560967, 1.0844457816079407, 1.0172816939983738]
+        [coupling]
+        x = 0.14616572467754196
+        y = 95.19660478079815
+        z = 0.7182194396781834
+        [load]
+        tip_force = [0.6251948400748418, -0.0479611992042154, -0.8759177734442191]
+        "#,
+    );
+    let scenario = scenario.unwrap();
+    let options = |stations| Options {
+        every_node: true,
+        stations,
+        ..Options::default()
+    };
+    let at = |stations| {
+        let found = relax(&scenario, &options(stations), &mut |_| {}).unwrap();
+        found.at_stations(&scenario, Some(20))
+    };
+    assert_eq!(at(None).outcome, Outcome::ToleranceNotReached);
+    let kept = at(Some(20));
+    assert_eq!(kept.outcome, Outcome::Converged);
+    assert_eq!(kept.accuracy.tolerance, 1e-6);
+    assert!(kept.accuracy.error_estimate.unwrap() <= 1e-6);
 }

@@ -52,6 +52,14 @@ fn what_is_there_is_not_replaced() {
     assert_eq!(place.read("mine.toml"), "mine");
 }
 
+/// Whatever its name contains, nothing of it reaches the terminal as a command.
+#[test]
+fn a_name_is_only_shown() {
+    let run = Workplace::empty().run("new rod \u{1b}[31mred.toml").ends(0);
+    assert!(!run.out.contains('\u{1b}'), "{:?}", run.out);
+    run.says(&["[31mred.toml: written"]);
+}
+
 #[test]
 fn without_a_scenario_one_is_offered() {
     for verb in ["relax", "simulate", "check"] {

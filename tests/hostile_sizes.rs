@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
-use workplace::{Json, Workplace, leaf};
+use workplace::{Json, Workplace, contains, leaf};
 
 #[test]
 fn what_takes_more_memory_than_is_allowed_is_refused() {
@@ -140,7 +140,7 @@ fn stations_of_a_profile_with_knots_are_compared_by_place() {
 }
 
 #[test]
-fn a_checkpoint_with_a_number_that_is_not_finite_is_refused() {
+fn a_checkpoint_with_an_impossible_number_is_refused() {
     let scenario = Scenario::from_toml(&leaf("small", 2)).unwrap();
     for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
         let options = Options {
@@ -152,11 +152,48 @@ fn a_checkpoint_with_a_number_that_is_not_finite_is_refused() {
         let state = simulation.save();
         assert!(simulation.restore(&state), "{scheme:?}");
         for at in (0..state.len()).step_by(7) {
-            for wild in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for wild in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e300] {
                 let mut changed = state.clone();
                 changed[at] = wild;
                 assert!(!simulation.restore(&changed), "{scheme:?}: {wild} at {at}");
             }
         }
+        // The time is the first or the second number after that of the outputs.
+        let time = 1 + usize::from(scheme == Scheme::Explicit);
+        let mut late = state.clone();
+        late[time] = 1e18;
+        assert!(!simulation.restore(&late), "{scheme:?}");
     }
+}
+
+/// What a text takes when parsed depends on its tables and keys more than on its length.
+#[test]
+fn a_text_of_many_tables_is_weighed_by_them() {
+    let place = Workplace::new();
+    let numbers = format!("a = [{}]", "1.0, ".repeat(20_000));
+    let keys = format!("a{} = 1\n", ".b".repeat(75)).repeat(660);
+    let tables = format!("a = [{}]", "{a.b.c=1},".repeat(10_000));
+    assert!(keys.len() < numbers.len() + 10_000 && tables.len() < numbers.len() + 10_000);
+    place.write("numbers.toml", numbers);
+    place.refuses("relax numbers.toml --memory 15MB", "unknown key a");
+    for (name, text) in [("keys", keys), ("tables", tables)] {
+        place.write(&format!("{name}.toml"), text);
+        place.refuses(format!("relax {name}.toml --memory 40MB"), "a scenario of ");
+    }
+}
+
+/// A grid that takes longer to build than a cell may last is not begun.
+#[test]
+fn cells_of_huge_grids_are_late_at_once() {
+    let place = Workplace::new();
+    let huge = "--set leaf.rods=1 --set method.segments=1000000 --methods semi-implicit";
+    let map = place.ok(format!(
+        "map leaf.toml {huge} --vary load.gravity[2]=-1..-2:2 --cell-seconds 1 --write csv"
+    ));
+    contains(&map.out, &["out-of-time"]);
+    let rows = place.read("out/small/map.csv");
+    assert_eq!(
+        rows.matches("1000000 nodes take longer than 1 s").count(),
+        2
+    );
 }

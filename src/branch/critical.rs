@@ -241,9 +241,15 @@ impl Critical {
             soft: &self.soft,
             exactly: self.kind == Kind::Fold,
         };
-        // Shorter steps follow the rounding of the eigenvalue only.
-        let rounding = rounding(search.equations, self.fraction)?;
-        let least = (rounding / self.slope.abs()).max(ACCURACY);
+        let least = match self.kind {
+            // Shorter steps follow the rounding of the eigenvalue, and the parameter of a fold
+            // depends on their squares.
+            Kind::Fold => {
+                let rounding = rounding(search.equations, self.fraction)?;
+                (rounding / self.slope.abs()).max(ACCURACY)
+            }
+            Kind::Branching => ACCURACY,
+        };
         let (mut distance, mut slope) = (0.0, self.slope);
         let mut best = search.at(distance)?;
         let mut value = best.eigenvalues[self.which];

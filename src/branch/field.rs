@@ -75,6 +75,12 @@ pub fn at_same_nodes(a: &Field) -> Field {
     a.iter().map(rod).collect()
 }
 
+/// Increments on the grid with every second node.
+pub fn every_second(a: &Field) -> Field {
+    let rod = |rod: &Vec<Increment>| rod.iter().skip(1).step_by(2).copied().collect();
+    a.iter().map(rod).collect()
+}
+
 fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
     let n = rod.len();
     let at = |i: usize| match i {

@@ -2,17 +2,20 @@
 
 use super::equations::{Equations, Plane, Stuck, reversed};
 use super::family::{Family, OutOfRange};
-use super::field::{at_same_nodes, prolong as prolong_field};
+use super::field::{at_same_nodes, every_second, prolong as prolong_field};
 use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::both_sides;
 use super::{Point, Tangent};
-use crate::leaf::{DiscreteLeaf, Grid};
-use crate::relax::prolong::prolong;
+use crate::leaf::{DiscreteLeaf, Grid, State};
+use crate::relax::prolong::{prolong, restrict};
 use glam::DVec3;
 
 /// Largest number of grids of a point, and of segments of the finest.
 pub(super) const GRIDS: usize = 6;
 pub(super) const FINEST: usize = 4096;
+
+/// Least number of finer grids that have the branch and the index of a point.
+const FINER_GRIDS: usize = 2;
 
 /// Displacements from grid to grid must decrease, unless below this (lengths).
 pub(super) const STILL: f64 = 1e-4;
@@ -25,6 +28,19 @@ const SAME_BRANCH: f64 = 0.85;
 /// the leaf on all grids. But at the same parameter at the ends of its range, and
 /// where the parameter's component of the tangent is at least this.
 const ALONG: f64 = 0.995;
+
+/// A point on a coarser grid that is farther away than this (lengths) is another.
+const NEAR: f64 = 0.1;
+
+/// Least safety factor on the last correction of a point whose order of convergence is not
+/// confirmed. Of 570 points of random branches, most of veins with profiles, 17 had errors of
+/// four to 22 such corrections.
+const CAUTION: f64 = 25.0;
+
+/// Iterations after Newton's method has converged, and the displacement (lengths) at which they
+/// end.
+const FURTHER: usize = 3;
+const FINISHED: f64 = 1e-12;
 
 /// Number of consecutive grids with the same index, if only the index is wanted.
 const AGREEING: usize = 3;
@@ -95,6 +111,28 @@ struct Finer<'a> {
     tangent: Tangent,
     /// Displacement from the interpolated state.
     moved: f64,
+    /// Displacement by the last iteration: its error is not larger.
+    unfinished: f64,
+}
+
+/// A point in a plane, or at a parameter, iterated until the displacements are below rounding,
+/// as extrapolation over grids magnifies what remains; and the last displacement.
+fn finished(
+    equations: &mut Equations,
+    (state, fraction): (&State, f64),
+    plane: Option<&Plane>,
+) -> Result<(Point, f64), Stuck> {
+    let mut found = equations.correct_within(state, fraction, plane)?;
+    let mut unfinished = f64::INFINITY;
+    for _ in 0..FURTHER {
+        let next = equations.correct_within(&found.state, found.fraction, plane)?;
+        unfinished = found.state.shift_to(&next.state);
+        found = next;
+        if unfinished < FINISHED {
+            break;
+        }
+    }
+    Ok((found, unfinished))
 }
 
 /// The point under the same condition on the grid with all segments halved.
@@ -111,12 +149,14 @@ fn on_next_grid<'a>(
         increments: prolong_field(&point.tangent.increments),
         ..point.tangent
     });
-    let mut found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
+    let plane = condition.as_plane();
+    let (mut found, unfinished) = finished(&mut equations, (&guess, point.fraction), plane)?;
     if equations.inner(&found.tangent, &tangent) < 0.0 {
         found.tangent = reversed(found.tangent);
     }
     Ok(Finer {
         moved: guess.shift_to(&found.state),
+        unfinished,
         point: found,
         tangent,
         equations,
@@ -175,6 +215,41 @@ pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt
     Err(Doubt::OtherIndex)
 }
 
+/// A point on the grid with every second node, and the condition on the next one. It adds to
+/// what the series of grids tells of its order. `None` if there is no such grid, or no point near
+/// on it.
+fn on_coarser(
+    family: &Family,
+    grid: &Grid,
+    point: &Point,
+    in_plane: bool,
+) -> Option<(usize, Values, Condition)> {
+    let mut equations = Equations::new(family, grid.coarsened()?).ok()?;
+    let near = Point {
+        state: restrict(&point.state),
+        tangent: equations.normalised(Tangent {
+            increments: every_second(&point.tangent.increments),
+            ..point.tangent
+        }),
+        ..point.clone()
+    };
+    let mut condition = match in_plane {
+        true => Condition::plane(&equations, &near),
+        false => Condition::Value,
+    };
+    let plane = condition.as_plane();
+    let start = (&near.state, point.fraction);
+    let (found, _) = finished(&mut equations, start, plane).ok()?;
+    let along = equations.inner(&found.tangent, &near.tangent).abs();
+    if along < SAME_BRANCH || near.state.shift_to(&found.state) > NEAR {
+        return None;
+    }
+    let values = Values::of(&mut equations, &found.state, found.fraction).ok()?;
+    let segments = equations.grid().segments();
+    condition.refine(equations.leaves.at(point.fraction).ok()?);
+    Some((segments, values, condition))
+}
+
 fn refine_in(
     family: &Family,
     grid: &Grid,
@@ -182,17 +257,26 @@ fn refine_in(
     accuracy: f64,
     in_plane: bool,
 ) -> Result<Refined, Doubt> {
-    let mut table = Table::default();
+    let mut table = Table::with_caution(CAUTION);
     let mut equations = Equations::new(family, grid.clone())?;
-    let mut condition = match in_plane {
-        true => Condition::plane(&equations, point),
-        false => Condition::Value,
+    let mut condition = match on_coarser(family, grid, point, in_plane) {
+        Some((segments, values, condition)) => {
+            table.push(segments, values);
+            condition
+        }
+        None if in_plane => Condition::plane(&equations, point),
+        None => Condition::Value,
     };
-    let values = Values::of(&mut equations, &point.state, point.fraction)?;
+    let start = (&point.state, point.fraction);
+    let (mut now, unfinished) = finished(&mut equations, start, condition.as_plane())?;
+    if equations.inner(&now.tangent, &point.tangent) < 0.0 {
+        now.tangent = reversed(now.tangent);
+    }
+    table.noise = unfinished;
+    let values = Values::of(&mut equations, &now.state, now.fraction)?;
     table.push(grid.segments(), values);
-    let mut now = point.clone();
     let mut moved = f64::INFINITY;
-    for _ in 1..GRIDS {
+    for finer_grids in 1..GRIDS {
         if 2 * equations.grid().segments() > FINEST {
             break;
         }
@@ -206,11 +290,12 @@ fn refine_in(
             return Err(Doubt::OtherIndex);
         }
         moved = finer.moved;
+        table.noise = table.noise.max(finer.unfinished);
         now = finer.point;
         let values = Values::of(&mut equations, &now.state, now.fraction)?;
         table.push(equations.grid().segments(), values);
         table.slope = Some(slope(&mut equations, &now)?);
-        if table.error() <= accuracy {
+        if finer_grids >= FINER_GRIDS && table.error() <= accuracy {
             return Ok(table.refined(now.state, equations.grid().clone()));
         }
     }

@@ -147,12 +147,22 @@ pub(super) struct Table {
     pub rounding: f64,
     /// Error of the fraction due to softening of the matrix.
     pub softening: f64,
+    /// Least safety factor on the last correction where all grids are needed for it.
+    caution: f64,
     /// An error of the points common to all grids, and their rounding error.
     pub common: f64,
     pub noise: f64,
 }
 
 impl Table {
+    /// A table with this least safety factor on unconfirmed corrections.
+    pub fn with_caution(caution: f64) -> Self {
+        Table {
+            caution,
+            ..Table::default()
+        }
+    }
+
     pub fn push(&mut self, segments: usize, values: Values) {
         self.rows.push((segments, values));
     }
@@ -182,8 +192,18 @@ impl Table {
 
     /// Estimate of the error of the points.
     pub fn error(&self) -> f64 {
-        let best = self.points().best();
-        best.map_or(f64::INFINITY, |best| best.error + self.common + self.noise)
+        let points = self.points();
+        let Some(best) = points.best() else {
+            return f64::INFINITY;
+        };
+        // So many grids do not show of which order the errors of the column before were.
+        let error = match best.columns {
+            last if last > 1 && last + 1 == self.rows.len() => {
+                best.error.max(self.caution * points.correction(last))
+            }
+            _ => best.error,
+        };
+        error + self.common + self.noise
     }
 
     /// Estimate of the error of the fraction of a critical point, without rounding.

@@ -83,7 +83,7 @@ impl Richardson {
         let row = self.table.last()?;
         let before = &self.table[self.table.len().checked_sub(2)?];
         let last = row.len() - 1;
-        let correction = |m: usize| distance(&row[m], &row[m - 1]);
+        let correction = |m: usize| self.correction(m);
         let mut columns = last;
         for m in 0..last - 1 {
             let change = distance(&row[m], &before[m]);
@@ -120,6 +120,12 @@ impl Richardson {
             columns,
             error: safety * correction(last),
         })
+    }
+
+    /// The change by column `m`, from 1, on the finest grid.
+    pub fn correction(&self, m: usize) -> f64 {
+        let row = self.table.last().expect("a table that is asked has a grid");
+        distance(&row[m], &row[m - 1])
     }
 
     /// The change preceding the one in the error estimate of the best column, `columns`: on

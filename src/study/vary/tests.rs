@@ -197,6 +197,24 @@ gravity = { at = [0, 1], value = [[0, 0, -1], [0, 0, -2]] }
 tip_force = { at = [0], value = [[0, 0, 0]] }
 rest = { at = [0, 2], factor = [1, 2] }
 "#;
+#[test]
+fn a_factor_of_nothing_is_refused() {
+    let base = base(&["load.gravity=[0,0,0]", "stiffness.axial=inf"]).unwrap();
+    for keys in [
+        "load.gravity",
+        "rest.twist",
+        "coupling.x",
+        "stiffness.axial",
+    ] {
+        let keys = format!("scale:{keys}");
+        let refused = at(&base, &[(&keys, 2.0)]).unwrap_err().to_string();
+        assert!(refused.contains("which no factor changes"), "{refused}");
+    }
+    // Joined to one that changes, it takes part.
+    let both = "scale:load.gravity+scale:leaf.length";
+    assert!(at(&base, &[(both, 2.0)]).is_ok());
+}
+
 const HEAVY: &str = r#"
 name = "heavy"
 leaf = { rods = 1, length = 1, fan = [0] }
