@@ -10,7 +10,7 @@ use std::time::Duration;
 use leafdyn::files::{Recording, Selection, read_peers};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
-use leafdyn::study::{Base, Vary};
+use leafdyn::study::{Base, Data, FitRequest, Vary};
 use tempfile::TempDir;
 
 /// A leaf with something of everything.
@@ -97,6 +97,19 @@ pub fn peers(data: &[u8]) {
     match read_peers(&file) {
         Ok(rows) => assert!(rows.iter().all(|row| row.seconds > 0.0)),
         Err(error) => assert!(error.to_string().len() < 1_000 + 4 * data.len()),
+    }
+}
+
+/// A table of measured data, and one of candidate experiments.
+pub fn measurements(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    let mut measured = Data::default();
+    let read = measured.read(text, "data.csv", 2);
+    let candidates = FitRequest::read_candidates(text, "candidates.csv").map(drop);
+    for refused in [read, candidates].into_iter().filter_map(Result::err) {
+        assert!(refused.to_string().len() < 2_000 + 4 * text.len());
     }
 }
 

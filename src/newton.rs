@@ -3,8 +3,8 @@
 
 mod convergence;
 
-use convergence::{BALANCED, NEUTRAL_STEP};
-pub use convergence::{Contraction, at_saddle, converged, rounding, satisfies_lengths};
+use convergence::{BALANCED, NEUTRAL_STEP, ROUNDING};
+pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_lengths};
 
 use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
@@ -262,7 +262,7 @@ impl Newton<'_> {
                     _ => Contraction::default().error_after_first(size, 0.0),
                 };
                 let tolerances = [previous_tolerance, tolerance];
-                let accuracy = (self.accuracy, rounding(leaf, &next, size, previous));
+                let accuracy = (self.accuracy, ROUNDING);
                 let remaining = converged(size, previous, tolerances, accuracy, first);
                 if let Some(remaining) = remaining
                     && satisfies_lengths(leaf, state, self.accuracy)

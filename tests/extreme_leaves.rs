@@ -270,7 +270,7 @@ fn many_veins() {
 fn a_leaf_without_resistance_to_torsion() {
     for torsion in [1e-7, 1e-8, 1e-9] {
         let overrides = ["leaf.rods=4".into(), format!("stiffness.torsion={torsion}")];
-        let scenario = Scenario::read_with(&path("scenarios/paper/fig04.toml"), &overrides);
+        let scenario = Scenario::read_with(&path("paper/fig04"), &overrides);
         let scenario = scenario.unwrap();
         let leaf = settle(&scenario, 1e-6);
         let sharp = scenario.relaxation().tolerance(1e-8).run().unwrap();

@@ -124,6 +124,15 @@ fn tables_of_peers() {
     each("peers.csv", table, 300, bodies::peers);
 }
 
+#[test]
+fn measured_data() {
+    let loads = "experiment,load.tip_force[2],tip_z,sd_tip_z\n1,0.0,-0.12,0.01\n2,0.2,-0.1,0.02\n";
+    let traced = "rod,x,y,z,sigma,sd\n1,0.5,0.1,-0.2,0.5,0.01\n2,0.9,-0.1,0.0,,0.01\n";
+    for text in [loads, traced] {
+        each("data.csv", text, 300, bodies::measurements);
+    }
+}
+
 /// Checkpoints and the files that they belong to.
 #[test]
 fn checkpoints() {
@@ -142,10 +151,11 @@ fn checkpoints() {
 fn the_corpus_of_the_fuzz_targets() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
     type Body = fn(&[u8]);
-    let bodies: [(&str, Body); 4] = [
+    let bodies: [(&str, Body); 5] = [
         ("scenario", bodies::scenario),
         ("typed", bodies::typed),
         ("peers", bodies::peers),
+        ("measurements", bodies::measurements),
         ("checkpoint", bodies::checkpoint),
     ];
     for (target, body) in bodies {

@@ -216,7 +216,10 @@ fn points_of_veins_with_soft_ends_are_within_what_is_told() {
     "#;
     for text in [TWO, FOUR] {
         let vary = "scale:load.gravity=1..1.6";
-        let request = branch::request(base(text, ""), vary, TOLERANCE, 2000);
+        let request = leafdyn::study::TraceRequest {
+            keep_unstable: false,
+            ..branch::request(base(text, ""), vary, TOLERANCE, 2000)
+        };
         let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
         assert!(trace.branches[0].end.complete());
         let points = &trace.branches[0].points;

@@ -32,11 +32,6 @@ const ALONG: f64 = 0.995;
 /// A point on a coarser grid that is farther away than this (lengths) is another.
 const NEAR: f64 = 0.1;
 
-/// Least safety factor on the last correction of a point whose order of convergence is not
-/// confirmed. Of 570 points of random branches, most of veins with profiles, 17 had errors of
-/// four to 22 such corrections.
-const CAUTION: f64 = 25.0;
-
 /// Iterations after Newton's method has converged, and the displacement (lengths) at which they
 /// end.
 const FURTHER: usize = 3;
@@ -257,7 +252,7 @@ fn refine_in(
     accuracy: f64,
     in_plane: bool,
 ) -> Result<Refined, Doubt> {
-    let mut table = Table::with_caution(CAUTION);
+    let mut table = Table::of_regular_point();
     let mut equations = Equations::new(family, grid.clone())?;
     let mut condition = match on_coarser(family, grid, point, in_plane) {
         Some((segments, values, condition)) => {

@@ -52,8 +52,12 @@ fn without_dots(path: PathBuf) -> PathBuf {
     plain
 }
 
-/// Hidden file that names the scenario where no JSON file does, or not enough.
-const OWNER: &str = ".scenario";
+/// Hidden file beside a folder that names its scenario where no JSON file in it does, or not
+/// enough.
+fn beside(folder: &Path) -> String {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    format!(".{name}.scenario")
+}
 
 /// What tells the scenario of a folder from others: its source and, if that is standard
 /// input, a checksum of its text.
@@ -71,7 +75,8 @@ pub fn check_owner(folder: &Path, owner: &str) -> Result<(), FileError> {
         let change = "name a folder with --out DIR, or give this scenario another name";
         Err(FileError::unfit(file, &format!("{why}: {change}")))
     };
-    let named = fs::read_to_string(folder.join(OWNER)).ok();
+    let named = fs::read_to_string(folder.with_file_name(beside(folder))).ok();
+    let named = named.filter(|_| folder.exists());
     let from_input = owner.starts_with("- ");
     for name in FILES.into_iter().flatten() {
         let file = folder.join(name);
@@ -95,10 +100,11 @@ pub fn check_owner(folder: &Path, owner: &str) -> Result<(), FileError> {
 
 /// Records the owner of a folder where JSON files will not, or replaces what is recorded.
 pub fn claim_folder(folder: &Path, owner: &str, needed: bool) -> Result<(), FileError> {
-    match needed || folder.join(OWNER).exists() {
-        true => write_table(folder, OWNER, format!("{owner}\n").as_bytes()).map(drop),
-        false => Ok(()),
-    }
+    let file = folder.with_file_name(beside(folder));
+    let (Some(parent), true) = (file.parent(), needed || file.exists()) else {
+        return Ok(());
+    };
+    write_table(parent, &beside(folder), format!("{owner}\n").as_bytes()).map(drop)
 }
 
 fn of_another(folder: &Path, source: &str) -> String {

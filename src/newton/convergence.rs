@@ -3,12 +3,15 @@
 use crate::leaf::{DiscreteLeaf, State};
 
 /// An increment (radians, lengths) below this that does not decrease is due to rounding.
-const ROUNDING: f64 = 1e-9;
+pub const ROUNDING: f64 = 1e-9;
 
 /// Increments below this (radians, lengths) are attributed to rounding in a neutral mode if no
 /// force or moment above the second number (A/L^2, A/L) is unbalanced.
 pub const NEUTRAL_STEP: f64 = 1e-5;
 pub const BALANCED: f64 = 1e-9;
+
+/// So many such increments in a row are no convergence.
+const STALLED: usize = 20;
 
 /// Increments below this (radians, lengths) are used to measure quadratic convergence.
 const ASYMPTOTIC: f64 = 0.05;
@@ -83,14 +86,21 @@ pub fn converged(
     }
 }
 
-/// The size of increments that are due to rounding if they do not decrease, at a `state`
-/// after an increment of this `size` and one of size `previous`: very soft veins turn by more
-/// where all forces are balanced, and their increments do not decrease at all.
-pub fn rounding(leaf: &DiscreteLeaf, state: &State, size: f64, previous: f64) -> f64 {
-    let turns = (ROUNDING..NEUTRAL_STEP).contains(&size) && size >= previous;
-    match turns && leaf.residual(state) < BALANCED {
-        true => NEUTRAL_STEP,
-        false => ROUNDING,
+/// Counts increments in a row that very soft veins owe to rounding: they turn by more than
+/// [`ROUNDING`] where all forces are balanced.
+#[derive(Default)]
+pub struct Stalled(usize);
+
+impl Stalled {
+    /// The size of increments that are due to rounding if they do not decrease, at a `state`
+    /// after an increment of this `size`.
+    pub fn rounding(&mut self, leaf: &DiscreteLeaf, state: &State, size: f64) -> f64 {
+        let turns = (ROUNDING..NEUTRAL_STEP).contains(&size) && leaf.residual(state) < BALANCED;
+        self.0 = if turns { self.0 + 1 } else { 0 };
+        match self.0 > STALLED {
+            true => NEUTRAL_STEP,
+            false => ROUNDING,
+        }
     }
 }
 

@@ -14,7 +14,7 @@
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{
-    Definite, Equations, Newton, Stop, Work, at_saddle, cg_tolerance, converged, rounding,
+    Definite, Equations, Newton, Stalled, Stop, Work, at_saddle, cg_tolerance, converged,
     satisfies_lengths,
 };
 use crate::relax::methods::damped_motion::Motion;
@@ -162,6 +162,7 @@ impl Relaxation<'_> {
         let mut trial = self.state.clone();
         let mut motion = Motion::new(leaf);
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
+        let mut stalled = Stalled::default();
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
@@ -184,7 +185,7 @@ impl Relaxation<'_> {
                 motion.newton = size;
                 let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
-                let rounding = rounding(leaf, &self.state, size, previous);
+                let rounding = stalled.rounding(leaf, &self.state, size);
                 rest = converged(size, previous, tolerances, (accuracy, rounding), first);
             } else {
                 motion.newton = f64::INFINITY;
