@@ -152,8 +152,8 @@ pub(super) struct Table {
     pub rounding: f64,
     /// Error of the fraction due to softening of the matrix.
     pub softening: f64,
-    /// Whether the point is regular. Then its fraction is that on the finest grid, and has no
-    /// error.
+    /// Whether the point is regular: then its fraction is extrapolated as its points are, and
+    /// has no error, as it is where they are.
     regular: bool,
     /// An error of the points common to all grids, and their rounding error.
     pub common: f64,
@@ -239,8 +239,12 @@ impl Table {
         let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
         let own = columns(&self.points());
         let fractions = self.of(|values| vec![values.fraction]);
-        let [best, plain] = [columns(&fractions), 0].map(|m| fractions.column(m)[0]);
-        let fraction = if self.regular { plain } else { best };
+        let best = if self.regular {
+            own
+        } else {
+            columns(&fractions)
+        };
+        let fraction = fractions.column(best)[0];
         let mut points = self.of(|values| values.points.clone()).column(own).to_vec();
         let mut energy = self.of(|values| vec![values.energy]).column(own)[0];
         let reaction = self.of(|values| values.reaction.to_array().to_vec());
