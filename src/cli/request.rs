@@ -249,13 +249,12 @@ impl Request {
         if !selection.kinds.is_empty() {
             files::check_writable(&folder)?;
             let owner = files::owner(&source, &text);
-            let shared = self.out.is_none() || !single;
-            if shared {
+            if self.out.is_none() || !single {
                 files::check_owner(&folder, &owner)?;
             }
             // JSON files do not hold the text of standard input.
             let unnamed = source == "-" || !selection.kinds.contains(&Kind::Json);
-            files::claim_folder(&folder, &owner, shared && unnamed)?;
+            files::claim_folder(&folder, &owner, self.out.is_none() && unnamed)?;
         }
         Ok(Job {
             overrides: &self.overrides,
