@@ -46,8 +46,11 @@ pub fn relax(
     };
     let mut sharp = relax_once(scenario, &sharper, progress)?;
     sharp.accuracy.tolerance = tolerance;
-    let same = sharp.stability.negative_eigenvalues == found.stability.negative_eigenvalues;
-    if !same || !sharp.keeps_tolerance_at(scenario, parts) {
+    let mut tips = sharp.tips.iter().zip(&found.tips);
+    let apart = 2.0 * tolerance * found.shape.longest();
+    let same = sharp.stability.negative_eigenvalues == found.stability.negative_eigenvalues
+        && tips.all(|(one, other)| one.distance(*other) <= apart);
+    if !same || !sharp.keeps_tolerance() || !sharp.keeps_tolerance_at(scenario, parts) {
         return Ok(found);
     }
     sharp.wall_seconds += found.wall_seconds;

@@ -54,7 +54,7 @@ impl Equilibrium {
         !self.keeps_tolerance() || there().keeps_tolerance()
     }
 
-    fn keeps_tolerance(&self) -> bool {
+    pub(super) fn keeps_tolerance(&self) -> bool {
         let allowed = self.accuracy.tolerance * self.shape.longest();
         (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
     }
