@@ -310,7 +310,7 @@ fn a_leaf_that_needs_many_segments() {
 }
 
 /// Interpolation between the stations of the solution would lose the tolerance: the leaf is
-/// solved again, as often as that.
+/// solved again with a smaller one.
 #[test]
 fn stations_keep_the_tolerance() {
     let scenario = Scenario::from_toml(

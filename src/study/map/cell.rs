@@ -19,7 +19,7 @@ use super::row::{Confidence, Found, MapMethod, MapOutcome, MapRow};
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
 
-/// Lower bound on the seconds per node on any machine; three to six times as many are measured.
+/// Lower bound on the seconds per node on any machine; two to four times as many are measured.
 /// A grid is built and its solution started before the time limit is first checked.
 const LEAST_SECONDS: f64 = 3e-6;
 
