@@ -8,6 +8,7 @@ use super::states::{advanced, forces_on, rate, stiffest_condensed};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::{Contraction, converged};
+use crate::relax::CLEARLY_POSITIVE;
 use crate::rod::RESOLVED_TURN;
 
 /// Largest number of Newton iterations of a corrector.
@@ -45,6 +46,9 @@ pub enum Stuck {
     /// The matrix does not fit into memory.
     #[error("the sparse factorisation of the leaf does not fit into memory")]
     TooLarge,
+    /// Rounding may change the sign of the softest eigenvalues.
+    #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
+    Rounding,
 }
 
 /// The equations of a family of leaves on a grid, with workspace.
@@ -307,10 +311,19 @@ impl<'a> Equations<'a> {
 
     /// Morse index of an equilibrium, without neutral modes.
     fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
+        let shift = self.leaves.at(fraction)?.neutral_shift();
+        let index = self.index_below(state, fraction, shift)?;
+        if shift > CLEARLY_POSITIVE && index != self.index_below(state, fraction, -shift)? {
+            return Err(Stuck::Rounding);
+        }
+        Ok(index)
+    }
+
+    /// Number of eigenvalues below minus `shift`.
+    fn index_below(&mut self, state: &State, fraction: f64, shift: f64) -> Result<usize, Stuck> {
         let leaf = self.leaves.at(fraction)?;
         let system = &mut self.system;
         self.factorizations += 1;
-        let shift = leaf.neutral_shift();
         system.set_coupling(leaf);
         leaf.assemble(state, system);
         if system.stable_without_coupling(shift) {

@@ -164,7 +164,8 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 _ => Outcome::Converged,
             },
             run.index.is_none().then(|| match run.leaf.loads.tip_moment == DVec3::ZERO {
-                true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
+                true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
+                     its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
             })
             .or_else(|| run.moved_softened.then(|| SOFTENED.into())),

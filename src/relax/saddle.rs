@@ -17,7 +17,7 @@ const MAX_STEP: f64 = 0.5;
 
 /// Lower bound on the lowest eigenvalue (with respect to the masses; 12 for a clamped rod) on
 /// one grid of a leaf that counts as clearly stable: near a fold it changes with the shape.
-const CLEARLY_POSITIVE: f64 = 0.1;
+pub const CLEARLY_POSITIVE: f64 = 0.1;
 
 /// Safety factor on the excess stiffness of the elements, which is computed with the forces on
 /// the grid.
@@ -59,6 +59,19 @@ pub fn index(
     negative(system, shift)
 }
 
+/// The least and the largest [`index`] on a grid so fine that rounding may change the sign of
+/// the softest eigenvalues.
+pub fn index_within_rounding(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut Work,
+) -> Option<[usize; 2]> {
+    let noise = leaf.neutral_shift();
+    let least = index(leaf, state, system, noise, work)?;
+    Some([least, index(leaf, state, system, -noise, work)?])
+}
+
 /// Negative eigenvalues of an assembled matrix plus `shift` times its mass matrix.
 fn negative(system: &System, shift: f64) -> Option<usize> {
     let pattern = SparsePattern::new(system).ok()?;
@@ -67,7 +80,8 @@ fn negative(system: &System, shift: f64) -> Option<usize> {
 
 /// Whether a state at rest on a grid may be expected to be stable on finer ones as well: its
 /// Hessian minus [`EXCESS_SAFETY`] times the excess stiffness of the elements over the rods
-/// and minus [`CLEARLY_POSITIVE`] times the mass matrix is positive definite.
+/// and minus [`CLEARLY_POSITIVE`], or more where rounding is more, times the mass matrix is
+/// positive definite.
 pub fn clearly_stable(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -80,15 +94,16 @@ pub fn clearly_stable(
         work.force_evaluations += 1;
         work.factorizations += 1;
     };
+    let least = CLEARLY_POSITIVE.max(leaf.neutral_shift());
     assemble(system);
-    if system.stable_without_coupling(-CLEARLY_POSITIVE) {
+    if system.stable_without_coupling(-least) {
         return true;
     }
     if !system.coupled() {
         return false;
     }
     assemble(system);
-    negative(system, -CLEARLY_POSITIVE) == Some(0)
+    negative(system, -least) == Some(0)
 }
 
 /// Newton's equations with pivots of any sign, and steps of bounded size.

@@ -20,6 +20,14 @@ impl Run<'_, '_> {
         }
         self.index = match self.clearly_stable {
             true => Some(0),
+            false if leaf.neutral_shift() > saddle::CLEARLY_POSITIVE => {
+                let within = saddle::index_within_rounding(leaf, state, system, &mut self.work);
+                // Whatever is unstable is pushed off, however many its unstable modes.
+                let known = |&[least, most]: &[usize; 2]| {
+                    least == most || (least > 0 && !self.keeps_unstable())
+                };
+                within.filter(known).map(|[least, _]| least)
+            }
             false => saddle::index(leaf, state, system, 0.0, &mut self.work),
         };
         true
