@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use crate::relax::{self, Equilibrium, Method, Options, Settings};
+use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
 use crate::report::{self, numbers::brief};
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
@@ -116,7 +116,9 @@ impl Relax {
         for doubt in &equilibrium.doubts {
             job.remark(Some(doubt));
         }
-        let success = equilibrium.outcome.is_success();
+        let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
+        let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;
+        let success = equilibrium.outcome.is_success() && !unwanted;
         job.deliver(&equilibrium, success, |files| {
             report::relax_report(&equilibrium, files)
         })

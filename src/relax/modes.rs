@@ -74,6 +74,9 @@ pub struct Lowest {
     /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
     /// free motion.
     pub undecided: Option<f64>,
+    /// The Morse index by the signs of the eigenvalues, if all are larger than their errors and
+    /// the last is positive.
+    pub index: Option<usize>,
 }
 
 /// The lowest modes. `None` if they cannot be computed: the leaf is too large, unless they are
@@ -145,6 +148,7 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     Some(Lowest {
         modes: series.values().into_iter().zip(shapes).map(mode).collect(),
         undecided: series.undecided(),
+        index: series.negative(),
     })
 }
 
@@ -308,6 +312,14 @@ impl Series {
             error.is_some_and(|error| error <= wanted + self.rounding)
         };
         self.values().into_iter().enumerate().all(known)
+    }
+
+    /// Number of negative eigenvalues, if their signs are certain and the last is positive.
+    fn negative(&self) -> Option<usize> {
+        let values = self.values();
+        let certain = |&(value, error): &(f64, Option<f64>)| error.is_some_and(|e| value.abs() > e);
+        let complete = values.iter().all(certain) && values.last()?.0 > 0.0;
+        complete.then(|| values.iter().filter(|(value, _)| *value < 0.0).count())
     }
 
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the

@@ -199,6 +199,9 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                     "a vein bends by more than a right angle within one of {finest} segments{}",
                     advice(run)
                 ),
+                Stop::StepLimit if run.keeps_unstable() => format!(
+                    "Newton's method leads to no equilibrium from this start on {finest} segments: let the leaf relax, which moves it to a stable one"
+                ),
                 _ => format!(
                     "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
                     advice(run)
@@ -207,6 +210,9 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
         ),
     }
 }
+
+/// Loads that advice names, as a part of the largest.
+const COUNTS: f64 = 0.1;
 
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
@@ -237,11 +243,17 @@ fn advice(run: &Run) -> String {
         false => stiffness.recip(),
     };
     let softest = ["torsion", "bending_2", "bending_3"][turned.max_position()];
-    let load = match weight * run.leaf.rods() as f64 > tip {
-        _ if moment > weight.max(tip) => "lower load.tip_moment",
-        true => "lower load.gravity",
-        false if tip > 0.0 => "lower load.tip_force",
-        false => "lower the curvatures at rest",
+    let named = [
+        (weight * run.leaf.rods() as f64, "load.gravity"),
+        (tip, "load.tip_force"),
+        (moment, "load.tip_moment"),
+    ];
+    let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
+    let counts = |(size, _): &&(f64, _)| *size > COUNTS * largest;
+    let loads: Vec<&str> = named.iter().filter(counts).map(|(_, name)| *name).collect();
+    let load = match loads.is_empty() {
+        true => "the curvatures at rest".to_owned(),
+        false => loads.join(" or "),
     };
     let reached = match run.load_part {
         part if part > 0.0 && part < 0.995 => {
@@ -250,7 +262,7 @@ fn advice(run: &Run) -> String {
         _ => String::new(),
     };
     format!(
-        "{reached}: {load}, or raise stiffness.{softest} of vein {}",
+        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}",
         vein + 1
     )
 }

@@ -3,7 +3,7 @@
 use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::newton::{Stop, Work};
-use crate::relax::equilibrium::Equilibrium;
+use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
 use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
@@ -157,8 +157,14 @@ fn on_grids(
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
     run.shape_alone = shape_alone;
-    let mut end = run.solve(grid.clone());
-    end = run.settle_by_own_motion(&grid, end);
+    let end = rest_from(&mut run, grid);
+    Ok(finished(run, end, clock))
+}
+
+/// Rest, starting on this grid; if that fails, by steps of loads and stiffness on finer ones.
+fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
+    let end = run.solve(grid.clone());
+    let mut end = run.settle_by_own_motion(&grid, end);
     let mut next = Some(grid);
     while end.is_err()
         && run.may_go_by_steps()
@@ -177,7 +183,7 @@ fn on_grids(
             .map(|level| level.leaf.grid.refined())
             .filter(|grid| grid.segments() <= FINEST_BY_STEPS);
     }
-    Ok(finished(run, end, clock))
+    end
 }
 
 /// The result of a run, with the modes of a leaf at rest: requested modes are not counted in
@@ -201,9 +207,18 @@ fn finished(
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
     // Near a bifurcation the Morse index on a grid may differ from that of the leaf.
     while let Some(finer) = modes::deciding_grid(&run, lowest.as_ref()) {
-        let further = run.continue_on(finer);
+        let coarser = run.levels.clone();
+        // A saddle of the finer grid may be none of the coarser, and what it leads to not
+        // near them.
+        let further = run.continue_on(finer.clone()).or_else(|_| {
+            run.restart();
+            rest_from(&mut run, finer)
+        });
         // The grids before found rest; without this one the sign remains undecided.
-        let Ok(_) = further else { break };
+        if further.is_err() {
+            run.levels = coarser;
+            break;
+        }
         end = further;
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
@@ -212,13 +227,33 @@ fn finished(
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
-        found.doubts.push(UNDECIDED.to_owned());
+    if let Some(undecided) = lowest.as_ref().filter(|it| it.undecided.is_some()) {
+        found.decide(undecided.index);
     }
     found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
     (found, run.levels)
 }
 
+impl Equilibrium {
+    /// The Morse index by extrapolated eigenvalues, where those of single grids may have other
+    /// signs.
+    fn decide(&mut self, index: Option<usize>) {
+        self.stability.negative_eigenvalues = index;
+        match index {
+            Some(1..) if self.outcome.is_success() => {
+                self.outcome = Outcome::Saddle;
+                self.remark = Some(BESIDE_BIFURCATION.to_owned());
+            }
+            Some(_) => {}
+            None => self.doubts.push(UNDECIDED.to_owned()),
+        }
+    }
+}
+
 /// Remark on a leaf with an eigenvalue that may have either sign.
 const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     whether the leaf is stable is not certain";
+     whether the leaf is stable is not known";
+
+/// Remark on a leaf at rest on all grids that is at a saddle.
+const BESIDE_BIFURCATION: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
+     still stable; a load that is a little larger, or a small disturbance, shows where it goes";

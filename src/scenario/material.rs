@@ -73,11 +73,20 @@ impl Sections {
         Ok(Some(sections))
     }
 
-    /// Refuses stiffnesses and masses that are too large or too small.
+    /// Refuses stiffnesses and masses that are too large or too small, and flat sections of
+    /// auxetic materials, for which Cowper's formula has no meaning.
     fn check(&self, raw: &Raw) -> Result<()> {
         let Some(item) = size(raw) else {
             return Ok(());
         };
+        for (rod, section) in self.sections.iter().enumerate() {
+            raw.item(Key::Poisson)?.entry(rod).ensure(
+                section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
+                "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
+                 so flat a section with a negative ratio: choose a larger one, or give the \
+                 stiffnesses in place of a section",
+            )?;
+        }
         let stiffness = [Property::Couple, Property::Force];
         let stiffness = stiffness.into_iter().flat_map(|of| (0..3).map(of));
         let masses = [Property::Density, Property::RotaryInertia];

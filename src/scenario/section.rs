@@ -135,13 +135,24 @@ impl Section {
 
     /// Values at the knots and between them.
     pub(super) fn samples(&self, property: Property) -> impl Iterator<Item = f64> {
+        self.fractions().map(move |sigma| self.at(property, sigma))
+    }
+
+    /// Cowper's factors for both shear forces, likewise.
+    pub(super) fn shear_factors(&self) -> impl Iterator<Item = f64> {
+        self.fractions().flat_map(|sigma| {
+            let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
+            let poisson = self.poisson.at(sigma);
+            [(w, t), (t, w)]
+                .map(|(along, across)| self.outline.shear_factor(along, across, poisson))
+        })
+    }
+
+    fn fractions(&self) -> impl Iterator<Item = f64> {
         let edges = [&[0.0], self.kinks(), &[1.0]].concat();
         (0..edges.len() - 1).flat_map(move |panel| {
             let (from, to) = (edges[panel], edges[panel + 1]);
-            (0..=SAMPLES).map(move |k| {
-                let part = k as f64 / SAMPLES as f64;
-                self.at(property, from + part * (to - from))
-            })
+            (0..=SAMPLES).map(move |k| from + k as f64 / SAMPLES as f64 * (to - from))
         })
     }
 }

@@ -62,7 +62,16 @@ pub fn trace_observed(
         .into(),
         ..Options::default()
     };
-    let rest = relax(&scenario, &options, &mut |_| {})?;
+    let mut rest = relax(&scenario, &options, &mut |_| {})?;
+    if request.keep_unstable && !rest.outcome.is_at_rest() {
+        // Newton's method leads nowhere from this start.
+        let method = SemiImplicit::default().into();
+        let stable = Options {
+            method,
+            ..options.clone()
+        };
+        rest = relax(&scenario, &stable, &mut |_| {})?;
+    }
     let check = |least| check_grid(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
@@ -84,9 +93,11 @@ pub fn trace_observed(
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    let began = match rest.stability.negative_eigenvalues {
-        Some(_) => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
-        None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
+    // Next to a bifurcation the index at the start may be unknown.
+    let counted = rest.stability.negative_eigenvalues.is_some();
+    let began = match counted || (rest.outcome.is_success() && rest.remark.is_none()) {
+        true => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
+        false => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
     match began {
         Ok((grids, first)) => {
