@@ -46,6 +46,23 @@ fn an_acceleration_in_place_of_a_weight_is_named() {
     assert!(said(&weight("20.0")).is_empty());
 }
 
+/// A strip whose edge carries what its face does not.
+#[test]
+fn an_acceleration_of_a_flat_strip_is_named() {
+    let strip = |gravity: f64| {
+        let strip = format!(
+            r#"
+            name = "strip"
+            leaf = {{ rods = 1, length = 0.3, fan = [0.0] }}
+            section = {{ shape = "rectangle", width = 0.008, thickness = 4e-4, young = 1e9, mass_density = 800 }}
+            load = {{ gravity = [0.0, 0.0, {gravity:?}] }}"#
+        );
+        settle(base(&strip, "").scenario(), 1e-6).doubts
+    };
+    assert!(strip(-9.81).concat().contains("not the acceleration"));
+    assert!(strip(-800.0 * 0.008 * 4e-4 * 9.81).is_empty());
+}
+
 /// Nothing is said about the leaves that come with the program, whose numbers are meant.
 #[test]
 fn nothing_is_said_about_other_leaves() {

@@ -66,3 +66,45 @@ fn traced_veins_give_stiffnesses() {
         gives_back(&found, &[1.6, 2.5], 1e-3);
     }
 }
+
+/// A weight three times as large bends a vein three times as stiff as much: along what is not
+/// known, gravity changes by itself while the stiffness changes by the factor e.
+#[test]
+fn what_weight_and_stiffness_share_is_named_in_their_units() {
+    let heavy = VEIN
+        .replace("-0.5", "-20.0")
+        .replace("axial = 50.0, shear_2 = 40.0, shear_3 = 40.0", RIGIDLY);
+    let leaf = settle(base(&heavy, "").scenario(), 1e-9);
+    let mut table = String::from("rod,x,z,sd\n");
+    for node in &leaf.shape.rods[0].nodes[1..] {
+        table += &format!("1,{:?},{:?},1e-3\n", node.position.x, node.position.z);
+    }
+    let free = ["stiffness.bending_2", "load.gravity[2]"];
+    let found = fitted(&request(base(&heavy, ""), &[&table], &free));
+    let [open] = found.undetermined.as_slice() else {
+        panic!("{:?}", found.says);
+    };
+    let rate = open["load.gravity[2]"] / open["stiffness.bending_2"];
+    close("change of gravity", rate, -20.0, 0.05);
+    assert!(found.says.concat().contains("20 ln t"), "{:?}", found.says);
+}
+
+const RIGIDLY: &str = "axial = inf, shear_2 = inf, shear_3 = inf";
+
+/// Data in millimetres of a leaf in metres, and frequencies of a leaf without mass.
+#[test]
+fn data_in_other_units_are_doubted() {
+    let free = ["stiffness.bending_2"];
+    let doubted = |text: &str, data: &str, doubt: &str| {
+        let found = fitted(&request(base(text, ""), &[data], &free));
+        found.remarks.iter().any(|remark| remark.contains(doubt))
+    };
+    let near = "rod,x,z\n1,0.5,-0.01\n1,0.9,-0.04\n1,0.98,-0.05\n";
+    let far = "rod,x,z\n1,500,-10\n1,900,-40\n1,980,-50\n";
+    assert!(!doubted(VEIN, near, "unit of length"));
+    assert!(doubted(VEIN, far, "unit of length"));
+    let massless = VEIN.replace("dynamics = { density = 1.0, rotary_inertia = 1e-4 }", "");
+    let beats = "frequency_1\n0.5\n0.51\n0.49\n";
+    assert!(!doubted(VEIN, beats, "density"));
+    assert!(doubted(&massless, beats, "density"));
+}

@@ -26,7 +26,7 @@ const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The first point of a branch and its grid: the equilibrium `rest`, found with these
 /// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
 /// the first one, at least twice as fine as the stations of the relaxation, on which the index
-/// is that of `rest`, if that is known.
+/// is that of `rest`.
 ///
 /// # Errors
 /// The failure on the finest grid, if Newton's method converges on none.
@@ -38,8 +38,7 @@ pub fn begin<'a>(
 ) -> Result<(Grids<'a>, Point), Stuck> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
     let least = segments.unwrap_or(2 * coarsest);
-    let any_index = segments.is_some() || rest.stability.negative_eigenvalues.is_none();
-    search(family, rest, least, any_index).or_else(|stuck| {
+    search(family, rest, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();

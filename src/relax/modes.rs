@@ -74,9 +74,8 @@ pub struct Lowest {
     /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
     /// free motion.
     pub undecided: Option<f64>,
-    /// The Morse index by the signs of the eigenvalues, if all are larger than their errors and
-    /// the last is positive.
-    pub index: Option<usize>,
+    /// How many of the eigenvalues are negative, if all are larger than their errors.
+    pub negative: Option<usize>,
 }
 
 /// The lowest modes. `None` if they cannot be computed: the leaf is too large, unless they are
@@ -148,7 +147,7 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     Some(Lowest {
         modes: series.values().into_iter().zip(shapes).map(mode).collect(),
         undecided: series.undecided(),
-        index: series.negative(),
+        negative: series.negative(),
     })
 }
 
@@ -314,12 +313,12 @@ impl Series {
         self.values().into_iter().enumerate().all(known)
     }
 
-    /// Number of negative eigenvalues, if their signs are certain and the last is positive.
+    /// Number of negative eigenvalues, if their signs are certain.
     fn negative(&self) -> Option<usize> {
         let values = self.values();
         let certain = |&(value, error): &(f64, Option<f64>)| error.is_some_and(|e| value.abs() > e);
-        let complete = values.iter().all(certain) && values.last()?.0 > 0.0;
-        complete.then(|| values.iter().filter(|(value, _)| *value < 0.0).count())
+        let all = values.iter().all(certain);
+        all.then(|| values.iter().filter(|(value, _)| *value < 0.0).count())
     }
 
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the

@@ -7,7 +7,7 @@ use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
 use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
-use crate::relax::modes;
+use crate::relax::modes::{self, Lowest};
 use crate::relax::options::{
     MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
 };
@@ -227,32 +227,44 @@ fn finished(
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    if let Some(undecided) = lowest.as_ref().filter(|it| it.undecided.is_some()) {
-        found.decide(undecided.index);
+    if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
+        found.decide(index_by_eigenvalues(&run, lowest.as_ref(), count));
     }
     found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
     (found, run.levels)
 }
 
+/// The Morse index by the signs of the extrapolated eigenvalues, if they are certain: those of
+/// the lowest `count`, or of more if all of these are negative.
+fn index_by_eigenvalues(run: &Run, lowest: Option<&Lowest>, count: usize) -> Option<usize> {
+    let mut negative = lowest?.negative?;
+    let mut count = count;
+    while negative == count && count < MOST_MODES {
+        count = (2 * count).min(MOST_MODES);
+        negative = modes::lowest(run, count, true)?.negative?;
+    }
+    (negative < count).then_some(negative)
+}
+
 impl Equilibrium {
-    /// The Morse index by extrapolated eigenvalues, where those of single grids may have other
-    /// signs.
+    /// Takes the Morse index by extrapolated eigenvalues, if it is known, where those of single
+    /// grids may have other signs.
     fn decide(&mut self, index: Option<usize>) {
-        self.stability.negative_eigenvalues = index;
-        match index {
-            Some(1..) if self.outcome.is_success() => {
-                self.outcome = Outcome::Saddle;
-                self.remark = Some(BESIDE_BIFURCATION.to_owned());
-            }
-            Some(_) => {}
-            None => self.doubts.push(UNDECIDED.to_owned()),
+        let Some(index) = index else {
+            self.doubts.push(UNDECIDED.to_owned());
+            return;
+        };
+        self.stability.negative_eigenvalues = Some(index);
+        if index > 0 && self.outcome.is_success() {
+            self.outcome = Outcome::Saddle;
+            self.remark = Some(BESIDE_BIFURCATION.to_owned());
         }
     }
 }
 
 /// Remark on a leaf with an eigenvalue that may have either sign.
 const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
-     whether the leaf is stable is not known";
+     whether the leaf is stable is not certain";
 
 /// Remark on a leaf at rest on all grids that is at a saddle.
 const BESIDE_BIFURCATION: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \

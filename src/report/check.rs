@@ -26,6 +26,7 @@ pub fn report(check: &Check, files: Option<String>) -> String {
     if let (Some(remark), true) = (&relaxed.remark, check.shot.is_some()) {
         lines.push(("remark", remark.clone()));
     }
+    lines.extend(labelled("doubtful", relaxed.doubts.clone()));
     lines.extend(files.map(|files| ("written", files)));
     let veins = veins(relaxed);
     let heading = format!("{}: {veins}, relaxed and by shooting", relaxed.scenario);

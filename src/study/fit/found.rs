@@ -6,15 +6,22 @@ use super::data::Experiment;
 use super::directions::sparse;
 use super::least_squares::End;
 use super::model::Model;
+use super::quantity::Quantity;
 use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
 use super::statistics::{OPEN, Statistics};
 use super::words::{self, Undetermined};
 use crate::relax::Lost;
+use crate::scenario::longest;
 use crate::study::Keys;
 
 /// Components of a weakly determined combination smaller than this part of its
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
+
+/// Data this far from the fitted leaf, or from the base, in lengths of the longest rod, are
+/// hardly those of a leaf of this length.
+const MISSED: f64 = 0.5;
+const BEYOND: f64 = 3.0;
 
 /// Number of times the leaves of all experiments were relaxed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,8 +52,7 @@ pub(super) fn fit(
         .map(|free| free.keys.to_string())
         .collect();
     let logs: Vec<bool> = coordinates.iter().map(|free| free.log).collect();
-    // Ratios of the coefficients of coordinates to those of their numbers.
-    let units: Vec<f64> = coordinates.iter().map(|free| 1.0 / free.unit).collect();
+    let units: Vec<f64> = coordinates.iter().map(|free| free.unit).collect();
     let outcome = match end {
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
@@ -73,7 +79,7 @@ pub(super) fn fit(
             .iter()
             .map(|open| words::map(open, &keys, &units))
             .collect(),
-        says: words::sentences(&parameters, &open, &logs),
+        says: words::sentences(&parameters, &open, (&logs, &units)),
         parameters,
         chi_squared: match stats.known {
             true => stats.residuals.norm_squared(),
@@ -122,6 +128,7 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
             });
         }
     }
+    remarks.extend(other_units(stats));
     if stats.freedom == 0 {
         remarks
             .push("there are as many numbers as data: nothing is left to judge the fit by".into());
@@ -133,6 +140,46 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
             stats.residuals.norm_squared(),
             stats.freedom
         ));
+    }
+    remarks
+}
+
+/// Data that are probably in other units than the scenario.
+fn other_units(stats: &Statistics) -> Vec<String> {
+    let base = stats.model.base;
+    let longest = longest(&base.scenario().rods);
+    let (mut places, mut frequencies) = (0, false);
+    for component in stats.point.components() {
+        match component.what {
+            Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => {
+                let apart = (component.observed - component.model).abs() > MISSED * longest;
+                places += usize::from(apart || component.observed.abs() > BEYOND * longest);
+            }
+            Compared::Result(Quantity::Frequency(_)) => frequencies = true,
+            Compared::Result(Quantity::Reaction(_)) => {}
+        }
+    }
+    let mut remarks = Vec::new();
+    if places > 0 {
+        remarks.push(format!(
+            "{places} of the coordinates are far from any leaf of this length ({longest}): are the data in the \
+             scenario's unit of length?"
+        ));
+    }
+    let given = |key: &str| {
+        let keys = key.parse::<Keys>();
+        keys.is_ok_and(|keys| base.at(&[(&keys, 1.0)]).is_ok())
+    };
+    if frequencies
+        && !["scale:dynamics.density", "scale:section.mass_density"]
+            .into_iter()
+            .any(given)
+    {
+        remarks.push(
+            "frequencies are compared, but the scenario has no dynamics.density: its unit of time is then \
+             sqrt(rho L^4/A), which changes with the bending stiffness A: give the density"
+                .into(),
+        );
     }
     remarks
 }
@@ -157,11 +204,12 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
                 .find(|part| part.abs() == largest)
                 .map_or(1.0, |p| p.signum());
             let parts = v.iter().map(|part| sign * part / largest).enumerate();
-            let parts = parts.filter(|(_, part)| part.abs() > NEGLIGIBLE);
-            open.push(Undetermined {
-                parts: parts.collect(),
-                exactly: false,
-            });
+            let parts: Vec<_> = parts.filter(|(_, part)| part.abs() > NEGLIGIBLE).collect();
+            // Of a number alone its profile decides.
+            if !matches!(parts[..], [(k, _)] if parameters[k].determined) {
+                let exactly = false;
+                open.push(Undetermined { parts, exactly });
+            }
         }
     }
     // A number whose profile alone has no end.

@@ -29,11 +29,11 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// A sentence for each number and each undetermined combination. `logs` are the numbers
-/// whose coordinate is a logarithm.
+/// whose coordinate is a logarithm, `units` those of the other coordinates.
 pub(super) fn sentences(
     parameters: &[FitParameter],
     open: &[Undetermined],
-    logs: &[bool],
+    (logs, units): (&[bool], &[f64]),
 ) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
@@ -49,7 +49,7 @@ pub(super) fn sentences(
         });
     }
     for open in open {
-        said.push(sentence(open, parameters, logs));
+        said.push(sentence(open, parameters, (logs, units)));
     }
     said
 }
@@ -62,7 +62,11 @@ fn percent(part: f64) -> String {
     }
 }
 
-fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> String {
+fn sentence(
+    open: &Undetermined,
+    parameters: &[FitParameter],
+    (logs, units): (&[bool], &[f64]),
+) -> String {
     let key = |k: usize| parameters[k].key.as_str();
     let all_logs = open.parts.iter().all(|(k, _)| logs[*k]);
     match open.parts.as_slice() {
@@ -78,9 +82,10 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> 
             format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
+            // Of numbers that are not logarithms the combination is the tangent.
             let change = |(k, part): &(usize, f64)| match logs[*k] {
                 true => format!("{} in proportion to t^{}", key(*k), short(*part)),
-                false => format!("{} by {} t", key(*k), short(*part)),
+                false => format!("{} by {} ln t", key(*k), digits(part * units[*k])),
             };
             let changes: Vec<String> = parts.iter().map(change).collect();
             let unseen = if open.exactly {
@@ -88,9 +93,15 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> 
             } else {
                 "hardly seen"
             };
-            format!("{unseen}: {} together, for any t", changes.join(", "))
+            let which = if all_logs { "any t" } else { "t near 1" };
+            format!("{unseen}: {} together, for {which}", changes.join(", "))
         }
     }
+}
+
+/// Three significant digits.
+fn digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 fn short(value: f64) -> String {

@@ -93,11 +93,9 @@ pub fn trace_observed(
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    // Next to a bifurcation the index at the start may be unknown.
-    let counted = rest.stability.negative_eigenvalues.is_some();
-    let began = match counted || (rest.outcome.is_success() && rest.remark.is_none()) {
-        true => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
-        false => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
+    let began = match rest.stability.negative_eigenvalues {
+        Some(_) => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
+        None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
     match began {
         Ok((grids, first)) => {
