@@ -7,6 +7,9 @@ use super::FitError;
 use super::data::{Data, Experiment, Measured, Origin, Traced};
 use crate::study::Keys;
 
+/// Numbers of the scenario during an experiment.
+type Settings = Vec<(Keys, f64)>;
+
 /// An experiment with the points traced on its veins.
 pub(super) struct Observed {
     /// Its position among all.
@@ -19,7 +22,7 @@ pub(super) struct Observed {
 
 /// The conditions of one experiment or of several, and what was observed under them.
 pub(super) struct Case {
-    pub settings: Vec<(Keys, f64)>,
+    pub settings: Settings,
     /// At least one.
     pub observed: Vec<Observed>,
     /// Whether it differs from the other cases by loads only: it then has the same
@@ -28,7 +31,7 @@ pub(super) struct Case {
 }
 
 impl Case {
-    fn new(settings: Vec<(Keys, f64)>) -> Case {
+    fn new(settings: Settings) -> Case {
         let mut targets = settings.iter().flat_map(|it| it.0.targets());
         let loaded_only = targets.all(|target| {
             let key = target.key();
@@ -82,7 +85,7 @@ pub(super) fn cases(data: Data) -> Result<Vec<Case>, FitError> {
 }
 
 /// The experiments with data, and their settings.
-fn observed(data: Data) -> Result<Vec<(Observed, Vec<(Keys, f64)>)>, FitError> {
+fn observed(data: Data) -> Result<Vec<(Observed, Settings)>, FitError> {
     let observed = |experiment: Experiment| {
         let observed = Observed {
             number: 0,
