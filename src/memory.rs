@@ -92,6 +92,13 @@ pub enum Request {
         /// Intervals.
         intervals: usize,
     },
+    /// A result at stations that are asked for.
+    Stations {
+        /// Rods.
+        rods: usize,
+        /// Stations of each, but for its base.
+        stations: usize,
+    },
     /// The rows of a map.
     Map {
         /// Cells.
@@ -125,6 +132,11 @@ impl Request {
             // Measured: five matrices of (12 N)^2 numbers per interval.
             Request::Shooting { rods, intervals } => {
                 product([rods, rods, intervals.saturating_add(1)], 5 * 144 * 8)
+            }
+            // Measured: 580 for tables, 700 with those of modes, however many; 920 for a page, 1240
+            // for that of a motion.
+            Request::Stations { rods, stations } => {
+                product([rods, stations.saturating_add(1), 1], 1_250)
             }
             Request::Map { cells, methods } => product([cells, methods, 1], 1_000),
             Request::Scenario { parsed, .. } => parsed,
@@ -190,6 +202,7 @@ impl Request {
             Request::Shooting { .. } => {
                 "use fewer rods or intervals, or the method semi-implicit, which has no such matrices"
             }
+            Request::Stations { .. } => "ask for fewer stations",
             Request::Map { .. } => "lower the counts of the axes",
             Request::Scenario { .. } => "write fewer entries",
         }
@@ -205,6 +218,9 @@ impl fmt::Display for Request {
             }
             Request::Shooting { rods, intervals } => {
                 write!(f, "shooting with {rods} rods, intervals: {intervals},")
+            }
+            Request::Stations { rods, stations } => {
+                write!(f, "{rods} rods with {stations} stations")
             }
             Request::Map { cells, methods } => write!(f, "{cells} cells by {methods} methods"),
             Request::Scenario { bytes, .. } => write!(f, "a scenario of {bytes} bytes"),

@@ -5,6 +5,7 @@ mod workplace;
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use leafdyn::scenario::{Scenario, schema};
 use serde_json::Value;
@@ -50,6 +51,21 @@ fn what_is_there_is_not_replaced() {
     place.write("mine.toml", "mine");
     place.refuses("new rod mine.toml", "mine.toml: is there already");
     assert_eq!(place.read("mine.toml"), "mine");
+    // On a full disk there is no part of it.
+    if cfg!(unix) {
+        let full = place.command("new rod part.toml");
+        let run = Command::new("sh")
+            .args([
+                "-c",
+                "trap '' XFSZ; ulimit -f 0; exec \"$0\" new rod part.toml",
+            ])
+            .arg(full.get_program())
+            .current_dir(place.path("."))
+            .output()
+            .unwrap();
+        assert_eq!(run.status.code(), Some(2));
+        assert_eq!(place.names("."), ["mine.toml"]);
+    }
 }
 
 /// Whatever its name contains, nothing of it reaches the terminal as a command.

@@ -28,6 +28,15 @@ const DATA: &str = "
     tip_z,frequency_1|-0.2,1 => standard deviations
     tip_z,tip_x,sd_tip_x|-0.2,1,0.1 => give all or none
     load.tip_force[2],tip_z|1e12,1 => data.csv:2
+    tip_z|1e308|-1e308 => data.csv:2: tip_z = 1e308: next to such a number
+    tip_z,sd_tip_z|-0.1,0.1|1e16,1e15 => data.csv:3: tip_z = 1e16
+    tip_z,sd_tip_z|-0.1,0.1|-0.1,1e-300 => data.csv:3: sd_tip_z = 1e-300: is less than the rounding of tip_z
+    tip_y,sd_tip_y|0,1e-160|0,1e-160 => data.csv:2: sd_tip_y = 1e-160
+    tip_z,sd_tip_z|-0.1,1e-17|-0.2,0.1 => data.csv:2: sd_tip_z = 1e-17
+    frequency_1|1e300|1 => data.csv:2: frequency_1 = 1e300
+    frequency_1,sd_frequency_1|1,1e-30|1,0.1 => data.csv:2: sd_frequency_1 = 1e-30
+    rod,sigma,x,y,sd|1,0.5,0.5,0,1e-200 => data.csv:2: sd = 1e-200: is less than the rounding of x
+    rod,x,y|1,-1e200,1e200|1,1,1 => data.csv:2: x = -1e200
 ";
 
 /// Numbers that are to be free, `=>` and a part of the message, with good data.

@@ -70,6 +70,27 @@ fn twenty_numbers_of_a_large_leaf_take_few_evaluations() {
     within_bars(&found, &[&values[..19], &[40.0]].concat(), 2.5);
 }
 
+/// Pulls that are measured again and again are one leaf each, and rows stay in their order.
+#[test]
+fn equal_experiments_share_a_leaf() {
+    let header = "load.tip_force[2],tip_z,frequency_1,sd_tip_z,sd_frequency_1\n";
+    let pulls = "0.5,-0.11,,0.01,\n1.0,-0.05,,0.01,\n0.5,,0.3,,0.1\n";
+    let asked = |count: usize| {
+        let data = header.to_string() + &pulls.repeat(count);
+        fitted(&request(base(LEAF, ""), &[&data], &FREE[..1]))
+    };
+    let [once, often] = [1, 5_000].map(asked);
+    let last = [&once, &often].map(|fit| fit.work.last.factorizations);
+    assert_eq!(last[0], last[1]);
+    let values = [&once, &often].map(|fit| fit.parameters[0].value);
+    close("bending", values[0], values[1], 1e-3);
+    assert_eq!(often.residuals.len(), 15_000);
+    for (row, residual) in often.residuals.iter().enumerate() {
+        assert_eq!(residual.experiment, (row + 1).to_string());
+        assert_eq!(residual.data, [-0.11, -0.05, 0.3][row % 3]);
+    }
+}
+
 #[test]
 fn threads_change_no_bit() {
     let text = |fit: Fit| {

@@ -21,6 +21,9 @@ fn what_takes_more_memory_than_is_allowed_is_refused() {
         --method shooting --set leaf.rods=100000 => shooting with 100000 rods
         --method single-shooting --set leaf.rods=100000 => shooting with 100000 rods
         --memory 10kB => a scenario of 
+        --stations 100000 --memory 100MB => 5 rods with 100000 stations would take about 625.0 MB of memory, and 100.0 MB are allowed: ask for fewer stations, or raise the limit with --memory
+        --stations 1000000 --modes 100 --write csv --memory 500MB => 5 rods with 1000000 stations
+        --all --stations 1000000 --memory 500MB => ask for fewer stations
         --memory lots => must be a size, as in 500MB or 2GB
         --memory=-1GB => must be a size
         ",
@@ -30,6 +33,7 @@ fn what_takes_more_memory_than_is_allowed_is_refused() {
         "
         check leaf.toml --intervals 4000 --memory 500MB => shooting with 5 rods
         check leaf.toml --set leaf.rods=100000 => shooting with 100000 rods
+        simulate leaf.toml --stations 1000000 --memory 1GB => ask for fewer stations
         simulate leaf.toml --segments 100000 --memory 1GB => 5 rods of 100000 segments
         trace leaf.toml --segments 10000 --vary load.gravity[2]=-1..0 --memory 1GB => branches of 5 rods of 10000 segments
         map leaf.toml --vary load.gravity[2]=-1..0:1000 --vary load.gravity[0]=0..1:1000 --memory 1GB => lower the counts of the axes

@@ -58,6 +58,40 @@ fn several_scenarios_have_a_folder_each_and_one_table() {
 }
 
 #[test]
+fn a_table_is_not_replaced_by_that_of_other_leaves() {
+    let place = Workplace::empty();
+    for (rods, name) in ["a", "b", "c", "d"].into_iter().enumerate() {
+        place.write(&format!("{name}.toml"), leaf(name, rods + 1));
+    }
+    let rows = || place.read("out/table.csv").lines().count() - 1;
+    place.ok("relax a.toml b.toml --write json,csv");
+    for (others, said) in [
+        ("c.toml d.toml", "results of a.toml, b.toml, which are not"),
+        ("c.toml ./a.toml --json", "results of b.toml, which are not"),
+    ] {
+        let run = place.refuses(format!("relax {others} --write json,csv"), said);
+        contains(&run.err, &["out/table.csv", "name a folder with --out DIR"]);
+        place.holds("out", "a b table.csv");
+    }
+    // The same are welcome, in any order, with others; and so is a folder that is named.
+    place.ok("relax ./b.toml c.toml a.toml --write json,csv");
+    assert_eq!(rows(), 3);
+    place.ok("check a.toml d.toml --write json,csv");
+    place.ok("relax c.toml d.toml --write json,csv --out out");
+    assert_eq!(rows(), 2);
+    place.write("out/table.csv", "x,y\n1,2\n");
+    place.refuses(
+        "relax a.toml b.toml",
+        "out/table.csv is no table of results",
+    );
+    // What was refused left no result.
+    place.write("bad.toml", "name = 3");
+    fs::remove_file(place.path("out/table.csv")).unwrap();
+    place.run("relax a.toml bad.toml --write json,csv").ends(2);
+    place.ok("relax a.toml b.toml --write json,csv");
+}
+
+#[test]
 fn several_leaves_side_by_side_are_those_one_by_one() {
     let place = Workplace::new();
     let names = [2, 3, 4, 5, 6, 7, 8, 9].map(|rods| format!("leaf{rods}"));

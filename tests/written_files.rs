@@ -187,6 +187,8 @@ fn a_scenario_can_come_on_standard_input() {
     place.write("piped.toml", leaf("piped", 5));
     place.refuses("relax piped.toml", another);
     fed_to("relax - --out out/piped", &leaf("piped", 6)).ends(0);
+    let twice = fed_to("relax - -", &leaf("twice", 2)).ends(2);
+    contains(&twice.err, &["standard input can be read only once"]);
 }
 
 #[test]
@@ -229,6 +231,71 @@ fn a_folder_belongs_to_one_scenario() {
         place.refuses("relax leaf.toml", why);
         assert_eq!(place.read("out/small/summary.json"), foreign);
     }
+}
+
+/// What a request reads it does not replace, by whatever path.
+#[test]
+fn inputs_are_not_replaced() {
+    let place = Workplace::new();
+    let tips = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.12,0.01\n0.2,-0.1,0.01\n";
+    place.write("fit.csv", tips);
+    place.write("tips.csv", tips);
+    place.write(
+        "chart.csv",
+        "program,scenario,rods,setting,seconds,error,outcome\n",
+    );
+    // First, as it removes tables of modes, which it does not have.
+    place.ok("relax leaf.toml --write json --out o");
+    for file in [
+        "centerlines.csv",
+        "modes.csv",
+        "table.csv",
+        "fitted.toml",
+        "motion.csv",
+    ] {
+        place.write(&format!("o/{file}"), leaf("small", 2));
+    }
+    let fit = "--free stiffness.bending_2 --data";
+    for (request, file) in [
+        (format!("fit leaf.toml {fit} fit.csv --out ."), "./fit.csv"),
+        (
+            format!("fit leaf.toml {fit} tips.csv {fit} o/../fit.csv --out o/.."),
+            "o/../fit.csv",
+        ),
+        (
+            format!("fit leaf.toml {fit} tips.csv --candidates fit.csv --out ."),
+            "./fit.csv",
+        ),
+        (
+            format!("fit o/fitted.toml {fit} tips.csv --out o"),
+            "o/fitted.toml",
+        ),
+        (
+            "chart leaf.toml --peers chart.csv --out .".into(),
+            "./chart.csv",
+        ),
+        (
+            "relax o/centerlines.csv --out o".into(),
+            "o/centerlines.csv",
+        ),
+        (
+            "relax o/modes.csv --write json --out ./o".into(),
+            "o/modes.csv",
+        ),
+        (
+            "relax o/summary.json --out o --json".into(),
+            "o/summary.json",
+        ),
+        ("relax o/table.csv leaf.toml --out o".into(), "o/table.csv"),
+        ("simulate o/motion.csv --out o".into(), "o/motion.csv"),
+    ] {
+        let before = (place.names("o"), place.read("fit.csv"));
+        let run = place.refuses(request, &format!("{file} is read by this request"));
+        contains(&run.err, &["name another folder with --out DIR"]);
+        assert_eq!((place.names("o"), place.read("fit.csv")), before);
+    }
+    // Files of other kinds are in nobody's way.
+    place.ok("relax o/centerlines.csv --write svg --out o");
 }
 
 #[test]

@@ -53,8 +53,11 @@ fn contender_parser() -> impl TypedValueParser<Value = Contender> {
 
 impl Chart {
     pub fn run(self) -> Result<Status, Refusal> {
-        self.request
-            .each::<Charted>(VerbTraits::default(), |job| self.one(job))
+        let traits = VerbTraits {
+            reads: &self.peers,
+            ..VerbTraits::default()
+        };
+        self.request.each::<Charted>(traits, |job| self.one(job))
     }
 
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {

@@ -45,8 +45,10 @@ pub struct Fit {
 
 impl Fit {
     pub fn run(self) -> Result<Status, Refusal> {
+        let reads: Vec<_> = self.data.iter().chain(&self.candidates).cloned().collect();
         let traits = VerbTraits {
             varies: true,
+            reads: &reads,
             ..VerbTraits::default()
         };
         self.request.each::<Fitted>(traits, |job| self.one(job))

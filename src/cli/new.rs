@@ -1,12 +1,12 @@
 //! `leafdyn new`: writes an example scenario.
 
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
 use super::{Refusal, Status, show_report};
+use crate::files;
 
 /// Write a scenario to begin with: short, with every entry explained.
 ///
@@ -59,10 +59,7 @@ impl New {
         let (name, text, next) = self.example.contents();
         let file = self.file.unwrap_or_else(|| format!("{name}.toml").into());
         let path = file.display();
-        // An existing file is never overwritten.
-        let created = OpenOptions::new().write(true).create_new(true).open(&file);
-        let written = created.and_then(|mut file| file.write_all(text.as_bytes()));
-        written.map_err(|reason| match reason.kind() {
+        files::write_new(&file, text.as_bytes()).map_err(|reason| match reason.kind() {
             ErrorKind::AlreadyExists => format!("{path}: is there already: name another file"),
             _ => format!("{path}: cannot be written: {reason}"),
         })?;

@@ -102,6 +102,7 @@ impl Relax {
             varies: !self.sensitivity.is_empty(),
             stations: true,
             parallel: true,
+            reads: &[],
         };
         match self.all {
             true => self.request.each::<All>(traits, |job| self.all(job)),

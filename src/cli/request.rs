@@ -81,7 +81,7 @@ fn kinds(list: &str) -> Result<Kinds, String> {
 
 /// How a verb treats its scenarios.
 #[derive(Clone, Copy, Default)]
-pub struct VerbTraits {
+pub struct VerbTraits<'f> {
     /// Whether it varies numbers of the scenario and settings of methods.
     pub varies: bool,
     /// Whether the stations in its files can be chosen.
@@ -89,6 +89,8 @@ pub struct VerbTraits {
     /// Whether scenarios run in parallel; otherwise one after the other, each on all
     /// cores.
     pub parallel: bool,
+    /// Files that it reads besides its scenarios.
+    pub reads: &'f [PathBuf],
 }
 
 impl Request {
@@ -100,7 +102,8 @@ impl Request {
     ) -> Result<Status, Refusal> {
         self.memory.into_iter().for_each(memory::allow);
         let selection = self.selection::<R>(traits)?;
-        let job = |file: &Path| self.open(file, traits, &selection);
+        self.check_scenarios::<R>(traits, &selection)?;
+        let job = |file: &Path| self.open::<R>(file, traits, &selection);
         if let [file] = self.scenarios.as_slice() {
             let done = run(&job(file)?)?;
             self.show(&done)?;
@@ -143,6 +146,41 @@ impl Request {
         self.finish::<R>(&selection, done)
     }
 
+    /// Checks what the scenarios share: standard input, and the table of several.
+    fn check_scenarios<R: Written>(
+        &self,
+        traits: VerbTraits,
+        selection: &Selection,
+    ) -> Result<(), Refusal> {
+        let from_input = self.scenarios.iter().filter(|path| path.as_os_str() == "-");
+        if from_input.count() > 1 {
+            let why = "standard input can be read only once: name one - and files";
+            return Err(why.into());
+        }
+        if self.scenarios.len() > 1 && selection.kinds.contains(&Kind::Csv) {
+            let (folder, name) = self.table::<R>();
+            files::check_inputs(folder, &[&name], self.inputs(traits))?;
+            if self.out.is_none() {
+                files::check_table(&folder.join(name), &self.scenarios)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All files that are read.
+    fn inputs<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
+        self.scenarios.iter().chain(traits.reads)
+    }
+
+    /// The folder and the name of the table of several scenarios.
+    fn table<R: Written>(&self) -> (&Path, String) {
+        let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
+            None | Some("summary") => "table.csv".to_string(),
+            Some(verb) => format!("{verb}_table.csv"),
+        };
+        (self.out.as_deref().unwrap_or(Path::new("out")), name)
+    }
+
     /// Outputs the results of several scenarios, and writes their table.
     fn finish<R: Written>(
         &self,
@@ -173,16 +211,12 @@ impl Request {
         for error in errors {
             note(&format!("error: {error}"));
         }
-        let out = self.out.clone().unwrap_or("out".into());
         if selection.kinds.contains(&Kind::Csv) {
-            let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
-                None | Some("summary") => "table.csv".to_string(),
-                Some(verb) => format!("{verb}_table.csv"),
-            };
+            let (out, name) = self.table::<R>();
             let rows = rows_of_json(&documents)?;
-            let file = files::write_table(&out, &name, &rows)?;
+            let file = files::write_table(out, &name, &rows)?;
             if !self.json {
-                show_report(&format!("table      {}\n", list_files(&out, &[file])))?;
+                show_report(&format!("table      {}\n", list_files(out, &[file])))?;
             }
         }
         if self.json {
@@ -216,7 +250,7 @@ impl Request {
 
     /// Opens a scenario and chooses the folder for its files; refused before the run if
     /// the folder is not writable.
-    fn open(
+    fn open<R: Written>(
         &self,
         path: &Path,
         traits: VerbTraits,
@@ -234,6 +268,10 @@ impl Request {
             Some(base) => base.scenario().clone(),
             None => Scenario::from_toml_with(&text, &file, &self.overrides)?,
         };
+        if let Some(stations) = selection.stations {
+            let rods = scenario.rods.len();
+            memory::Request::Stations { rods, stations }.weigh()?;
+        }
         let single = self.scenarios.len() == 1;
         let folder = match &self.out {
             Some(out) if single => out.clone(),
@@ -248,6 +286,7 @@ impl Request {
         };
         if !selection.kinds.is_empty() {
             files::check_writable(&folder)?;
+            files::check_inputs(&folder, &R::replaced(&selection.kinds), self.inputs(traits))?;
             let owner = files::owner(&source, &text);
             if self.out.is_none() || !single {
                 files::check_owner(&folder, &owner)?;

@@ -45,6 +45,17 @@ pub(super) fn write_file(
     rename(draft.path(), file)
 }
 
+/// Writes a file that does not exist yet; on an error it still does not.
+pub fn write_new(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    // Takes the name, so that a file of another process is not replaced.
+    File::create_new(file)?;
+    let written = write_file(file, |out| out.write_all(bytes));
+    written.inspect_err(|_| {
+        // What cannot be removed is left behind, empty.
+        let _ = fs::remove_file(file);
+    })
+}
+
 /// The path of a file that is being written. A file begun here and not renamed is removed
 /// when this is dropped.
 pub(super) struct Draft(PathBuf);
@@ -146,7 +157,9 @@ mod tests {
     fn failed_write_leaves_the_old_file_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.json");
-        write_file(&file, |out| out.write_all(b"old")).unwrap();
+        write_new(&file, b"old").unwrap();
+        let again = write_new(&file, b"new").unwrap_err();
+        assert_eq!(again.kind(), io::ErrorKind::AlreadyExists);
         let failed = write_file(&file, |out| {
             out.write_all(b"half of the n")?;
             Err(io::Error::other("disk full"))

@@ -61,8 +61,9 @@ pub trait Written: Serialize + Sync + Sized + 'static {
     /// Every other format, in the order in which files are named.
     const FORMATS: &'static [Format<Self>];
 
-    /// Kinds of files that are written while the result is computed.
-    const GROWING: &'static [Kind] = &[];
+    /// Names of files besides these: those that grow while the result is computed, and those
+    /// of a part of it that is written on its own.
+    const BESIDES: &'static [&'static str] = &[];
 
     /// Formats of optional parts of a result, written after the others. Where a result
     /// lacks a part, a file left by an earlier run is removed.
@@ -76,8 +77,18 @@ pub trait Written: Serialize + Sync + Sized + 'static {
     /// All kinds of its files.
     fn kinds() -> Vec<Kind> {
         let names = Self::FORMATS.iter().flat_map(Format::names).copied();
-        let kinds = Self::JSON.into_iter().chain(names).map(Kind::of);
-        kinds.chain(Self::GROWING.iter().copied()).collect()
+        let names = Self::JSON.into_iter().chain(names);
+        let names = names.chain(Self::BESIDES.iter().copied());
+        names.map(Kind::of).collect()
+    }
+
+    /// Names of the files that are replaced or removed where files of these kinds are written.
+    fn replaced(kinds: &[Kind]) -> Vec<&'static str> {
+        let names = Self::FORMATS.iter().flat_map(Format::names);
+        let names = Self::JSON.iter().chain(names).chain(Self::BESIDES);
+        let names = names.filter(|name| kinds.contains(&Kind::of(name)));
+        let more = Self::MORE.iter().flat_map(Format::names);
+        names.chain(more).copied().collect()
     }
 
     /// Its files of these kinds but JSON: their names and formats.

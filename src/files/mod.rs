@@ -14,10 +14,10 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-pub use atomic::{abandon_unfinished, check_writable};
+pub use atomic::{abandon_unfinished, check_writable, write_new};
 pub use format::{Format, Kind, Written};
 pub use journal::{Journal, belongs, claim, write_rows};
-pub use owner::{check_owner, claim_folder, owner, source};
+pub use owner::{check_inputs, check_owner, check_table, claim_folder, owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
@@ -112,7 +112,7 @@ impl Written for Boundary {
 
 impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
-    const GROWING: &'static [Kind] = &[Kind::Csv];
+    const BESIDES: &'static [&'static str] = &["motion.csv", "motion.npy", "energy.csv"];
     const FORMATS: &'static [Format<Self>] = &[
         Format::Figure(["energy.svg", "energy.png"], figure::energy),
         Format::Figure(["filmstrip.svg", "filmstrip.png"], figure::filmstrip),
@@ -125,6 +125,8 @@ impl Written for Record {
 
 impl Written for Chart {
     const JSON: Option<&'static str> = Some("chart.json");
+    const BESIDES: &'static [&'static str] =
+        &["chart_rods.csv", "chart_rods.svg", "chart_rods.png"];
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("chart.csv", report::chart_table),
         Format::Figure(["chart.svg", "chart.png"], |it, _| figure::chart(it)),

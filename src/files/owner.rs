@@ -1,4 +1,5 @@
-//! The scenario whose results a folder holds: the JSON files in it name its file.
+//! The scenario whose results a folder holds: the JSON files in it name its file; and files that
+//! results must not replace.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -24,6 +25,9 @@ const FILES: [Option<&str>; 9] = [
     Chart::JSON,
     Fit::JSON,
 ];
+
+/// Most scenarios that a message names.
+const MOST_NAMED: usize = 3;
 
 /// How a result in `folder` names the file of its scenario: by the relative path, so
 /// that both can be moved together.
@@ -96,6 +100,80 @@ pub fn check_owner(folder: &Path, owner: &str) -> Result<(), FileError> {
         Some(other) if other != owner => refuse(folder, &of_another(folder, other)),
         _ => Ok(()),
     }
+}
+
+/// Refuses to replace files of these names in a folder if one of them is an input of the same
+/// request.
+pub fn check_inputs<'p>(
+    folder: &Path,
+    names: &[&str],
+    inputs: impl IntoIterator<Item = &'p PathBuf>,
+) -> Result<(), FileError> {
+    for input in inputs {
+        let Ok(input) = input.canonicalize() else {
+            // It does not exist, or is standard input.
+            continue;
+        };
+        let files = names.iter().map(|name| folder.join(name));
+        let same = |file: &PathBuf| file.canonicalize().is_ok_and(|file| file == input);
+        if let Some(file) = files.into_iter().find(same) {
+            let why = "is read by this request, and its results would replace it: \
+                       name another folder with --out DIR";
+            return Err(FileError::unfit(&file, why));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to replace a table that has results of other scenarios than these, or is no table of
+/// results.
+pub fn check_table(file: &Path, scenarios: &[PathBuf]) -> Result<(), FileError> {
+    let Ok(bytes) = fs::read(file) else {
+        return Ok(());
+    };
+    let plain = |path: &Path| {
+        let plain = path.canonicalize().or_else(|_| absolute(path));
+        plain.map_or_else(|_| path.into(), without_dots)
+    };
+    let ours: Vec<PathBuf> = scenarios.iter().map(|path| plain(path)).collect();
+    let Some(mut others) = scenarios_in(&bytes) else {
+        let why = "is no table of results: name a folder with --out DIR, or remove it";
+        return Err(FileError::unfit(file, why));
+    };
+    others.retain(|other| !ours.contains(&plain(Path::new(other))));
+    if others.is_empty() {
+        return Ok(());
+    }
+    let more = others.len().saturating_sub(MOST_NAMED);
+    others.truncate(MOST_NAMED);
+    let mut names = others.join(", ");
+    if more > 0 {
+        names += &format!(" and {more} more");
+    }
+    let why = format!(
+        "has results of {names}, which are not among these scenarios: name a folder with --out DIR, \
+         or remove the table"
+    );
+    Err(FileError::unfit(file, &why))
+}
+
+/// The files of the scenarios whose results a table has; `None` if it is no such table.
+fn scenarios_in(table: &[u8]) -> Option<Vec<String>> {
+    let mut table = csv::Reader::from_reader(table);
+    let header = table.headers().ok()?.clone();
+    let column = |name: &str| header.iter().position(|it| it == name);
+    let (file, name) = (column("file")?, column("scenario"));
+    column("exit_status")?;
+    let mut found = Vec::new();
+    for row in table.records() {
+        let row = row.ok()?;
+        // Where a scenario was refused there is no result.
+        let has_result = name.is_some_and(|name| !row[name].is_empty());
+        if has_result {
+            found.push(row[file].to_string());
+        }
+    }
+    Some(found)
 }
 
 /// Records the owner of a folder where JSON files will not, or replaces what is recorded.

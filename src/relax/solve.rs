@@ -2,6 +2,7 @@
 
 use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
+use crate::memory::Request;
 use crate::newton::{Stop, Work};
 use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
@@ -32,6 +33,10 @@ pub fn relax(
     options: &Options,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
+    if let Some(stations) = options.stations {
+        let rods = scenario.rods.len();
+        (Request::Stations { rods, stations }.weigh()).map_err(RelaxError::Memory)?;
+    }
     let found = relax_once(scenario, options, progress)?;
     let Some(parts) = options.stations else {
         return Ok(found);

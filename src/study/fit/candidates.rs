@@ -58,6 +58,7 @@ pub(super) fn rank(
 fn added(stats: &Statistics, model: &Model) -> Result<DMatrix<f64>, String> {
     let found = model.find(&stats.point.theta);
     let mut point = found.map_err(|refused| refused.to_string())?;
+    (model.check_weights(&point)).map_err(|refused| refused.to_string())?;
     (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
     let sd = |component: &Component| match component.what {
         Compared::Result(quantity) => component.sd.or(stats.assumed(quantity.kind())),

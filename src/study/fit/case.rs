@@ -1,9 +1,10 @@
-//! A leaf at rest under the conditions of one experiment, its predictions for the data, and
+//! A leaf at rest under the conditions of its experiments, its predictions for the data, and
 //! their derivatives.
 
 use glam::DVec3;
 
-use super::data::{Experiment, Measured, Origin, Traced};
+use super::data::Origin;
+use super::experiments::{Case, Observed};
 use super::quantity::{Kind, Quantity};
 use super::responses::Responses;
 use super::vein::Vein;
@@ -12,27 +13,15 @@ use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
-use crate::study::Keys;
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
 
-/// A leaf under the conditions of one experiment, with its measurements.
-pub(super) struct Case {
-    pub name: String,
-    pub settings: Vec<(Keys, f64)>,
-    pub measured: Vec<Measured>,
-    pub traced: Vec<Traced>,
-    pub origin: Option<Origin>,
-    /// Whether it differs from the other experiments by loads only: it then has the same
-    /// derivatives with respect to the free numbers.
-    pub loaded_only: bool,
-}
-
 /// One scalar datum.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
-    pub case: usize,
+    /// The number of its experiment.
+    pub experiment: usize,
     pub what: Compared,
     pub observed: f64,
     pub model: f64,
@@ -62,6 +51,22 @@ impl Compared {
             Compared::Vein { .. } => Kind::Length,
         }
     }
+
+    /// The name of its column in the data.
+    pub fn column(self) -> String {
+        match self {
+            Compared::Result(quantity) => quantity.to_string(),
+            Compared::Vein { axis, .. } => ["x", "y", "z"][axis].into(),
+        }
+    }
+
+    /// The name of the column of its standard deviation.
+    pub fn deviation_column(self) -> String {
+        match self {
+            Compared::Result(quantity) => format!("sd_{quantity}"),
+            Compared::Vein { .. } => "sd".into(),
+        }
+    }
 }
 
 /// A leaf at rest at some values of the free numbers.
@@ -76,37 +81,11 @@ pub(super) struct CaseAt {
     pub gradients: Vec<Vec<f64>>,
 }
 
-impl Case {
-    /// An experiment without traced points.
-    pub fn new(experiment: Experiment) -> Case {
-        let mut targets = experiment.settings.iter().flat_map(|it| it.0.targets());
-        let loaded_only = targets.all(|target| {
-            let key = target.key();
-            key.is_some_and(|key| key.path().starts_with("load."))
-        });
-        Case {
-            loaded_only,
-            name: experiment.name,
-            settings: experiment.settings,
-            measured: experiment.measured,
-            traced: Vec::new(),
-            origin: experiment.origin,
-        }
-    }
-
-    /// Its position in the data as the beginning of a message, if it has one.
-    pub fn place(&self) -> String {
-        let origin = self.origin.as_ref();
-        origin.map_or_else(String::new, |origin| format!("{origin}: "))
-    }
-}
-
 impl CaseAt {
-    /// Predictions of a leaf at rest for the data of this experiment.
-    pub fn new(of: &Case, case: usize, at: AtRest) -> Result<CaseAt, Lost> {
+    /// Predictions of a leaf at rest for the data under these conditions.
+    pub fn new(of: &Case, at: AtRest) -> Result<CaseAt, Lost> {
         let frequencies = of
-            .measured
-            .iter()
+            .measured()
             .filter_map(|measured| match measured.quantity {
                 Quantity::Frequency(mode) => Some(mode),
                 _ => None,
@@ -138,21 +117,30 @@ impl CaseAt {
             responses: None,
             gradients: Vec::new(),
         };
+        let mut veins = Vec::new();
+        let observed = of.observed.iter();
+        let components = observed.flat_map(|of| found.compared(of, &mut veins));
+        found.components = components.collect();
+        Ok(found)
+    }
+
+    /// The components of an experiment.
+    fn compared<'v>(&'v self, of: &Observed, veins: &mut Vec<Option<Vein<'v>>>) -> Vec<Component> {
+        let mut components = Vec::new();
         for measured in &of.measured {
-            found.components.push(Component {
-                case,
+            components.push(Component {
+                experiment: of.number,
                 what: Compared::Result(measured.quantity),
                 observed: measured.value.unwrap_or(f64::NAN),
-                model: found.result(measured.quantity),
+                model: self.result(measured.quantity),
                 sd: measured.sd,
                 free: false,
                 origin: of.origin.clone(),
             });
         }
-        let mut veins: Vec<Option<Vein>> = Vec::new();
         for traced in &of.traced {
             veins.resize_with(veins.len().max(traced.rod + 1), || None);
-            let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&found.at, traced.rod));
+            let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&self.at, traced.rod));
             let beside = traced.sigma.is_none();
             let (sigma, model) = match traced.sigma {
                 Some(sigma) => (sigma, vein.point(sigma).0),
@@ -161,8 +149,8 @@ impl CaseAt {
             let seen = traced.at.iter().enumerate();
             let seen = seen.filter_map(|(axis, value)| value.map(|value| (axis, value)));
             for (number, (axis, observed)) in seen.enumerate() {
-                found.components.push(Component {
-                    case,
+                components.push(Component {
+                    experiment: of.number,
                     what: Compared::Vein {
                         rod: traced.rod,
                         axis,
@@ -176,7 +164,7 @@ impl CaseAt {
                 });
             }
         }
-        Ok(found)
+        components
     }
 
     /// The axes along which its tip was measured, if there are no other data, and the equations of
@@ -242,6 +230,18 @@ impl CaseAt {
         self.at.levels[0].leaf.leaf.scale.force()
     }
 
+    /// The unit of such data in which numbers of the leaf are about one.
+    pub fn unit(&self, kind: Kind) -> f64 {
+        match kind {
+            Kind::Length => self.length(),
+            Kind::Force => self.force(),
+            Kind::Frequency => {
+                let physics = Physics::new(&self.at.levels[0].leaf.leaf);
+                1.0 / (std::f64::consts::TAU * physics.time)
+            }
+        }
+    }
+
     pub fn result(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::Tip(axis) => {
@@ -253,8 +253,7 @@ impl CaseAt {
                 force[axis] * self.force()
             }
             Quantity::Frequency(mode) => {
-                let physics = Physics::new(&self.at.levels[0].leaf.leaf);
-                self.eigenvalue(mode).max(0.0).sqrt() / (std::f64::consts::TAU * physics.time)
+                self.eigenvalue(mode).max(0.0).sqrt() * self.unit(Kind::Frequency)
             }
         }
     }

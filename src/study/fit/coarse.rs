@@ -42,13 +42,13 @@ impl<'a> Model<'a> {
                 let Some(at) = known.at.coarsest(count) else {
                     break;
                 };
-                let found = CaseAt::new(&self.cases[case], case, at).map_err(lost)?;
+                let found = CaseAt::new(&self.cases[case], at).map_err(lost)?;
                 let mut both = found.components.iter().zip(&known.components);
                 if both.all(|(a, b)| (a.model - b.model).abs() < INSIGNIFICANT * sd(b)) {
                     return Ok(found);
                 }
             }
-            CaseAt::new(&self.cases[case], case, known.at.clone()).map_err(lost)
+            CaseAt::new(&self.cases[case], known.at.clone()).map_err(lost)
         };
         let cases = (0..self.cases.len()).into_par_iter().map(coarse);
         let cases = cases.collect::<Result<_, _>>()?;

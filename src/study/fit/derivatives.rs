@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::case::{CaseAt, Compared, Component};
 use super::model::{Change, Model, Point};
+use super::quantity::Quantity;
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
@@ -103,17 +104,25 @@ impl CaseAt {
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();
+        // Measured more than once, a result has the same derivatives.
+        let mut known: Vec<(Quantity, Vec<f64>)> = Vec::new();
         let mut index = 0;
         while index < self.components.len() {
             let component = &self.components[index];
             match component.what {
                 Compared::Result(quantity) => {
+                    index += 1;
+                    if let Some((_, row)) = known.iter().find(|(it, _)| *it == quantity) {
+                        gradients.push(row.clone());
+                        continue;
+                    }
                     let by = |k: usize| {
                         let of = (&numbers[k], &rates[k], responses.each[k].as_slice());
                         slopes[k] * self.result_rate(quantity, of)
                     };
-                    gradients.push((0..numbers.len()).map(by).collect());
-                    index += 1;
+                    let row: Vec<f64> = (0..numbers.len()).map(by).collect();
+                    known.push((quantity, row.clone()));
+                    gradients.push(row);
                 }
                 Compared::Vein { rod, sigma, .. } => {
                     // All coordinates of the point.

@@ -4,6 +4,7 @@ use super::candidates;
 use super::case::Compared;
 use super::data::Experiment;
 use super::directions::sparse;
+use super::experiments::Observed;
 use super::least_squares::End;
 use super::model::Model;
 use super::quantity::Quantity;
@@ -226,19 +227,23 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
 }
 
 fn compared(stats: &Statistics) -> Vec<FitResidual> {
-    let bands = stats.bands();
-    (stats.point.components().zip(bands))
+    let mut all: Vec<_> = stats.point.components().zip(stats.bands()).collect();
+    // In the order of the data, which that of the leaves need not be.
+    all.sort_by_key(|(component, _)| component.experiment);
+    let mut observed: Vec<&Observed> = (stats.model.cases.iter())
+        .flat_map(|case| &case.observed)
+        .collect();
+    observed.sort_by_key(|it| it.number);
+    all.into_iter()
         .map(|(component, band)| {
             let sd = stats.sd(component);
-            let (what, rod, sigma) = match component.what {
-                Compared::Result(quantity) => (quantity.to_string(), None, None),
-                Compared::Vein { rod, axis, sigma } => {
-                    (["x", "y", "z"][axis].into(), Some(rod + 1), Some(sigma))
-                }
+            let (rod, sigma) = match component.what {
+                Compared::Result(_) => (None, None),
+                Compared::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
             };
             FitResidual {
-                experiment: stats.model.cases[component.case].name.clone(),
-                what,
+                experiment: observed[component.experiment].name.clone(),
+                what: component.what.column(),
                 rod,
                 sigma,
                 data: component.observed,
@@ -252,23 +257,26 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
 }
 
 fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
-    let cases = stats.model.cases.iter().zip(&stats.point.cases);
-    cases
-        .filter_map(|(case, at)| {
-            let finest = at.at.levels.last()?;
-            let length = finest.leaf.leaf.scale.length;
-            let nodes = finest.leaf.segments() + 1;
-            let curves = finest.state.x.chunks(nodes);
-            let curves = curves.map(|rod| rod.iter().map(|x| *x * length).collect());
+    let mut leaves = Vec::new();
+    for (case, at) in stats.model.cases.iter().zip(&stats.point.cases) {
+        let Some(finest) = at.at.levels.last() else {
+            continue;
+        };
+        let length = finest.leaf.leaf.scale.length;
+        let nodes = finest.leaf.segments() + 1;
+        let curves = finest.state.x.chunks(nodes);
+        let curves = curves.map(|rod| rod.iter().map(|x| *x * length).collect());
+        let curves: Vec<_> = curves.collect();
+        for observed in &case.observed {
+            let traced = observed.traced.iter();
             let leaf = FitLeaf {
-                curves: curves.collect(),
-                traced: case
-                    .traced
-                    .iter()
-                    .map(|traced| (traced.rod, traced.at))
-                    .collect(),
+                curves: curves.clone(),
+                traced: traced.map(|traced| (traced.rod, traced.at)).collect(),
             };
-            Some((case.name.clone(), leaf))
-        })
-        .collect()
+            leaves.push((observed.number, observed.name.clone(), leaf));
+        }
+    }
+    leaves.sort_by_key(|(number, ..)| *number);
+    let leaves = leaves.into_iter();
+    leaves.map(|(_, name, leaf)| (name, leaf)).collect()
 }

@@ -12,6 +12,7 @@ mod data;
 mod derivatives;
 mod directions;
 mod end;
+mod experiments;
 mod found;
 mod free;
 mod interval;
@@ -124,6 +125,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let assumed = ASSUMED * model.unit();
     let first = model.with_loose_tolerance(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
+    model.check_weights(&first)?;
     let measured = first.components().filter(|component| !component.free);
     check_count(coordinates.len(), measured.count(), known)?;
     let search = Search {

@@ -6,8 +6,9 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use super::FitError;
-use super::case::{Case, CaseAt, Component};
-use super::data::{Data, Experiment, Measured, Origin};
+use super::case::{CaseAt, Component};
+use super::data::{Data, Measured, Origin};
+use super::experiments::{self, Case};
 use super::free::Coordinate;
 use super::quantity::Kind;
 use crate::newton::Work;
@@ -83,36 +84,10 @@ impl<'a> Model<'a> {
         data: Data,
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
-        let mut cases: Vec<Case> = data.experiments.into_iter().map(Case::new).collect();
-        let mut plain = None;
-        for traced in data.traced {
-            let place = match &traced.experiment {
-                Some(name) => {
-                    let found = cases.iter().position(|case| case.name == *name);
-                    found.ok_or_else(|| {
-                        let origin = &traced.origin;
-                        let why = format!(
-                            "{origin}: experiment {name}: no row of an experiments file has that name"
-                        );
-                        FitError::Data(why)
-                    })?
-                }
-                None => *plain.get_or_insert_with(|| {
-                    cases.push(Case::new(Experiment {
-                        name: "as it is".into(),
-                        settings: Vec::new(),
-                        measured: Vec::new(),
-                        origin: None,
-                    }));
-                    cases.len() - 1
-                }),
-            };
-            cases[place].traced.push(traced);
-        }
-        cases.retain(|case| !case.measured.is_empty() || !case.traced.is_empty());
+        let cases = experiments::cases(data)?;
         for case in &cases {
             let of_a_tip = |m: &&Measured| m.quantity.kind() == Kind::Length;
-            if let Some(measured) = case.measured.iter().find(of_a_tip)
+            if let Some(measured) = case.measured().find(of_a_tip)
                 && rods > 1
                 && !base.scenario().joined
             {
@@ -124,7 +99,7 @@ impl<'a> Model<'a> {
                 return Err(FitError::Data(why));
             }
             let of_a_holder = |m: &&Measured| m.quantity.kind() == Kind::Force;
-            if let Some(measured) = case.measured.iter().find(of_a_holder)
+            if let Some(measured) = case.measured().find(of_a_holder)
                 && base.scenario().held_tip.is_none()
             {
                 let why = format!(
@@ -174,7 +149,7 @@ impl<'a> Model<'a> {
         let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = AtRest::find(&scenario, &self.options)?;
-            let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], case, at));
+            let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], at));
             found.map_err(|lost| self.no_equilibrium(case, &lost))
         };
         let cases = (0..self.cases.len()).into_par_iter().map(find);
@@ -186,7 +161,7 @@ impl<'a> Model<'a> {
 
     pub(super) fn no_equilibrium(&self, case: usize, lost: &Lost) -> FitError {
         let case = &self.cases[case];
-        let (place, name) = (case.place(), &case.name);
+        let (place, name) = (case.place(), case.name());
         let why = match lost {
             Lost::NotAtRest(why) => why.as_str(),
             Lost::Elsewhere => "it jumps to another equilibrium",
@@ -212,7 +187,7 @@ impl<'a> Model<'a> {
             let how = (&self.options, grids);
             let answer = from.answer(&from.at.levels, &steps)?;
             let at = from.at.follow(scenario, &answer, how)?;
-            CaseAt::new(&self.cases[case], case, at)
+            CaseAt::new(&self.cases[case], at)
         };
         let cases = (0..self.cases.len()).into_par_iter().map(follow);
         Ok(Point {
@@ -223,8 +198,8 @@ impl<'a> Model<'a> {
 
     /// Unit of the data: the length of the leaf, or the largest of them.
     pub fn unit(&self) -> f64 {
-        let mut measured = self.cases.iter().flat_map(|case| &case.measured);
-        let mut traced = self.cases.iter().flat_map(|case| &case.traced);
+        let mut measured = self.cases.iter().flat_map(Case::measured);
+        let mut traced = self.cases.iter().flat_map(Case::traced);
         let lengths = |measured: &Measured| measured.quantity.kind() == Kind::Length;
         match traced.next().is_some() || measured.clone().all(lengths) {
             true => self.base.scenario().scale().length,
@@ -249,17 +224,14 @@ impl<'a> Model<'a> {
         let sd = |sd: Option<f64>| sd.unwrap_or(assumed) / length;
         let mut tolerance = f64::INFINITY;
         for case in self.cases.iter() {
-            for measured in &case.measured {
+            for measured in case.measured() {
                 let known = match measured.quantity.kind() {
                     Kind::Length => INSIGNIFICANT * sd(measured.sd),
                     _ => 0.0,
                 };
                 tolerance = known.min(tolerance);
             }
-            let traced = case
-                .traced
-                .iter()
-                .map(|traced| INSIGNIFICANT * sd(traced.sd));
+            let traced = case.traced().map(|traced| INSIGNIFICANT * sd(traced.sd));
             tolerance = traced.fold(tolerance, f64::min);
         }
         Model {
@@ -301,6 +273,37 @@ impl<'a> Model<'a> {
             ));
         }
         Ok(false)
+    }
+
+    /// Checks that double precision can weigh all data.
+    pub fn check_weights(&self, point: &Point) -> Result<(), FitError> {
+        let all = point.cases.iter();
+        let all = all.flat_map(|case| case.components.iter().map(move |datum| (case, datum)));
+        for (case, datum) in all {
+            let (value, column) = (datum.observed, datum.what.column());
+            let kind = datum.what.kind();
+            let size = match kind {
+                // A vein is extended to any point that was traced.
+                Kind::Length => case.unit(kind),
+                _ => case.unit(kind).max(datum.model.abs()),
+            };
+            let why = match datum.sd {
+                _ if value.abs() * f64::EPSILON > size => format!(
+                    "{column} = {value:e}: next to such a number the whole leaf is lost in \
+                     rounding: check its unit, or leave the row out"
+                ),
+                Some(sd) if sd < f64::EPSILON * size.max(value.abs()) => format!(
+                    "{} = {sd:e}: is less than the rounding of {column} as computed: give the \
+                     standard deviation of the measurement",
+                    datum.what.deviation_column()
+                ),
+                _ => continue,
+            };
+            let place = datum.origin.as_ref().map(Origin::to_string);
+            let place = place.map_or_else(String::new, |place| format!("{place}: "));
+            return Err(FitError::Data(format!("{place}{why}")));
+        }
+        Ok(())
     }
 
     pub fn work(point: &Point) -> Work {
