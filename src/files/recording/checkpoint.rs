@@ -103,7 +103,7 @@ pub struct Extent {
 /// The keys, in the order in which they are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// For people only: `state` has the exact time.
+    /// The time of `state`.
     pub time: f64,
     run: Identity,
     pub motion: Extent,
