@@ -22,6 +22,8 @@ pub(super) struct VaryingWork {
     /// rest curvatures times the moments without them.
     half_impulse: f64,
     turned: f64,
+    /// Rate of that sum before the last kick.
+    rate: f64,
 }
 
 impl VaryingWork {
@@ -36,6 +38,7 @@ impl VaryingWork {
             straightening: straightening.sum(),
             half_impulse: 0.0,
             turned: 0.0,
+            rate: 0.0,
         }
     }
 
@@ -45,10 +48,11 @@ impl VaryingWork {
     pub(super) fn of_rest(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
         let turned = bent + mean * self.straightening;
         let half_impulse = 0.5 * length * (mean - self.rest);
-        let work = match width > 0.0 {
-            true => (self.half_impulse + half_impulse) * (turned - self.turned) / width,
+        self.rate = match width > 0.0 {
+            true => (turned - self.turned) / width,
             false => 0.0,
         };
+        let work = (self.half_impulse + half_impulse) * self.rate;
         (self.half_impulse, self.turned) = (half_impulse, turned);
         work
     }
@@ -83,10 +87,14 @@ impl Explicit {
             let VaryingWork {
                 rest: first,
                 straightening,
+                half_impulse,
                 turned,
+                rate,
                 ..
             } = self.work;
             let rest = self.physics.rest(self.time);
+            // The rate after the last kick is nearly that before it.
+            work += half_impulse * rate;
             work += (first - rest) * turned;
             work += 0.5 * (rest * rest - first * first) * straightening;
         }
