@@ -246,7 +246,7 @@ mod tests {
             fs::write(&file, &changed).unwrap();
             match Checkpoint::read(folder.path(), &identity()) {
                 Err(error) if error.to_string().contains(" is damaged: ") => (),
-                // The time is not used, nor is white space.
+                // The time is compared with that of the state, and white space is not used.
                 Ok(read) => assert_eq!(
                     Checkpoint { time: 0.3, ..read },
                     checkpoint,

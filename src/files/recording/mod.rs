@@ -124,7 +124,7 @@ impl Recording {
         // As text a number may lose its last digit.
         let close = (found.time - time).abs() <= 1e-12 * time;
         if !close {
-            let why = format!("its time {} is not that of its state", found.time);
+            let why = format!("its time {:e} is not that of its state", found.time);
             return Err(damaged(&folder.join(checkpoint::FILE_NAME), &why));
         }
         let motion = folder.join(recording.form.file_name());
