@@ -231,7 +231,7 @@ impl fmt::Display for Request {
 const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
 
 /// Formats a number of bytes for people.
-fn size(bytes: u64) -> String {
+pub fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     let unit = UNITS.into_iter().find(|(_, unit)| bytes >= *unit);
     unit.map_or(format!("{bytes} bytes"), |(name, unit)| {

@@ -56,8 +56,9 @@ struct Flight {
     damping: f64,
     snapshots: Vec<Snapshot>,
     momenta: Vec<[DVec3; 2]>,
-    /// Force and moment about the origin, at every step.
-    loads: Vec<[DVec3; 2]>,
+    /// Impulses of the force and of the moment about the origin, in the kick of every step:
+    /// until the step, and in all.
+    impulses: Vec<[[DVec3; 2]; 2]>,
 }
 
 fn fly(scenario: &Scenario, steps: usize) -> Flight {
@@ -71,7 +72,7 @@ fn fly(scenario: &Scenario, steps: usize) -> Flight {
         damping: physics.damping,
         snapshots: vec![method.snapshot()],
         momenta: Vec::new(),
-        loads: Vec::new(),
+        impulses: Vec::new(),
     };
     for k in 1..=steps {
         method.advance(h * k as f64).unwrap();
@@ -81,9 +82,14 @@ fn fly(scenario: &Scenario, steps: usize) -> Flight {
     for now in &flight.snapshots {
         let momentum = momentum(&grid, &physics, now);
         flight.momenta.push(momentum);
-        let loads = physics.loads(now.time);
-        let moment = now.state.tip(0).cross(loads.tip_force) + loads.tip_moment;
-        flight.loads.push([loads.tip_force, moment]);
+        let from = (now.time - 0.5 * h).max(0.0);
+        let until = |until: f64| {
+            let loads = physics.mean_loads([from, until]);
+            let moment = now.state.tip(0).cross(loads.tip_force) + loads.tip_moment;
+            [loads.tip_force, moment].map(|load| (until - from) * load)
+        };
+        let kick = [until(now.time), until(now.time + 0.5 * h)];
+        flight.impulses.push(kick);
     }
     flight
 }
@@ -100,18 +106,16 @@ fn worst<'a>(pairs: impl Iterator<Item = (&'a [DVec3; 2], [DVec3; 2])>) -> [f64;
     [error[0] / size[0], error[1] / size[1]]
 }
 
-/// The impulse of the loads, by the rule that is exact for what is linear
-/// between steps, as the force is.
+/// The impulse of the loads until every step: of the force exactly, of its moment at the
+/// positions of the kicks.
 fn impulses(flight: &Flight) -> Vec<[DVec3; 2]> {
     let mut sum = [DVec3::ZERO; 2];
-    let mut all = vec![sum];
-    for pair in flight.loads.windows(2) {
-        for k in 0..2 {
-            sum[k] += 0.5 * flight.step * (pair[0][k] + pair[1][k]);
-        }
-        all.push(sum);
-    }
-    all
+    let of_kick = |[until, whole]: &[[DVec3; 2]; 2]| {
+        let now = [0, 1].map(|k| sum[k] + until[k]);
+        sum = [0, 1].map(|k| sum[k] + whole[k]);
+        now
+    };
+    flight.impulses.iter().map(of_kick).collect()
 }
 
 #[test]
@@ -155,14 +159,16 @@ fn damped_from_outside_both_decay_alike() {
     let mut scenario = parse(SPAGHETTI);
     scenario.dynamics.external_damping = 0.4;
     let flight = fly(&scenario, ALL);
-    let free = &flight.momenta[LOADED..];
+    // Half of the kick at the end of the loads is still under them.
+    let first = LOADED + 1;
+    let free = &flight.momenta[first..];
     let half = 0.5 * flight.damping * flight.step;
     let part = (1.0 - half) / (1.0 + half);
     let decayed = free.iter().enumerate().skip(1);
     let decayed = decayed.map(|(k, now)| (now, free[0].map(|start| start * part.powi(k as i32))));
     let [linear, angular] = worst(decayed);
     assert!(linear < 1e-12 && angular < 1e-12);
-    let all: f64 = (ALL - LOADED) as f64 * flight.step * flight.damping;
+    let all: f64 = (ALL - first) as f64 * flight.step * flight.damping;
     let left = free[free.len() - 1][0].length() / free[0][0].length();
     assert!((left.ln() + all).abs() < 1e-6, "{left} of {}", (-all).exp());
 }

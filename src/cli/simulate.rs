@@ -6,6 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
+use crate::memory;
 use crate::report::{self, FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
@@ -15,6 +16,9 @@ use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
 /// Longer simulations, in seconds, are announced with their expected duration.
 const ANNOUNCED: f64 = 60.0;
+
+/// Larger recordings, in bytes, are announced with their expected size.
+const LARGE: u64 = 1_000_000_000;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -77,6 +81,11 @@ impl Simulate {
             let time = progress::duration(seconds);
             note(&format!("{name}: {steps} steps to make, some {time}"));
         }
+        let bytes = recording.expected_bytes(&simulation);
+        if bytes > LARGE {
+            let (name, size) = (&job.scenario.name, memory::size(bytes));
+            note(&format!("{name}: some {size} to record"));
+        }
         checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, job);
         if ended.is_err() {
@@ -93,7 +102,7 @@ impl Simulate {
     ) -> Result<Delivered, Refusal> {
         let stopped = record(simulation, recording, job.progress())?;
         let record = recording.record(simulation, stopped)?;
-        job.remark(stopped);
+        job.remark(record.remark());
         let written = recording.finish(&job.document(&record));
         let written = match written {
             Ok(files) => Ok(job.list_files(&files)),

@@ -51,7 +51,7 @@ impl Held {
 }
 
 /// Dead loads.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loads {
     /// Gravity per unit length.
     pub gravity: DVec3,
@@ -59,6 +59,30 @@ pub struct Loads {
     pub tip_force: DVec3,
     /// Moment on the tip of a single rod.
     pub tip_moment: DVec3,
+}
+
+impl std::ops::Sub for Loads {
+    type Output = Loads;
+
+    fn sub(self, other: Loads) -> Loads {
+        Loads {
+            gravity: self.gravity - other.gravity,
+            tip_force: self.tip_force - other.tip_force,
+            tip_moment: self.tip_moment - other.tip_moment,
+        }
+    }
+}
+
+impl std::ops::Mul<f64> for Loads {
+    type Output = Loads;
+
+    fn mul(self, factor: f64) -> Loads {
+        Loads {
+            gravity: self.gravity * factor,
+            tip_force: self.tip_force * factor,
+            tip_moment: self.tip_moment * factor,
+        }
+    }
 }
 
 impl Leaf {

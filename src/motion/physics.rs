@@ -48,6 +48,8 @@ pub struct Physics {
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
     pub constant_rest: Option<f64>,
+    /// Times at which a load or the factor may change its slope, in increasing order.
+    knots: Vec<f64>,
 }
 
 impl Physics {
@@ -75,6 +77,7 @@ impl Physics {
             && dynamics.tip_moment.is_constant();
         let mut physics = Physics {
             constant_loads: None,
+            knots: knots(&dynamics, time),
             constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
             time,
@@ -116,17 +119,47 @@ impl Physics {
             return loads;
         }
         let (d, at) = (&self.dynamics, time * self.time);
+        self.scaled([d.gravity.at(at), d.tip_force.at(at), d.tip_moment.at(at)])
+    }
+
+    /// The means of the loads over an interval.
+    pub fn mean_loads(&self, interval: [f64; 2]) -> Loads {
+        if let Some(loads) = self.constant_loads {
+            return loads;
+        }
+        let (d, [from, to]) = (&self.dynamics, interval.map(|time| time * self.time));
+        let loads = [&d.gravity, &d.tip_force, &d.tip_moment];
+        self.scaled(loads.map(|load| load.mean(from, to)))
+    }
+
+    /// Gravity, and the force and the moment on a tip, without dimensions.
+    fn scaled(&self, loads: [[f64; 3]; 3]) -> Loads {
+        let [gravity, tip_force, tip_moment] = loads.map(DVec3::from_array);
         let force = self.scale.force();
         Loads {
-            gravity: DVec3::from_array(d.gravity.at(at)) * (self.scale.length / force),
-            tip_force: DVec3::from_array(d.tip_force.at(at)) / force,
-            tip_moment: DVec3::from_array(d.tip_moment.at(at)) / self.scale.moment(),
+            gravity: gravity * (self.scale.length / force),
+            tip_force: tip_force / force,
+            tip_moment: tip_moment / self.scale.moment(),
         }
+    }
+
+    /// The first time after `time` at which a load or the factor of the rest curvatures may
+    /// change its slope; infinite if there is none.
+    pub fn next_knot(&self, time: f64) -> f64 {
+        let next = self.knots.partition_point(|&knot| knot <= time);
+        self.knots.get(next).copied().unwrap_or(f64::INFINITY)
     }
 
     /// The factor of all rest curvatures at a time.
     pub fn rest(&self, time: f64) -> f64 {
         let changing = || self.dynamics.rest.at(time * self.time);
+        self.constant_rest.unwrap_or_else(changing)
+    }
+
+    /// The mean of that factor over an interval.
+    pub fn mean_rest(&self, interval: [f64; 2]) -> f64 {
+        let [from, to] = interval.map(|time| time * self.time);
+        let changing = || self.dynamics.rest.mean(from, to);
         self.constant_rest.unwrap_or_else(changing)
     }
 
@@ -144,4 +177,19 @@ impl Physics {
     pub fn rest_differs(&self) -> bool {
         self.constant_rest != Some(1.0)
     }
+}
+
+/// The knots of everything that varies in time, over the unit of time.
+fn knots(dynamics: &Dynamics, unit: f64) -> Vec<f64> {
+    let mut knots = Vec::new();
+    for load in [&dynamics.gravity, &dynamics.tip_force, &dynamics.tip_moment] {
+        if !load.is_constant() {
+            knots.extend(load.at.iter().map(|time| time / unit));
+        }
+    }
+    if !dynamics.rest.is_constant() {
+        knots.extend(dynamics.rest.at.iter().map(|time| time / unit));
+    }
+    knots.sort_by(f64::total_cmp);
+    knots
 }

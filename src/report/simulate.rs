@@ -28,9 +28,7 @@ pub fn lines(record: &Record, files: Option<String>) -> Lines {
     lines.extend(tip(record));
     lines.push(("speed", speed(record)));
     lines.extend(files.map(|files| ("written", files)));
-    if let Some(stopped) = record.stopped {
-        lines.push(("remark", stopped.to_string()));
-    }
+    lines.extend(record.remark().map(|remark| ("remark", remark)));
     lines
 }
 

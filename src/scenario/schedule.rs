@@ -27,6 +27,26 @@ impl<T> Schedule<T> {
         self.value.windows(2).all(|pair| pair[0] == pair[1])
     }
 
+    /// The linear pieces of an interval: the middle of each, and its part of the interval.
+    fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        let first = self.at.partition_point(|&known| known <= from);
+        let last = self.at.partition_point(|&known| known < to).max(first);
+        let inner = || self.at[first..last].iter().copied();
+        let ends = inner().chain([to]);
+        [from]
+            .into_iter()
+            .chain(inner())
+            .zip(ends)
+            .map(move |(a, b)| {
+                let part = if to > from {
+                    (b - a) / (to - from)
+                } else {
+                    1.0
+                };
+                (0.5 * (a + b), part)
+            })
+    }
+
     /// The values on both sides of `time`, and the fraction of the step between them.
     fn around(&self, time: f64) -> (&T, &T, f64) {
         let last = self.at.len() - 1;
@@ -48,6 +68,12 @@ impl Schedule<f64> {
         let (from, to, fraction) = self.around(time);
         between(*from, *to, fraction)
     }
+
+    /// The mean over an interval, exact however short the pulses in it.
+    pub fn mean(&self, from: f64, to: f64) -> f64 {
+        let pieces = self.pieces(from, to);
+        pieces.map(|(middle, part)| part * self.at(middle)).sum()
+    }
 }
 
 impl Schedule<[f64; 3]> {
@@ -55,6 +81,15 @@ impl Schedule<[f64; 3]> {
     pub fn at(&self, time: f64) -> [f64; 3] {
         let (from, to, fraction) = self.around(time);
         std::array::from_fn(|axis| between(from[axis], to[axis], fraction))
+    }
+
+    /// The mean over an interval, exact however short the pulses in it.
+    pub fn mean(&self, from: f64, to: f64) -> [f64; 3] {
+        let pieces = self.pieces(from, to);
+        pieces.fold([0.0; 3], |sum, (middle, part)| {
+            let value = self.at(middle);
+            std::array::from_fn(|axis| sum[axis] + part * value[axis])
+        })
     }
 }
 
@@ -80,6 +115,24 @@ mod tests {
         };
         assert_eq!(force.at(0.5), [1.0, 1.0, -0.5]);
         assert!(!factor.is_constant());
+    }
+
+    #[test]
+    fn means_see_every_pulse() {
+        let pulse = Schedule {
+            at: vec![0.5, 0.5 + 1e-6, 0.5 + 4e-6],
+            value: vec![0.0, 3e6, 0.0],
+        };
+        assert!((pulse.mean(0.0, 2.0) - 3.0).abs() < 1e-9);
+        assert!((pulse.mean(0.0, 0.5 + 1e-6) - 3.0).abs() < 1e-5);
+        assert_eq!(pulse.mean(0.6, 0.9), 0.0);
+        let slope = Schedule {
+            at: vec![0.0, 2.0],
+            value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
+        };
+        assert_eq!(slope.mean(0.25, 0.75), slope.at(0.5));
+        assert_eq!(slope.mean(0.5, 0.5), slope.at(0.5));
+        assert_eq!(slope.mean(1.0, 3.0), [3.5, 1.0, -1.75]);
     }
 
     #[test]

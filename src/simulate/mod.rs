@@ -28,7 +28,7 @@ mod stills;
 pub use crate::motion::Stopped;
 pub use error::{MOST_SECONDS, Refused};
 pub use frame::Frame;
-pub use record::{Moment, Record, Still};
+pub use record::{Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
 
 use std::time::{Duration, Instant};

@@ -7,6 +7,13 @@ use crate::shape::serialize_tips;
 use glam::DVec3;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
+/// Largest deviation of the energy balance, as a part of the largest energy that moved,
+/// without a remark.
+const LARGEST_IMBALANCE: f64 = 0.05;
+
+/// Energy, in units of A/L, that may be due to rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Data recorded at every output, in the units of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
@@ -34,6 +41,36 @@ impl Moment {
     }
 }
 
+/// The largest deviation of the energy balance of a motion from that at its start, as a part of
+/// the largest energy that moved.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the energy balance is off by {:.0} % of the largest energy that moved: compare with a motion in shorter steps",
+    100.0 * .0
+)]
+pub struct Imbalance(pub f64);
+
+impl Imbalance {
+    /// That of the outputs of a motion, if it is more than a few per cent.
+    fn of(moments: &[Moment], rounding: f64) -> Option<Self> {
+        let start = moments.first()?.energy;
+        let (mut moved, mut off) = (rounding, 0.0_f64);
+        for Moment { energy: e, .. } in moments {
+            let present = e.kinetic + e.elastic + e.coupling + e.dissipated;
+            let given = (e.potential - start.potential - e.work).abs();
+            moved = moved.max(present).max(given);
+            off = off.max((e.balance() - start.balance()).abs());
+        }
+        (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))
+    }
+}
+
+impl Serialize for Imbalance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// The shape of a leaf at an instant, for pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
@@ -55,6 +92,10 @@ pub struct Record {
     /// Why it ended early, if it did.
     #[serde(flatten, serialize_with = "serialize_outcome")]
     pub stopped: Option<Stopped>,
+    /// How far the energy balance of a completed motion is off, if it is by more than a few
+    /// per cent.
+    #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
+    pub imbalance: Option<Imbalance>,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -111,6 +152,10 @@ impl Record {
             scenario: scenario.name.clone(),
             scheme: simulation.scheme(),
             stopped,
+            imbalance: match stopped {
+                None => Imbalance::of(&moments, ROUNDING * scenario.scale().moment()),
+                Some(_) => None,
+            },
             rods: scenario.rods.len(),
             joined: scenario.joined,
             length: scenario::longest(&scenario.rods),
@@ -136,6 +181,13 @@ impl Record {
     /// The outcome in one word: `completed`, or [`Stopped::word`].
     pub fn outcome(&self) -> &'static str {
         outcome(&self.stopped)
+    }
+
+    /// Why the motion ended early, or what makes it doubtful.
+    pub fn remark(&self) -> Option<String> {
+        let imbalance = self.imbalance.map(|imbalance| imbalance.to_string());
+        self.stopped
+            .map_or(imbalance, |stopped| Some(stopped.to_string()))
     }
 }
 

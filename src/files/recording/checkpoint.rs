@@ -103,7 +103,7 @@ pub struct Extent {
 /// The keys, in the order in which they are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// For people only: `state` has the exact time.
+    /// The time of `state`.
     pub time: f64,
     run: Identity,
     pub motion: Extent,
@@ -246,7 +246,7 @@ mod tests {
             fs::write(&file, &changed).unwrap();
             match Checkpoint::read(folder.path(), &identity()) {
                 Err(error) if error.to_string().contains(" is damaged: ") => (),
-                // The time is not used, nor is white space.
+                // The time is compared with that of the state, and white space is not used.
                 Ok(read) => assert_eq!(
                     Checkpoint { time: 0.3, ..read },
                     checkpoint,

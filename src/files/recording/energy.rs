@@ -10,6 +10,9 @@ use crate::simulate::Moment;
 
 pub const FILE_NAME: &str = "energy.csv";
 
+/// Approximate bytes of a row.
+pub const BYTES: u64 = 200;
+
 pub const COLUMNS: [&str; 11] = [
     "time",
     "steps",

@@ -120,6 +120,13 @@ impl Recording {
             let why = "it does not fit the leaf, or a number of it is impossible";
             return Err(damaged(&folder.join(checkpoint::FILE_NAME), why));
         }
+        let time = simulation.time();
+        // As text a number may lose its last digit.
+        let close = (found.time - time).abs() <= 1e-12 * time;
+        if !close {
+            let why = format!("its time {:e} is not that of its state", found.time);
+            return Err(damaged(&folder.join(checkpoint::FILE_NAME), &why));
+        }
         let motion = folder.join(recording.form.file_name());
         let motion = GrowingFile::resume(motion, &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
@@ -155,6 +162,16 @@ impl Recording {
             moments: Vec::new(),
             wall: Duration::ZERO,
             checkpointer: Checkpointer::default(),
+        }
+    }
+
+    /// Approximate number of bytes that the growing files still need; zero without these.
+    pub fn expected_bytes(&self, simulation: &Simulation) -> u64 {
+        let (all, made) = simulation.frames();
+        let output = self.form.bytes(self.size) + energy::BYTES;
+        match &self.growing {
+            Some(_) => (all.saturating_sub(made) as u64).saturating_mul(output),
+            None => 0,
         }
     }
 

@@ -20,6 +20,9 @@ const COLUMNS: [&str; 16] = [
 /// Numbers per node of a NumPy array: the columns from `x` on.
 const NUMBERS: usize = 13;
 
+/// Approximate bytes per number in a table.
+const DIGITS: usize = 20;
+
 /// Bytes of the header of the array.
 const NPY_HEADER: usize = 128;
 
@@ -66,6 +69,15 @@ impl Form {
             Form::Table => Form::Array,
             Form::Array => Form::Table,
         }
+    }
+
+    /// Bytes of an output, in a table approximately.
+    pub fn bytes(self, size: Size) -> u64 {
+        let row = match self {
+            Form::Table => COLUMNS.len() * DIGITS,
+            Form::Array => NUMBERS * size_of::<f64>(),
+        };
+        (size.rows() as u64).saturating_mul(row as u64)
     }
 
     /// The header of a file with this number of outputs.

@@ -22,7 +22,8 @@ impl Explicit {
     /// Forces of all segments at the present positions, rod by rod. Strains
     /// are stored as those of the last step if `remember`.
     pub(super) fn forces(&mut self, remember: bool) -> Vec<DVec3> {
-        let (law, segments) = (self.law(remember), self.leaf.segments());
+        let rest = self.physics.rest(self.stepped);
+        let (law, segments) = (self.law(rest, remember), self.leaf.segments());
         let mut forces = Vec::with_capacity(self.rods.len() * segments);
         for (rod, positions) in self.rods.iter_mut().zip(&self.positions) {
             self.arch.dispatch(Forces {
@@ -101,7 +102,7 @@ impl Method for Explicit {
         let path: Vec<_> = (self.rods.iter().zip(&self.positions))
             .map(|(rod, x)| (x.clone(), rod.motion.clone(), rod.past.clone()))
             .collect();
-        let (time, widths) = (self.stepped, self.widths);
+        let (time, widths, work) = (self.stepped, self.widths, self.work);
         let mut exchange = Exchange::default();
         let left = self.time - self.stepped;
         if left > NO_TIME * self.step {
@@ -109,6 +110,7 @@ impl Method for Explicit {
         }
         self.stepped = self.time;
         exchange += self.kick(0.0, 0.0, false).0;
+        exchange.work += self.work_now();
         let state = self.now();
         let n = self.leaf.segments();
         let velocities = self.rods.iter().flat_map(|rod| rod.velocities(n));
@@ -116,7 +118,7 @@ impl Method for Explicit {
         for ((rod, x), path) in self.rods.iter_mut().zip(&mut self.positions).zip(path) {
             (*x, rod.motion, rod.past) = path;
         }
-        (self.stepped, self.widths) = (time, widths);
+        (self.stepped, self.widths, self.work) = (time, widths, work);
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {
             time: self.time,
@@ -136,6 +138,7 @@ impl Method for Explicit {
             self.widths[0],
             self.widths[1],
         ];
+        numbers.extend(self.work.save());
         numbers.extend(self.balance.save());
         for (rod, positions) in self.rods.iter().zip(&self.positions) {
             let moving = positions.x.iter().chain(rod.moving_arrays());
@@ -155,6 +158,7 @@ impl Method for Explicit {
         self.steps = next() as usize;
         self.begin = (next(), next() as usize);
         self.widths = [next(), next()];
+        self.work.restore(&mut next);
         self.balance.restore(&mut next);
         self.last_snapshot = None;
         for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {

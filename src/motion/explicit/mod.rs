@@ -6,7 +6,8 @@
 //! whose free rotation is known in closed form. The method is of second order
 //! and symplectic, and conserves momentum and angular momentum to rounding, since
 //! the forces of a segment derive from an energy that is invariant under rigid
-//! motions. External damping enters by its mean over the kick.
+//! motions. External damping, and loads and rest curvatures that vary in time, enter by their
+//! mean over the kick: the impulse of a load is exact, however short it is.
 //!
 //! It is stable up to a time step of 2/omega for the highest frequency omega,
 //! which is at most that of a single segment ([`Explicit::stable_step`]), as
@@ -19,6 +20,7 @@
 mod advance;
 #[cfg(test)]
 mod tests;
+mod work;
 
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
@@ -33,6 +35,7 @@ use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
+use work::VaryingWork;
 
 /// Part of the stable time step used.
 const SAFETY: f64 = 0.9;
@@ -71,6 +74,7 @@ pub struct Explicit {
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     balance: EnergyBalance,
+    work: VaryingWork,
     /// The last snapshot, until the leaf moves or is changed: after a check
     /// it is often needed.
     last_snapshot: Option<Snapshot>,
@@ -119,6 +123,7 @@ impl Explicit {
             begin: (0.0, 0),
             widths: [0.0; 2],
             balance: EnergyBalance::default(),
+            work: VaryingWork::new(&leaf, &physics),
             last_snapshot: None,
             parallel: count > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
@@ -221,21 +226,20 @@ impl Explicit {
     fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> (Exchange, f64) {
         let length = self.lag() + ahead;
         let [from, to] = [self.stepped - self.lag(), self.stepped + ahead];
-        let loads = self.physics.loads(self.stepped);
+        let loads = self.physics.mean_loads([from, to]);
+        let rest = self.physics.mean_rest([from, to]);
+        let before_kick = self.power(&loads);
         let mut work = 0.0;
-        if self.physics.loads_change() {
-            work -= self.potential_of(&self.physics.loads(from), &self.physics.loads(to));
-        }
         let last = GROUP + self.leaf.segments();
         let (rotation, before) = (self.rods[0].rotation(last), self.rods[0].moving(last));
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
-        self.step_rods(&loads, (keep, kick), drift, remember);
-        let (mut energy, mut friction, mut rest) = (0.0, 0.0, 0.0);
+        self.step_rods(&loads, self.law(rest, remember), (keep, kick), drift);
+        let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for rod in &self.rods {
             energy += rod.totals.twice_kinetic;
             friction += self.physics.retardation * rod.totals.friction;
-            rest += rod.totals.rest;
+            bent += rod.totals.rest;
         }
         if let Some(mass) = self.tip_mass {
             let mut force = loads.tip_force;
@@ -253,13 +257,14 @@ impl Explicit {
                 }
             }
         }
+        work += 0.5 * length * (before_kick + self.power(&loads));
         if loads.tip_moment != DVec3::ZERO {
             let momentum = 0.5 * (before.1 + self.rods[0].moving(last).1);
             let spin = self.rods[0].spin(last, rotation, momentum);
             work += length * loads.tip_moment.dot(spin);
         }
         if self.physics.rest_changes() {
-            work -= rest * (self.physics.rest(to) - self.physics.rest(from));
+            work += self.work.of_rest(rest, bent, length, self.widths[0]);
         }
         let exchange = Exchange {
             dissipated: length * (self.physics.damping * energy + friction),
@@ -268,33 +273,12 @@ impl Explicit {
         (exchange, energy)
     }
 
-    /// Decrease of the potential with other loads at fixed positions.
-    fn potential_of(&self, before: &Loads, after: &Loads) -> f64 {
-        let last = GROUP + self.leaf.segments();
-        let gravity = after.gravity - before.gravity;
-        let tip_force = after.tip_force - before.tip_force;
-        let mut lower = 0.0;
-        for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
-            for at in GROUP..=last {
-                lower += rod.weight(at) * gravity.dot(vector(&positions.x, at));
-            }
-            if j == 0 || !self.leaf.leaf.joined() {
-                lower += tip_force.dot(vector(&positions.x, last));
-            }
-        }
-        lower
-    }
-
-    fn law(&self, remember: bool) -> Law {
+    fn law(&self, rest: f64, remember: bool) -> Law {
         let changes = self.physics.rest_changes();
         Law {
             damped: self.physics.retardation > 0.0,
             changes,
-            rest: if changes {
-                self.physics.rest(self.stepped)
-            } else {
-                1.0
-            },
+            rest: if changes { rest } else { 1.0 },
             retardation: self.physics.retardation,
             rates: rates(self.widths[0], self.widths[1]),
             remember,
@@ -302,8 +286,8 @@ impl Explicit {
     }
 
     /// Moves all nodes except a shared tip; the previous positions are left in `next`.
-    fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), drift: f64, remember: bool) {
-        let (arch, law, segments) = (self.arch, self.law(remember), self.leaf.segments());
+    fn step_rods(&mut self, loads: &Loads, law: Law, kick: (f64, f64), drift: f64) {
+        let (arch, segments) = (self.arch, self.leaf.segments());
         let mut loads = *loads;
         if self.tip_mass.is_some() {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.

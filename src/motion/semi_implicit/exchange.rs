@@ -31,8 +31,9 @@ impl SemiImplicit {
         if self.physics.retardation > 0.0 {
             self.past.swap(0, 1);
             self.past[0] = self.strains();
-            self.past_step = h;
         }
+        self.corrected = Loads::default();
+        self.past_step = h;
         self.time += h;
         self.count += 1;
     }

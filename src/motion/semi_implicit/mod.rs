@@ -20,12 +20,13 @@ mod closing;
 mod curves;
 mod exchange;
 mod initial;
+mod lag;
 mod step;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Method, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
-use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
+use crate::leaf::{DiscreteLeaf, Loads, SparsePattern, State, System};
 use crate::newton::Definite;
 use crate::rod::Section;
 use glam::{DQuat, DVec3};
@@ -133,9 +134,9 @@ pub struct SemiImplicit {
     inertia: Vec<Inertia>,
     /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
-    /// Strains (v, u) of all segments at the last step and the one before, and
-    /// the width of the step between.
+    /// Strains (v, u) of all segments at the last step and the one before.
     past: [Vec<[DVec3; 2]>; 2],
+    /// Length of the last step; zero if there was none.
     past_step: f64,
     /// Power of internal friction at the last step.
     friction_power: f64,
@@ -156,6 +157,8 @@ pub struct SemiImplicit {
     /// Number of factorisations.
     pub factorizations: usize,
     balance: EnergyBalance,
+    /// Loads by which the accelerations were corrected for the step being attempted.
+    corrected: Loads,
 }
 
 impl SemiImplicit {
@@ -186,6 +189,7 @@ impl SemiImplicit {
             count: 0,
             factorizations: 0,
             balance: EnergyBalance::default(),
+            corrected: Loads::default(),
             leaf,
             physics,
         };
@@ -260,7 +264,9 @@ impl Method for SemiImplicit {
 
     fn advance(&mut self, until: f64) -> Result<(), Stopped> {
         while self.time < until {
-            self.step_towards(until)?;
+            // Within a step loads are linear in time: no pulse is stepped over.
+            let knot = self.physics.next_knot(self.time);
+            self.step_towards(until.min(knot))?;
         }
         let now = self.snapshot();
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)

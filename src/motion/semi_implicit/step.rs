@@ -95,6 +95,7 @@ impl SemiImplicit {
         let of_acceleration = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * h * h);
         let per_mass = of_acceleration + damping * w.gamma / (w.beta * h);
         self.apply_loads_and_damping(self.time + h, h, per_mass);
+        self.correct_lag(h);
         self.predict(h);
         let last = match self.steps {
             Steps::Fixed(_) => FIXED_LAST,
