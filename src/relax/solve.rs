@@ -228,6 +228,13 @@ fn finished(
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
     }
+    // Rounding may hide on the finest grid what coarser ones tell.
+    if run.index.is_none()
+        && let Some(index) = index_by_eigenvalues(&run, lowest.as_ref(), count)
+    {
+        run.index = Some(index);
+        found = result(&run, end);
+    }
     if requested == 0 {
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
