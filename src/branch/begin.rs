@@ -92,7 +92,7 @@ fn search<'a>(
                 Err(_) => {}
             }
             if grid.segments() >= FINEST {
-                return found;
+                return found.and(Err(Stuck::BesideBifurcation));
             }
         }
         state = prolonged(&discrete, &state);

@@ -8,7 +8,7 @@ use super::states::{advanced, forces_on, rate, stiffest_condensed};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::{Contraction, converged};
-use crate::relax::CLEARLY_POSITIVE;
+use crate::relax::NOISY;
 use crate::rod::RESOLVED_TURN;
 
 /// Largest number of Newton iterations of a corrector.
@@ -46,6 +46,11 @@ pub enum Stuck {
     /// The matrix does not fit into memory.
     #[error("the sparse factorisation of the leaf does not fit into memory")]
     TooLarge,
+    /// No grid has the Morse index of the leaf.
+    #[error(
+        "no grid has as many negative eigenvalues as the leaf, which is too close to a bifurcation: start farther from it"
+    )]
+    BesideBifurcation,
     /// Rounding may change the sign of the softest eigenvalues.
     #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
     Rounding,
@@ -313,7 +318,7 @@ impl<'a> Equations<'a> {
     fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
         let shift = self.leaves.at(fraction)?.neutral_shift();
         let index = self.index_below(state, fraction, shift)?;
-        if shift > CLEARLY_POSITIVE && index != self.index_below(state, fraction, -shift)? {
+        if shift > NOISY && index != self.index_below(state, fraction, -shift)? {
             return Err(Stuck::Rounding);
         }
         Ok(index)

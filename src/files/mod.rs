@@ -112,7 +112,8 @@ impl Written for Boundary {
 
 impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
-    const BESIDES: &'static [&'static str] = &["motion.csv", "motion.npy", "energy.csv"];
+    const BESIDES: &'static [&'static str] =
+        &["motion.csv", "motion.npy", "energy.csv", "checkpoint.json"];
     const FORMATS: &'static [Format<Self>] = &[
         Format::Figure(["energy.svg", "energy.png"], figure::energy),
         Format::Figure(["filmstrip.svg", "filmstrip.png"], figure::filmstrip),

@@ -144,10 +144,23 @@ impl Physics {
     }
 
     /// The first time after `time` at which a load or the factor of the rest curvatures may
-    /// change its slope; infinite if there is none.
+    /// change its slope; infinite if there is none. Not closer than [`SHORTEST`]: a jump
+    /// within less takes that long.
     pub fn next_knot(&self, time: f64) -> f64 {
         let next = self.knots.partition_point(|&knot| knot <= time);
-        self.knots.get(next).copied().unwrap_or(f64::INFINITY)
+        let knot = self.knots.get(next).copied().unwrap_or(f64::INFINITY);
+        knot.max(time + SHORTEST)
+    }
+
+    /// A time at which a load or that factor has a pulse too short for steps that end at its
+    /// knots, in the scenario's unit.
+    pub fn too_short_a_pulse(&self) -> Option<f64> {
+        let (d, shortest) = (&self.dynamics, SHORTEST * self.time);
+        let loads = [&d.gravity, &d.tip_force, &d.tip_moment];
+        let of_loads = loads
+            .into_iter()
+            .find_map(|load| load.pulse_within(shortest));
+        of_loads.or_else(|| d.rest.pulse_within(shortest))
     }
 
     /// The factor of all rest curvatures at a time.
@@ -178,6 +191,9 @@ impl Physics {
         self.constant_rest != Some(1.0)
     }
 }
+
+/// Shortest step to a knot, in units of time: the accelerations of shorter ones are rounding.
+const SHORTEST: f64 = 1e-6;
 
 /// The knots of everything that varies in time, over the unit of time.
 fn knots(dynamics: &Dynamics, unit: f64) -> Vec<f64> {

@@ -60,7 +60,7 @@ pub use options::{
 };
 pub use request::Relaxation;
 pub use saddle::Saddle;
-pub(crate) use saddle::{CLEARLY_POSITIVE, polish};
+pub(crate) use saddle::{NOISY, polish};
 pub(crate) use segments::check_segments;
 pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};
 pub(crate) use shape::rods as shape_of;

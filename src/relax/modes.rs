@@ -313,11 +313,15 @@ impl Series {
         self.values().into_iter().enumerate().all(known)
     }
 
-    /// Number of negative eigenvalues, if their signs are certain.
+    /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
+    /// grid.
     fn negative(&self) -> Option<usize> {
         let values = self.values();
-        let certain = |&(value, error): &(f64, Option<f64>)| error.is_some_and(|e| value.abs() > e);
-        let all = values.iter().all(certain);
+        let alone = |k: usize| NOISE * self.rounding + UNFINISHED * self.tolerance * self.unit(k);
+        let certain = |(k, (value, error)): (usize, &(f64, Option<f64>))| {
+            value.abs() > error.unwrap_or_else(|| alone(k))
+        };
+        let all = values.iter().enumerate().all(certain);
         all.then(|| values.iter().filter(|(value, _)| *value < 0.0).count())
     }
 

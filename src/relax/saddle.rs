@@ -17,7 +17,10 @@ const MAX_STEP: f64 = 0.5;
 
 /// Lower bound on the lowest eigenvalue (with respect to the masses; 12 for a clamped rod) on
 /// one grid of a leaf that counts as clearly stable: near a fold it changes with the shape.
-pub const CLEARLY_POSITIVE: f64 = 0.1;
+const CLEARLY_POSITIVE: f64 = 0.1;
+
+/// Noise of eigenvalues by rounding from which on their signs are not taken for granted.
+pub const NOISY: f64 = 0.01;
 
 /// Safety factor on the excess stiffness of the elements, which is computed with the forces on
 /// the grid.

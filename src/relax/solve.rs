@@ -239,7 +239,10 @@ fn finished(
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
+    let undecided = lowest.as_ref().is_some_and(|it| it.undecided.is_some());
+    let negative = lowest.as_ref().and_then(|it| it.negative);
+    // On a fine grid rounding may have excused a negative eigenvalue as neutral.
+    if undecided || negative > run.index {
         found.decide(index_by_eigenvalues(&run, lowest.as_ref(), count));
     }
     found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
@@ -253,9 +256,12 @@ fn index_by_eigenvalues(run: &Run, lowest: Option<&Lowest>, count: usize) -> Opt
     let mut count = count;
     while negative == count && count < MOST_MODES {
         count = (2 * count).min(MOST_MODES);
-        negative = modes::lowest(run, count, true)?.negative?;
+        let more = modes::lowest(run, count, true).and_then(|more| more.negative);
+        // There are at least so many.
+        let Some(more) = more else { break };
+        negative = more;
     }
-    (negative < count).then_some(negative)
+    Some(negative)
 }
 
 impl Equilibrium {

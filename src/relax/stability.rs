@@ -20,7 +20,7 @@ impl Run<'_, '_> {
         }
         self.index = match self.clearly_stable {
             true => Some(0),
-            false if leaf.neutral_shift() > saddle::CLEARLY_POSITIVE => {
+            false if leaf.neutral_shift() > saddle::NOISY => {
                 let within = saddle::index_within_rounding(leaf, state, system, &mut self.work);
                 // Whatever is unstable is pushed off, however many its unstable modes.
                 let known = |&[least, most]: &[usize; 2]| {

@@ -27,6 +27,20 @@ impl<T> Schedule<T> {
         self.value.windows(2).all(|pair| pair[0] == pair[1])
     }
 
+    /// The time of a value that differs from both beside it, which are less than `width` apart.
+    pub fn pulse_within(&self, width: f64) -> Option<f64>
+    where
+        T: PartialEq,
+    {
+        let mut inner = 1..self.at.len().saturating_sub(1);
+        let pulse = inner.find(|&k| {
+            let value = &self.value[k];
+            let apart = *value != self.value[k - 1] && *value != self.value[k + 1];
+            apart && self.at[k + 1] - self.at[k - 1] < width
+        });
+        pulse.map(|k| self.at[k])
+    }
+
     /// The linear pieces of an interval: the middle of each, and its part of the interval.
     fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
         let first = self.at.partition_point(|&known| known <= from);

@@ -24,6 +24,18 @@ pub enum Refused {
         /// Whether a rod is rigid, which the explicit method cannot move.
         rigid: bool,
     },
+    /// A load has a pulse that the semi-implicit method does not resolve.
+    #[error(
+        "a load in time has a pulse at {at} that is shorter than a millionth of the unit of time \
+         sqrt(rho L^4/A): make it longer with the same impulse{}",
+        if *.rigid { "" } else { ", or use the explicit method" }
+    )]
+    Pulse {
+        /// Its time.
+        at: f64,
+        /// Whether a rod is rigid, which the explicit method cannot move.
+        rigid: bool,
+    },
     /// The time step is not positive.
     #[error("step = {found}: must be greater than 0")]
     NotPositive {

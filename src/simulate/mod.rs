@@ -129,6 +129,11 @@ impl Simulation {
         if scheme == Scheme::SemiImplicit && !physics.clamped() {
             return Err(Refused::Held { rigid });
         }
+        if scheme == Scheme::SemiImplicit
+            && let Some(at) = physics.too_short_a_pulse()
+        {
+            return Err(Refused::Pulse { at, rigid });
+        }
         let mut step = options.step;
         let mut stable = None;
         let method: Box<dyn Method + Send> = match scheme {
