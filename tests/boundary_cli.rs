@@ -69,6 +69,6 @@ fn what_cannot_be_followed_is_refused() {
         load.gravity[1]=1..1 => the same
         stiffness.axial=100..-5 => greater than 0
         load.gravity[1]=0..1 --vary load.gravity[0]=0..1 => 3 times
-        load.gravity[1]=0..1 --cross-section 1 => one --vary",
+        load.gravity[1]=0..1 --cross-section 1 => vary one number",
     );
 }

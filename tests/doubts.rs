@@ -24,6 +24,12 @@ fn a_vein_that_is_stretched_far_is_named() {
     assert!(said("rest.stretch=1.5").is_empty());
 }
 
+#[test]
+fn a_fan_in_degrees_is_named() {
+    only("leaf.fan=[-60.0]", "leaf.fan is in radians, and -60 is");
+    assert!(said("leaf.fan=[-6.28]").is_empty());
+}
+
 /// A pull beyond the axial stiffness from behind pushes a short soft rod through its base.
 #[test]
 fn a_vein_turned_through_itself_is_named() {

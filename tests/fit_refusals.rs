@@ -11,6 +11,8 @@ const DATA: &str = "
     => data.csv:1: is empty
     -0.1,-0.2 => data.csv:1: has no header
     tip_z => no row below the header
+    load.tip_force[2];tip_z|-0,1;-0,2 => data.csv:1: columns are divided by commas
+    load.tip_force[2]|-0.1 => there are no data: columns of results are tip_x
     tip_z,tip_z|1,2 => stands there twice
     load.tip_force[2],tip_w|1,2 => unknown column tip_w
     load.tip_forc[2],tip_z|1,2 => did you mean load.tip_force?
@@ -64,6 +66,20 @@ fn tried(lines: &str, free: &str) -> Result<(), FitError> {
         ..request
     };
     fit(&request, &mut |_| {}).map(|_| ())
+}
+
+#[test]
+fn tables_divided_in_other_ways_are_explained() {
+    for (text, said) in [
+        (
+            "load.tip_force[2]\ttip_z\n-0.1\t-0.2\n",
+            "columns are divided by commas",
+        ),
+        ("tip_z\r-0.1\r", "line ends of CR alone"),
+    ] {
+        let refused = Data::default().read(text, "data.csv", 5).unwrap_err();
+        assert!(refused.to_string().contains(said), "{refused}");
+    }
 }
 
 #[test]

@@ -24,19 +24,34 @@ pub fn scenario_error(py: Python, error: &ScenarioError) -> PyErr {
         Ok(class) => class,
         Err(error) => return error,
     };
-    let key = error.key.map(|key| key.path());
-    let arguments = (error.to_string(), key, file, line, remedy(&error.problem));
+    let known = error.key.map(|key| key.path());
+    let key = known.or_else(|| unknown_key(&error.problem));
+    // As the argument `set`, not the program's option.
+    let message = error.to_string();
+    let message = message.strip_prefix("--").unwrap_or(&message);
+    let arguments = (message, key, file, line, remedy(&error.problem));
     match class.call1(arguments) {
         Ok(exception) => PyErr::from_value(exception),
         Err(error) => error,
     }
 }
 
-/// The end of a message, which says what to change.
+/// The key of a message about an unknown one.
+fn unknown_key(problem: &str) -> Option<&str> {
+    let rest = problem.lines().next()?.strip_prefix("unknown key ")?;
+    let end = rest.find(" (did you mean ").or_else(|| rest.find(": "));
+    Some(&rest[..end.unwrap_or(rest.len())])
+}
+
+/// The part of a message that says what to change: what was probably meant, or its end.
 fn remedy(problem: &str) -> Option<&str> {
     let sentence = problem.lines().next()?;
     if sentence.starts_with("not valid TOML") {
         return None;
+    }
+    if let Some(at) = sentence.find("(did you mean ") {
+        let meant = &sentence[at + 1..];
+        return meant.find("?)").map(|end| &meant[..=end]);
     }
     match sentence.rfind(": allowed") {
         Some(at) => Some(&sentence[at + 2..]),

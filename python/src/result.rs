@@ -196,6 +196,7 @@ impl Leaf {
         all.set_item(intern!(py, "outcome"), ended.outcome.word())?;
         all.set_item(intern!(py, "success"), ended.outcome.is_success())?;
         all.set_item(intern!(py, "remark"), ended.remark.as_deref())?;
+        all.set_item(intern!(py, "doubts"), &found.doubts)?;
         all.set_item(intern!(py, "rods"), found.rod_count)?;
         all.set_item(intern!(py, "joined"), found.shape.joined)?;
         all.set_item(intern!(py, "segments"), &found.accuracy.segments)?;

@@ -109,7 +109,8 @@ def test_the_message_is_that_of_the_program(tmp_path: Path) -> None:
             leafdyn.relax(file, set={key: eval(value)})
         told = program("relax", file, "--set", f"{key}={value}", "--out", tmp_path / "out")
         assert told.returncode == 2
-        assert told.stderr == f"error: {refused.value}\n"
+        # The argument `set` stands for the option.
+        assert told.stderr == f"error: --{refused.value}\n"
 
 
 @pytest.mark.parametrize(
@@ -143,3 +144,62 @@ def test_a_fault_of_the_program_is_an_exception(capfd: pytest.CaptureFixture[str
     with pytest.raises(RuntimeError, match="panicked.*on purpose"):
         leafdyn._leafdyn.panic_on_purpose()
     assert leafdyn.relax(fan(2)).stable
+
+
+def test_unknown_keys_are_named_with_what_was_meant() -> None:
+    for slip, set_, key, remedy in [
+        ({"stiffness": {"torsoin": 1}}, None, "stiffness.torsoin", "did you mean stiffness.torsion?"),
+        ({}, {"stiffness.bending2": 1}, "stiffness.bending2", "did you mean stiffness.bending_2?"),
+        ({"load": {"gold": 1}}, None, "load.gold", "allowed here: gravity, tip_force, tip_moment"),
+    ]:
+        with pytest.raises(leafdyn.ScenarioError) as refused:
+            leafdyn.relax({**fan(3), **slip}, set=set_)
+        assert (refused.value.key, refused.value.remedy) == (key, remedy)
+
+
+def test_the_remedy_of_a_missing_file() -> None:
+    with pytest.raises(leafdyn.ScenarioError) as refused:
+        leafdyn.relax("none.toml")
+    assert refused.value.remedy == "check its path and permissions"
+
+
+@pytest.mark.parametrize(
+    "verb, wrong, kind, message",
+    [
+        ("relax", {"stations": -1}, ValueError, "stations = -1: allowed are whole numbers from 1"),
+        ("relax", {"stations": 1.5}, TypeError, "stations = 1.5: allowed are whole numbers from 1"),
+        ("relax", {"segments": -4}, ValueError, "segments = -4: allowed"),
+        ("relax", {"modes": -1}, ValueError, "modes = -1: allowed are whole numbers from 0"),
+        ("relax", {"set": ["a=1"]}, TypeError, r"set = \['a=1'\]: a dict is wanted"),
+        ("modes", {"count": -1}, ValueError, "count = -1"),
+        ("check", {"intervals": -1}, ValueError, "intervals = -1"),
+        ("all_shapes", {"stations": -1}, ValueError, "stations = -1"),
+        ("simulate", {"segments": -1}, ValueError, "segments = -1"),
+        ("trace", {"vary": "load.gravity[2]=-1..-2", "points": -1}, ValueError, "points = -1"),
+    ],
+)
+def test_wrong_arguments_are_named(verb: str, wrong: dict[str, Any], kind: type[Exception], message: str) -> None:
+    with pytest.raises(kind, match=message):
+        getattr(leafdyn, verb)(fan(2), **wrong)
+
+
+def test_an_empty_text() -> None:
+    with pytest.raises(leafdyn.ScenarioError, match="is empty: give a path, a text in TOML, or a dict"):
+        leafdyn.relax("")
+
+
+def test_many_scenarios_are_a_list() -> None:
+    one = fan(2)
+    for wrong in ("a.toml", Path("a.toml"), one, leafdyn.Scenario(one)):
+        with pytest.raises(TypeError, match="a list is wanted"):
+            leafdyn.relax_many(wrong)  # type: ignore[arg-type, unused-ignore]
+
+
+def test_messages_name_no_options_of_the_program() -> None:
+    for wrong in ({"leaf.rods": 0}, {"leaf.rod": 1}, {"load.gravity[7]": 1}):
+        with pytest.raises(leafdyn.ScenarioError, match="^set ") as refused:
+            leafdyn.relax(fan(2), set=wrong)
+        assert "--" not in str(refused.value)
+    with pytest.raises(ValueError, match="vary one number"):
+        vary = ["load.gravity[2]=-1..-2", "stiffness.torsion=1..2"]
+        leafdyn.trace(fan(2), vary, cross_section=1.0)

@@ -135,3 +135,16 @@ def test_progress_is_told() -> None:
     told: list[str] = []
     leafdyn.fit(PULL, [MEASURED / "pull.csv"] * 10, AXIAL, progress=lambda done, total, text: told.append(text))
     assert "sum of squares" in told[-1]
+
+
+def test_tables_that_are_no_csv_say_so(tmp_path: Path) -> None:
+    for text, said in [
+        ("load.tip_force[0];tip_x\n4;0.97\n", "divided by commas"),
+        ("load.tip_force[0]\ttip_x\n4\t0.97\n", "divided by commas"),
+        ("load.tip_force[0],tip_x\r4,0.97\r", "line ends"),
+        ("load.tip_force[0]\n4\n", "columns of results are tip_x"),
+    ]:
+        file = tmp_path / "data.csv"
+        file.write_bytes(text.encode())
+        with pytest.raises(ValueError, match=said):
+            leafdyn.fit(PULL, file, AXIAL, set=REST)

@@ -1,6 +1,7 @@
 """A leaf at rest: what it can be asked with, and what it holds."""
 
 import json
+import re
 from pathlib import Path
 from types import MappingProxyType
 
@@ -175,10 +176,12 @@ def test_requests_that_cannot_be_met(request_: dict[str, object], part: str) -> 
 
 
 def test_a_run_that_ends_otherwise_is_a_result_and_a_warning() -> None:
-    with pytest.warns(leafdyn.LeafWarning, match="allowed, do not reach the tolerance|no step lowers|rounding"):
+    with pytest.warns(leafdyn.LeafWarning) as warned:
         leaf = leafdyn.relax(fan(3), tolerance=1e-12, set={"load.gravity": [0, 0, -10_000.0]})
     assert not leaf.success
     assert leaf.remark is not None
+    assert re.search("allowed, do not reach the tolerance|no step lowers|rounding", leaf.remark)
+    assert [str(warning.message) for warning in warned] == [f"fan: {said}" for said in (leaf.remark, *leaf.doubts)]
     assert leaf.outcome in repr(leaf)
 
 
@@ -198,3 +201,33 @@ def test_repr_says_what_matters() -> None:
     assert words.startswith("<Equilibrium fan: stable, tip (")
     assert f"{leaf.error_estimate:.1e}" in words
     assert f"{leaf.tip[0]:.5g}" in words
+
+
+STRIP = """
+name = "strip"
+leaf = { rods = 1, length = 0.3, fan = [0.0] }
+section = { shape = "rectangle", width = 0.04, thickness = 4e-4, young = 1e9, mass_density = 800 }
+load = { gravity = [0.0, 0.0, -0.125] }
+"""
+
+
+def test_the_input_of_a_result_keeps_the_section() -> None:
+    leaf = leafdyn.relax(STRIP)
+    input = leaf.to_dict()["input"]
+    assert "stiffness" not in input
+    again = leafdyn.relax(input)
+    assert again.positions.tobytes() == leaf.positions.tobytes()
+    assert again.to_dict()["input"] == input
+    stiffer = {"section.young": 2e9}
+    found = leafdyn.relax(input, set=stiffer)
+    assert found.positions.tobytes() == leafdyn.relax(STRIP, set=stiffer).positions.tobytes()
+    assert leaf.tip is not None and found.tip is not None
+    data = {"tip_x": found.tip[0], "tip_z": found.tip[2], "sd_tip_x": 1e-5, "sd_tip_z": 1e-5}
+    fit = leafdyn.fit(input, data, "section.young")
+    assert abs(fit.values["section.young"] / 2e9 - 1) < 1e-3
+
+
+def test_a_remark_on_a_leaf_at_rest_is_a_warning() -> None:
+    with pytest.warns(leafdyn.LeafWarning, match="leaf.fan is in radians"):
+        leaf = leafdyn.relax({**fan(1), "leaf": {"rods": 1, "length": 1.0, "fan": [-60]}, "coupling": {}})
+    assert leaf.outcome == "converged"

@@ -4,6 +4,7 @@ use crate::relax::equilibrium::Equilibrium;
 use crate::scenario::{Rod, Scenario};
 use crate::shape::RodShape;
 use glam::DVec3;
+use std::f64::consts::TAU;
 
 /// Largest plausible stretch of a vein relative to its rest stretch.
 const STRETCHED: f64 = 0.2;
@@ -26,12 +27,20 @@ pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
         return Vec::new();
     }
     let rods = &leaf.shape.rods;
-    let mut all: Vec<String> = too_long(scenario).into_iter().collect();
+    let mut all: Vec<String> = in_degrees(scenario).into_iter().collect();
+    all.extend(too_long(scenario));
     all.extend(inverted(rods, &leaf.shape.stations).or_else(|| {
         let all = strains(scenario, rods, &leaf.shape.stations);
         stretched(all)
     }));
     all
+}
+
+/// Base angles of more than a whole turn.
+fn in_degrees(scenario: &Scenario) -> Option<String> {
+    let angle = scenario.rods.iter().map(|rod| rod.angle);
+    let angle = angle.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    (angle.abs() > TAU).then(|| format!("leaf.fan is in radians, and {angle} is more than a turn"))
 }
 
 /// Relative stretch beyond the rest stretch, with the vein and the fraction of its length.

@@ -1,52 +1,32 @@
 //! Serializes a checked scenario as JSON of the same form as the TOML, which can be read
 //! in place of it.
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::sync::Arc;
+
+use serde::ser::{Serialize, Serializer};
 
 use super::error::ScenarioError;
 use super::key::Range;
-use super::section::{Outline, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
+use super::section::{Outline, Property, Section};
+use super::written::{Written, in_time, list, number_or_list, quantity};
+use super::{Key, Profile, Rod, Scenario, Start};
 
-/// A value to be written.
-enum Written<'a> {
-    Text(&'a str),
-    Switch(bool),
-    Whole(usize),
-    /// JSON has no infinity: `"inf"`.
-    Number(f64),
-    List(Vec<Written<'a>>),
-    Table(Vec<(&'static str, Written<'a>)>),
+/// The sections of a scenario, and what else is theirs.
+struct Sections<'a> {
+    sections: &'a [Arc<Section>],
+    density: bool,
+    rotary_inertia: bool,
 }
 
-impl Serialize for Written<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Written::Text(text) => serializer.serialize_str(text),
-            Written::Switch(switch) => serializer.serialize_bool(*switch),
-            Written::Whole(whole) => serializer.serialize_u64(*whole as u64),
-            Written::Number(number) if number.is_infinite() => serializer.serialize_str("inf"),
-            Written::Number(number) => serializer.serialize_f64(*number),
-            Written::List(list) => serializer.collect_seq(list),
-            Written::Table(table) => {
-                let mut object = serializer.serialize_map(Some(table.len()))?;
-                for (key, value) in table {
-                    object.serialize_entry(key, value)?;
-                }
-                object.end()
-            }
-        }
-    }
-}
-
-/// All entries with their values, including defaults: a JSON object from which
+/// All entries with their values, including defaults, but not those that `[section]` gives: a JSON object from which
 /// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
 /// `"inf"`.
 impl Serialize for Scenario {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut top: Vec<(&str, Written)> = Vec::new();
+        let sections = self.sections();
         for key in Key::all() {
-            let Some(value) = self.written(key) else {
+            let Some(value) = self.written(key, sections.as_ref()) else {
                 continue;
             };
             match (key.parts(), top.last_mut()) {
@@ -63,12 +43,12 @@ impl Serialize for Scenario {
 
 impl Scenario {
     /// The value of a key; `None` if other keys determine it.
-    fn written(&self, key: Key) -> Option<Written<'_>> {
+    fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Written<'_>> {
         match key.parts().0 {
-            "section" => return self.of_section(key),
-            "stiffness" if self.section(0).is_some() => return None,
+            "section" => return sections?.written(key),
+            "stiffness" if sections.is_some() => return None,
             "tip" => return self.of_tip(key),
-            "dynamics" => return self.of_dynamics(key),
+            "dynamics" => return self.of_dynamics(key, sections),
             _ => {}
         }
         Some(match key {
@@ -116,11 +96,11 @@ impl Scenario {
     }
 
     /// The value of a key of `[dynamics]`.
-    fn of_dynamics(&self, key: Key) -> Option<Written<'_>> {
+    fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Written<'_>> {
         let dynamics = &self.dynamics;
-        let of_section = section_of(&dynamics.density[0]).is_some();
         Some(match key {
-            Key::Density | Key::RotaryInertia if of_section => return None,
+            Key::Density if sections.is_some_and(|it| it.density) => return None,
+            Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
             Key::Density => quantity(dynamics.density.iter()),
             // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
@@ -142,30 +122,28 @@ impl Scenario {
         })
     }
 
-    /// The section from which the stiffnesses of a rod follow.
-    fn section(&self, rod: usize) -> Option<&Section> {
-        section_of(&self.rods[rod].couple_stiffness[0])
-    }
-
-    /// The value of a key of sections that change along the rods; for constant ones the
-    /// stiffnesses are written instead.
-    fn of_section(&self, key: Key) -> Option<Written<'_>> {
-        let outline = self.section(0)?.outline;
-        let sections = || (0..self.rods.len()).filter_map(|rod| self.section(rod));
-        Some(match key {
-            Key::SectionShape => Written::Text(match outline {
-                Outline::Ellipse => "ellipse",
-                Outline::Rectangle => "rectangle",
-            }),
-            Key::Width => quantity(sections().map(|section| &section.width)),
-            Key::Thickness => quantity(sections().map(|section| &section.thickness)),
-            Key::Young => quantity(sections().map(|section| &section.young)),
-            Key::Poisson => quantity(sections().map(|section| &section.poisson)),
-            Key::MassDensity => {
-                section_of(&self.dynamics.density[0])?;
-                quantity(sections().map(|section| &section.mass_density))
-            }
-            _ => return None,
+    /// The sections, if they give the stiffnesses.
+    fn sections(&self) -> Option<Sections<'_>> {
+        let sections = self.radii.sections();
+        let gives = |(rod, section): (&Rod, &Arc<Section>)| {
+            (0..3).all(|axis| {
+                rod.couple_stiffness[axis] == section.profile(Property::Couple(axis))
+                    && rod.force_stiffness[axis] == section.profile(Property::Force(axis))
+            })
+        };
+        if sections.len() != self.rods.len() || !self.rods.iter().zip(sections).all(gives) {
+            return None;
+        }
+        let give = |profiles: &[Profile], property| {
+            let mut pairs = profiles.iter().zip(sections);
+            pairs.all(|(profile, section)| *profile == section.profile(property))
+        };
+        let density = give(&self.dynamics.density, Property::Density);
+        let inertia = give(&self.dynamics.rotary_inertia, Property::RotaryInertia);
+        Some(Sections {
+            sections,
+            density,
+            rotary_inertia: density && inertia,
         })
     }
 
@@ -181,56 +159,29 @@ impl Scenario {
     }
 }
 
-fn section_of(profile: &Profile) -> Option<&Section> {
-    match profile {
-        Profile::Section { section, .. } => Some(section),
-        _ => None,
+impl Sections<'_> {
+    /// The value of a key of `[section]`.
+    fn written(&self, key: Key) -> Option<Written<'static>> {
+        let outline = self.sections.first()?.outline;
+        let of = |of: fn(&Section) -> &Profile| {
+            quantity(self.sections.iter().map(|section| of(section)))
+        };
+        Some(match key {
+            Key::SectionShape => Written::Text(match outline {
+                Outline::Circle => "circle",
+                Outline::Ellipse => "ellipse",
+                Outline::Rectangle => "rectangle",
+            }),
+            Key::Diameter if outline == Outline::Circle => of(|section| &section.width),
+            Key::Width | Key::Thickness if outline == Outline::Circle => return None,
+            Key::Width => of(|section| &section.width),
+            Key::Thickness => of(|section| &section.thickness),
+            Key::Young => of(|section| &section.young),
+            Key::Poisson => of(|section| &section.poisson),
+            Key::MassDensity if self.density => of(|section| &section.mass_density),
+            _ => return None,
+        })
     }
-}
-
-fn list(numbers: impl IntoIterator<Item = f64>) -> Written<'static> {
-    Written::List(numbers.into_iter().map(Written::Number).collect())
-}
-
-/// A single number if all are the same.
-fn number_or_list(numbers: impl Iterator<Item = f64>) -> Written<'static> {
-    let numbers: Vec<f64> = numbers.collect();
-    let first = numbers.first().copied().unwrap_or(0.0);
-    match numbers.iter().all(|number| *number == first) {
-        true => Written::Number(first),
-        false => list(numbers),
-    }
-}
-
-/// A quantity of all rods, in the shortest form.
-fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Written<'static> {
-    let profiles: Vec<&Profile> = profiles.collect();
-    if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
-        return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
-    }
-    let kinks = profiles.iter().flat_map(|profile| profile.kinks());
-    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
-    let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
-    let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
-        true => values(profiles[0]),
-        false => Written::List(profiles.iter().map(|profile| values(profile)).collect()),
-    };
-    Written::Table(vec![("at", list(at.iter().copied())), ("value", value)])
-}
-
-/// A quantity in time; `None` if it is always the one at rest.
-fn in_time<T: Copy + PartialEq>(
-    schedule: &Schedule<T>,
-    at_rest: T,
-    name: &'static str,
-    written: impl Fn(T) -> Written<'static>,
-) -> Option<Written<'static>> {
-    let values = schedule.value.iter().map(|&value| written(value));
-    let table = || {
-        let at = list(schedule.at.iter().copied());
-        Written::Table(vec![("at", at), (name, Written::List(values.collect()))])
-    };
-    (*schedule != Schedule::constant(at_rest)).then(table)
 }
 
 /// Converts a scenario in JSON, or the `input` of a result, to TOML; `None` if the text
@@ -316,8 +267,69 @@ mod tests {
             let json = serde_json::to_string(&scenario).unwrap();
             let again = Scenario::from_toml(&json);
             assert_eq!(again.unwrap(), scenario, "{json}");
+            assert_eq!(
+                json.contains("section"),
+                text.contains("section ="),
+                "{json}"
+            );
+            assert!(
+                !(json.contains("section") && json.contains("torsion")),
+                "{json}"
+            );
             let summary = format!("{{\"outcome\": \"converged\", \"input\": {json}}}");
             assert_eq!(Scenario::from_toml(&summary).unwrap(), scenario);
+        }
+    }
+
+    /// What a section gives is not written beside it, but what is given in its place is.
+    #[test]
+    fn a_section_is_written_as_it_was_given() {
+        let head = "name = 'strip'\nleaf = { rods = 1, length = 0.3, fan = [0.0] }\n";
+        for (sides, mass, density, inertia) in [
+            (
+                "shape = 'rectangle', width = 0.04, thickness = 4e-4",
+                true,
+                false,
+                true,
+            ),
+            (
+                "shape = 'ellipse', width = 0.04, thickness = 0.04",
+                true,
+                false,
+                false,
+            ),
+            (
+                "shape = 'circle', diameter = { at = [0, 1], value = [0.02, 0.01] }",
+                true,
+                false,
+                true,
+            ),
+            ("shape = 'circle', diameter = 0.02", false, true, false),
+        ] {
+            let material = if mass {
+                "mass_density = 800"
+            } else {
+                "poisson = 0.4"
+            };
+            let dynamics = if inertia {
+                "[dynamics]\nrotary_inertia = 1e-8"
+            } else {
+                ""
+            };
+            let text =
+                format!("{head}section = {{ {sides}, young = 2e9, {material} }}\n{dynamics}");
+            let scenario = Scenario::from_toml(&text).unwrap();
+            let written = serde_json::to_value(&scenario).unwrap();
+            let again = Scenario::from_toml(&written.to_string()).unwrap();
+            assert_eq!(again, scenario);
+            assert_eq!(serde_json::to_value(&again).unwrap(), written);
+            assert!(sides.contains(written["section"]["shape"].as_str().unwrap()));
+            for key in ["diameter", "width", "thickness"] {
+                assert_eq!(written["section"].get(key).is_some(), sides.contains(key));
+            }
+            assert!(written.get("stiffness").is_none());
+            assert_eq!(written["dynamics"].get("density").is_some(), density);
+            assert_eq!(written["dynamics"].get("rotary_inertia").is_some(), inertia);
         }
     }
 

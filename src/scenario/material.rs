@@ -108,15 +108,8 @@ impl Sections {
     }
 
     fn profiles(&self, property: Property) -> Vec<Profile> {
-        let profile = |section: &Arc<Section>| match section.is_constant() {
-            true => Profile::Constant(section.at(property, 0.5)),
-            false => Profile::Section {
-                section: section.clone(),
-                property,
-                factor: 1.0,
-            },
-        };
-        self.sections.iter().map(profile).collect()
+        let sections = self.sections.iter();
+        sections.map(|section| section.profile(property)).collect()
     }
 
     pub(super) fn radii(&self) -> Radii {
@@ -149,7 +142,7 @@ fn outline(raw: &Raw) -> Result<(Outline, [Key; 2])> {
     let item = raw.item(Key::SectionShape)?;
     let sides = [Key::Width, Key::Thickness];
     let (outline, sides, others) = match item.node().text() {
-        Some("circle") => (Outline::Ellipse, [Key::Diameter; 2], &sides[..]),
+        Some("circle") => (Outline::Circle, [Key::Diameter; 2], &sides[..]),
         Some("ellipse") => (Outline::Ellipse, sides, &[Key::Diameter][..]),
         Some("rectangle") => (Outline::Rectangle, sides, &[Key::Diameter][..]),
         _ => return Err(item.refuse("must be \"circle\", \"ellipse\" or \"rectangle\"")),

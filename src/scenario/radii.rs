@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Section;
 
-/// Radii of the veins, from their sections. No computation uses them: scenarios that
+/// Radii of the veins, from their sections. Computations use the stiffnesses alone: scenarios that
 /// differ only in radii are equal.
 #[derive(Clone, Debug, Default)]
 pub struct Radii(Vec<Arc<Section>>);
@@ -12,6 +12,11 @@ pub struct Radii(Vec<Arc<Section>>);
 impl Radii {
     pub(super) fn of(sections: &[Arc<Section>]) -> Self {
         Radii(sections.to_vec())
+    }
+
+    /// The sections; none where stiffnesses are given in place of them.
+    pub(super) fn sections(&self) -> &[Arc<Section>] {
+        &self.0
     }
 
     /// The radius of a rod at a fraction of its length: that of a circle with the area of

@@ -88,7 +88,10 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
             ErrorKind::IsADirectory => {
                 ScenarioError::in_file(&file, None, "is a folder: give the TOML file itself".into())
             }
-            _ => ScenarioError::in_file(&file, None, format!("cannot be read: {reason}")),
+            _ => {
+                let problem = format!("cannot be read: {reason}: check its path and permissions");
+                ScenarioError::in_file(&file, None, problem)
+            }
         })?;
     utf8(bytes, &file)
 }

@@ -16,6 +16,7 @@
 //! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::{Profile, ascending};
 
@@ -25,7 +26,9 @@ const SAMPLES: usize = 16;
 /// The outline of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
-    /// A circle, or an ellipse with its width along d2 and its thickness along d3.
+    /// A circle, whose width and thickness are the same.
+    Circle,
+    /// An ellipse with its width along d2 and its thickness along d3.
     Ellipse,
     /// A rectangle with the same sides.
     Rectangle,
@@ -92,7 +95,7 @@ impl Section {
     }
 
     /// Whether it is the same along the whole rod.
-    pub(super) fn is_constant(&self) -> bool {
+    fn is_constant(&self) -> bool {
         let mut profiles = self.profiles().into_iter();
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
@@ -106,7 +109,7 @@ impl Section {
     pub fn area(&self, sigma: f64) -> f64 {
         let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
         match self.outline {
-            Outline::Ellipse => PI / 4.0 * w * t,
+            Outline::Circle | Outline::Ellipse => PI / 4.0 * w * t,
             Outline::Rectangle => w * t,
         }
     }
@@ -118,7 +121,7 @@ impl Section {
         let shear = young / (2.0 * (1.0 + poisson));
         let area = self.area(sigma);
         let second = match self.outline {
-            Outline::Ellipse => PI / 64.0,
+            Outline::Circle | Outline::Ellipse => PI / 64.0,
             Outline::Rectangle => 1.0 / 12.0,
         };
         let second = [second * w * t * t * t, second * t * w * w * w];
@@ -130,6 +133,18 @@ impl Section {
             Property::Force(_) => self.outline.shear_factor(t, w, poisson) * shear * area,
             Property::Density => self.mass_density.at(sigma) * area,
             Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
+        }
+    }
+
+    /// A property along the rod.
+    pub(super) fn profile(self: &Arc<Section>, property: Property) -> Profile {
+        match self.is_constant() {
+            true => Profile::Constant(self.at(property, 0.5)),
+            false => Profile::Section {
+                section: self.clone(),
+                property,
+                factor: 1.0,
+            },
         }
     }
 
@@ -162,7 +177,7 @@ impl Outline {
     /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
     fn torsion(self, width: f64, thickness: f64) -> f64 {
         match self {
-            Outline::Ellipse => {
+            Outline::Circle | Outline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
                 // In this order equal sides give the circle's value to the last bit but one.
                 PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
@@ -185,7 +200,7 @@ impl Outline {
     fn shear_factor(self, along: f64, across: f64, nu: f64) -> f64 {
         match self {
             Outline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
-            Outline::Ellipse => {
+            Outline::Circle | Outline::Ellipse => {
                 let (a, b) = (along * along, across * across);
                 12.0 * (1.0 + nu) * a * (3.0 * a + b)
                     / ((40.0 + 37.0 * nu) * a * a + (16.0 + 10.0 * nu) * a * b + nu * b * b)

@@ -15,7 +15,7 @@ class ScenarioError(ValueError):
     """
 
     key: str | None
-    """The key it is about, if there is such a key."""
+    """The key it is about, be it a known one or not."""
     file: str | None
     """The file, ``"scenario"`` for a text or a dict; none for an entry of ``set``."""
     line: int | None

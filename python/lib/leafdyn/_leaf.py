@@ -44,6 +44,8 @@ class Equilibrium(Viewed):
     """Whether the leaf is at rest within the tolerance."""
     remark: str | None
     """What would help, if the run did not succeed."""
+    doubts: list[str]
+    """What can hardly be meant: a vein that is stretched far, say, or a fan in degrees."""
     rods: int
     """The number of rods N."""
     joined: bool
@@ -178,7 +180,7 @@ class Equilibrium(Viewed):
 
     @property
     def frequencies(self) -> Array | None:
-        """Angular frequencies omega, radians per time; not a number of modes that are unstable."""
+        """Angular frequencies omega, radians per time (over 2 pi: cycles per time); not a number of unstable modes."""
         if self.eigenvalues is None:
             return None
         with np.errstate(invalid="ignore"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,7 +11,7 @@ from . import _leafdyn
 from ._errors import LeafWarning
 from ._leaf import Equilibrium
 from ._progress import Progress, reporter
-from ._scenario import Source, checked
+from ._scenario import Scenario, Source, checked, whole
 
 
 def _asked(
@@ -26,11 +27,13 @@ def _asked(
     sensitivity: Iterable[str] = (),
     margin: bool = False,
 ) -> dict[str, Any]:
-    return {**locals(), "sensitivity": list(sensitivity)}
+    asked = {**locals(), "sensitivity": list(sensitivity)}
+    whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
+    return asked
 
 
-def warn(name: str, remark: str | None) -> None:
-    if remark is not None:
+def warn(name: str, *remarks: str | None) -> None:
+    for remark in filter(None, remarks):
         warnings.warn(f"{name}: {remark}", LeafWarning, stacklevel=3)
 
 
@@ -93,7 +96,7 @@ def relax(
     Warns
     -----
     LeafWarning
-        What would help, if the leaf is not at rest within the tolerance.
+        What would help, if the leaf is not at rest within the tolerance; what else is to be said of it, and its doubts.
 
     Examples
     --------
@@ -110,7 +113,7 @@ def relax(
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    warn(found.name, found.remark)
+    warn(found.name, found.remark, *found.doubts)
     return found
 
 
@@ -146,13 +149,15 @@ def relax_many(
     >>> [round(float(leaf.tip[2]), 4) for leaf in leaves]
     [-0.0739, -0.146, -0.2791]
     """
+    if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
+        raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
     asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
     leaves = [checked(scenario, set) for scenario in scenarios]
     with reporter(progress) as heard:
         cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
     found = [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
     for leaf in found:
-        warn(leaf.name, leaf.remark)
+        warn(leaf.name, leaf.remark, *leaf.doubts)
     return found
 
 
@@ -184,11 +189,12 @@ def modes(
     >>> leaf.frequencies.shape, leaf.mode_displacements.shape == (2, *leaf.curves.shape)
     ((2,), True)
     """
+    whole(count=count)
     asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    warn(found.name, found.remark)
+    warn(found.name, found.remark, *found.doubts)
     return found
 
 
@@ -239,5 +245,5 @@ def sensitivities(
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    warn(found.name, found.remark)
+    warn(found.name, found.remark, *found.doubts)
     return found

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from numbers import Integral
 from typing import Any, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
+from ._errors import ScenarioError
 
 
 class Scenario:
@@ -44,11 +46,16 @@ class Scenario:
     _core: _leafdyn.Scenario
 
     def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
+        if set is not None and not isinstance(set, Mapping):
+            raise TypeError(f'set = {set!r}: a dict is wanted, such as {{"leaf.rods": 5}}')
         entries = _leafdyn.overrides(set) if set else []
         if isinstance(source, Scenario):
             self._core = source._core.replaced(entries) if entries else source._core
         elif isinstance(source, Mapping):
             self._core = _leafdyn.Scenario.from_dict(source, entries)
+        elif isinstance(source, str) and not source.strip():
+            remedy = "give a path, a text in TOML, or a dict"
+            raise ScenarioError(f"scenario: is empty: {remedy}", file="scenario", remedy=remedy)
         elif isinstance(source, str) and _is_text(source):
             self._core = _leafdyn.Scenario(source, entries)
         else:
@@ -123,6 +130,17 @@ def _restore(text: str, overrides: list[str], file: str) -> Scenario:
     scenario = Scenario.__new__(Scenario)
     scenario._core = _leafdyn.Scenario(text, overrides, file)
     return scenario
+
+
+def whole(**counts: int | None) -> None:
+    """Refuse what are no whole numbers, or negative ones."""
+    for name, count in counts.items():
+        least = 0 if name in ("modes", "count") else 1
+        allowed = f"allowed are whole numbers from {least}"
+        if count is not None and not isinstance(count, Integral):
+            raise TypeError(f"{name} = {count!r}: {allowed}")
+        if count is not None and count < 0:
+            raise ValueError(f"{name} = {count}: {allowed}")
 
 
 def checked(source: Source, set: Mapping[str, Any] | None) -> Scenario:

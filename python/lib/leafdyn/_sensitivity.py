@@ -34,7 +34,8 @@ class Sensitivity:
     lowest_eigenvalue_error: float | None
     """Bound on its error."""
     frequencies: Array
-    """Changes of the frequencies, cycles per time, shape (modes,)."""
+    """Changes of the frequencies, cycles per time (`Equilibrium.frequencies` are angular), shape (modes,); without a
+    bound on their errors."""
     tip_reaction: Array | None
     """Change of the force that the holder of the tip feels, shape (3,); none if the tip is free."""
     tip_reaction_moments: Array | None

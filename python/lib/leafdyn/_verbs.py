@@ -10,7 +10,7 @@ from ._leaf import Equilibrium
 from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
 from ._relax import warn
-from ._scenario import Scenario, Source, checked
+from ._scenario import Scenario, Source, checked, whole
 from ._study import Boundary, Chart, Check, Map, Shapes, Trace
 
 
@@ -51,11 +51,12 @@ def check(
     >>> check.verdict, check.difference["position"] < 1e-6
     ('agree', True)
     """
+    whole(intervals=intervals)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         files, relaxed, solution = _leafdyn.check(leaf._core, tolerance, keep_unstable, intervals, heard)
     found = Check(files, Equilibrium(relaxed), solution)
-    warn(found.leaf.name, found.reason)
+    warn(found.leaf.name, found.reason, *found.leaf.doubts)
     return found
 
 
@@ -91,6 +92,7 @@ def all_shapes(
     >>> len(shapes), shapes[0].stable
     (1, True)
     """
+    whole(stations=stations)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         files, found = _leafdyn.all_shapes(leaf._core, tolerance, full_model, stations, heard)
@@ -198,6 +200,7 @@ def trace(
     >>> bool(abs(curve.values[:, 0] / curve.values[:, 1] / (-np.pi**2 / 4) - 1).max() < 1e-5)
     True
     """
+    whole(segments=segments, points=points)
     leaf = checked(scenario, set)
     asked = {
         "switch": switch,
@@ -382,6 +385,7 @@ def simulate(
     >>> motion.outcome, motion.positions.shape[0] == len(motion.times)
     ('completed', True)
     """
+    whole(segments=segments)
     leaf = checked(scenario, set)
     core = _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
     with reporter(progress) as heard:
@@ -428,6 +432,7 @@ def frames(
     >>> frame.positions.shape == frame.velocities.shape
     True
     """
+    whole(segments=segments)
     leaf: Scenario = checked(scenario, set)
     core = _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
     outputs: dict[str, Any] | None = core.frame()

@@ -55,7 +55,7 @@ impl BoundaryRequest {
             return Err(TraceError::Option(why));
         }
         if self.trace.cross_section.is_some() {
-            let why = "cross-section: Young's modulus is that of a branch; give one --vary";
+            let why = "cross-section: Young's modulus is that of a branch; vary one number";
             return Err(TraceError::Option(why.into()));
         }
         Ok(())

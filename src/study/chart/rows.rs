@@ -166,7 +166,7 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
         remarks.push(format!("{word} is not charted: {why}"));
     }
     if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
-        let why = "the run before took too long; allow more --seconds";
+        let why = "the run before took too long; allow more seconds";
         remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
     }
     // Estimates that are smaller than the true error are reported here.

@@ -92,6 +92,10 @@ fn unquoted(cell: &str) -> &str {
 impl<'t> Table<'t> {
     fn of(text: &'t str, file: &'t str) -> Result<Self, FitError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        if text.contains('\r') && !text.contains('\n') {
+            let why = "has line ends of CR alone: save it with line ends LF or CR LF";
+            return Err(refuse(file, 1, why));
+        }
         let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
         let mut lines = lines
             .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
@@ -102,6 +106,10 @@ impl<'t> Table<'t> {
                 "is empty: give a header, and a row for each datum",
             ));
         };
+        if !header.contains(',') && header.contains([';', '\t']) {
+            let why = "columns are divided by commas, and numbers have a decimal point";
+            return Err(refuse(file, first, why));
+        }
         let header: Vec<&str> = header.split(',').map(unquoted).collect();
         if header.iter().any(|name| name.parse::<f64>().is_ok()) {
             let why = "has no header: the first line names the columns, such as \

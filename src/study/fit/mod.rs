@@ -42,6 +42,7 @@ use found::Evaluations;
 use free::Coordinate;
 use least_squares::{ASSUMED, End, Iteration, Weighting};
 use model::{Model, Point};
+use quantity::Quantity;
 use statistics::Statistics;
 
 /// Largest number of minima abandoned for better ones.
@@ -246,6 +247,10 @@ fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     if free == 0 || free > count {
         return Err(FitError::Free(match free {
             0 => "no number is free: name at least one".into(),
+            _ if count == 0 => format!(
+                "there are no data: columns of results are {}, or rod, x, y, z of points on veins",
+                Quantity::ALL
+            ),
             _ => format!(
                 "{free} numbers are free, and there are {count} data: free fewer, or measure more"
             ),
