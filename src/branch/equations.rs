@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{add, between, dot, is_finite, largest, plus, times};
 use super::states::{advanced, forces_on, rate, stiffest_condensed};
+pub use super::stuck::Stuck;
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::{Contraction, converged};
@@ -30,31 +31,6 @@ const SAME_INDEX: f64 = 1e-9;
 
 /// Rounding error of a force, in units of epsilon times the largest stiffness.
 const ROUNDING: f64 = 10.0;
-
-/// Why no point is found.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum Stuck {
-    /// The parameter has left its range.
-    #[error(transparent)]
-    OutOfRange(#[from] OutOfRange),
-    /// A segment bends by more than the grid resolves.
-    #[error("a vein bends by more than a right angle within one segment")]
-    Unresolved,
-    /// Newton's method does not converge.
-    #[error("Newton's method does not lead back to the branch")]
-    NotConverged,
-    /// The matrix does not fit into memory.
-    #[error("the sparse factorisation of the leaf does not fit into memory")]
-    TooLarge,
-    /// No grid has the Morse index of the leaf.
-    #[error(
-        "no grid has as many negative eigenvalues as the leaf, which is too close to a bifurcation: start farther from it"
-    )]
-    BesideBifurcation,
-    /// Rounding may change the sign of the softest eigenvalues.
-    #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
-    Rounding,
-}
 
 /// The equations of a family of leaves on a grid, with workspace.
 pub struct Equations<'a> {

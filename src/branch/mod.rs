@@ -40,6 +40,7 @@ mod refine_critical;
 mod refined;
 mod states;
 mod step;
+mod stuck;
 mod walk;
 
 pub use begin::{begin, switch};
