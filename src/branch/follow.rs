@@ -214,7 +214,12 @@ impl Followed {
         if number > 0 && self.branch.missed.contains(&(number - 1)) {
             return Err(Doubt::Unexplained);
         }
-        self.critical.extend(critical?);
+        let critical = critical?;
+        // A point next to the range's end is on the other side of it, in truth.
+        if !critical.iter().all(Refined::is_inside) {
+            return Err(Doubt::OtherIndex);
+        }
+        self.critical.extend(critical);
         self.points.push(point?);
         match number == 0 || self.displaced_alike(number) {
             true => Ok(()),

@@ -40,6 +40,12 @@ pub struct Refined {
 }
 
 impl Refined {
+    /// Whether its parameter may be in the range.
+    pub fn is_inside(&self) -> bool {
+        let beyond = (-self.fraction).max(self.fraction - 1.0);
+        beyond <= self.fraction_error
+    }
+
     /// Its leaf on the finest grid, in the scenario's units.
     ///
     /// # Errors
