@@ -8,8 +8,8 @@ use glam::DVec3;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 /// Largest deviation of the energy balance, as a part of the largest energy that moved,
-/// without a remark: that of damped leaves released from arcs may be off by 6 %.
-const LARGEST_IMBALANCE: f64 = 0.1;
+/// without a remark.
+const LARGEST_IMBALANCE: f64 = 0.05;
 
 /// Energy, in units of A/L, that may be due to rounding.
 const ROUNDING: f64 = 1e-9;
@@ -53,22 +53,14 @@ pub struct Imbalance(pub f64);
 impl Imbalance {
     /// That of the outputs of a motion, if it is more than a few per cent.
     fn of(moments: &[Moment], rounding: f64) -> Option<Self> {
-        // What stays, such as the energy of a shape at rest, has not moved.
-        let range = |of: &dyn Fn(&Energy) -> f64| {
-            let values = moments.iter().map(|moment| of(&moment.energy));
-            let ends = (f64::INFINITY, f64::NEG_INFINITY);
-            let (least, most) = values.fold(ends, |(a, b), value| (a.min(value), b.max(value)));
-            most - least
-        };
-        let moved = [
-            range(&|e| e.kinetic),
-            range(&|e| e.elastic),
-            range(&|e| e.coupling),
-            range(&|e| e.dissipated),
-            range(&|e| e.potential - e.work),
-        ];
-        let moved = moved.into_iter().fold(rounding, f64::max);
-        let off = range(&|e| e.balance());
+        let start = moments.first()?.energy;
+        let (mut moved, mut off) = (rounding, 0.0_f64);
+        for Moment { energy: e, .. } in moments {
+            let present = e.kinetic + e.elastic + e.coupling + e.dissipated;
+            let given = (e.potential - start.potential - e.work).abs();
+            moved = moved.max(present).max(given);
+            off = off.max((e.balance() - start.balance()).abs());
+        }
         (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))
     }
 }
