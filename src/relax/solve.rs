@@ -228,21 +228,15 @@ fn finished(
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
     }
-    // Rounding may hide on the finest grid what coarser ones tell.
-    if run.index.is_none()
-        && let Some(index) = index_by_eigenvalues(&run, lowest.as_ref(), count)
-    {
-        run.index = Some(index);
-        found = result(&run, end);
-    }
     if requested == 0 {
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
     let undecided = lowest.as_ref().is_some_and(|it| it.undecided.is_some());
     let negative = lowest.as_ref().and_then(|it| it.negative);
-    // On a fine grid rounding may have excused a negative eigenvalue as neutral.
-    if undecided || negative > run.index {
+    // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
+    // coarser ones tell.
+    if undecided || negative > found.stability.negative_eigenvalues {
         found.decide(index_by_eigenvalues(&run, lowest.as_ref(), count));
     }
     found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
@@ -272,10 +266,16 @@ impl Equilibrium {
             self.doubts.push(UNDECIDED.to_owned());
             return;
         };
-        self.stability.negative_eigenvalues = Some(index);
-        if index > 0 && self.outcome.is_success() {
+        let unknown = (self.stability.negative_eigenvalues.replace(index)).is_none();
+        if !self.outcome.is_success() {
+            return;
+        }
+        if index > 0 {
             self.outcome = Outcome::Saddle;
             self.remark = Some(BESIDE_BIFURCATION.to_owned());
+        } else if unknown {
+            // It said so.
+            self.remark = None;
         }
     }
 }
