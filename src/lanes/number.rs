@@ -23,18 +23,21 @@ impl Four {
     }
 }
 
+/// Largest number of lanes of an instruction.
+pub const WIDTH: usize = 8;
+
+/// The widest instructions available.
+pub fn widest_arch() -> Arch {
+    Arch::new()
+}
+
 /// The widest instructions available whose width divides a group.
 pub fn arch() -> Arch {
-    struct Width;
-    impl pulp::WithSimd for Width {
-        type Output = usize;
-        fn with_simd<S: Simd>(self, _: S) -> usize {
-            S::F64_LANES
-        }
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Arch::V3(*simd),
+        arch => arch,
     }
-    let arch = Arch::new();
-    let fits = GROUP.is_multiple_of(arch.dispatch(Width));
-    if fits { arch } else { Arch::Scalar }
 }
 
 /// A loop over groups.
@@ -57,7 +60,15 @@ pub fn run(arch: Arch, kernel: &mut impl Kernel) {
             }
         }
     }
-    arch.dispatch(Parts(kernel));
+    match arch {
+        // Not compiled for wider instructions than a group.
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, Parts(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        _ => Simd::vectorize(Scalar, Parts(kernel)),
+        #[cfg(not(target_arch = "x86_64"))]
+        _ => arch.dispatch(Parts(kernel)),
+    }
 }
 
 /// The part of an array given by its first index and its length.

@@ -7,8 +7,8 @@
 //! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
-use super::kernel::{Node, blocks};
-use super::nodes::{Rod, node_data};
+use super::kernel::{Layout, Node};
+use super::nodes::{Pack, materials, node_data};
 use super::physics::Physics;
 use crate::leaf::DiscreteLeaf;
 
@@ -18,9 +18,10 @@ use crate::leaf::DiscreteLeaf;
 const ROTATING: f64 = 0.5;
 
 /// Sets the masses of the rods; returns that of a shared tip.
-pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, rods: &mut [Rod]) -> f64 {
-    let (n, count) = (leaf.segments(), rods.len());
+pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout, packs: &mut [Pack]) -> f64 {
+    let (n, count) = (leaf.segments(), leaf.rods());
     let mut tip = 0.0;
+    let mut rods: Vec<Vec<Node>> = Vec::with_capacity(count);
     for j in 0..count {
         let old: Vec<Node> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
         let mut new = old.clone();
@@ -36,9 +37,9 @@ pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, rods: &mut [Rod]) -> f64 {
             }
             let node = &mut new[i];
             // Both neighbours pull on a node, and may move as much as it does.
-            for gap in [j.wrapping_sub(1), j] {
+            for (gap, coupled) in [j.wrapping_sub(1), j].into_iter().zip(node.coupled) {
                 if gap < count - 1 {
-                    mass += 0.5 * (leaf.leaf.coupling(gap) * node.coupled).max_element();
+                    mass += 0.5 * (leaf.leaf.coupling(gap) * coupled).max_element();
                 }
             }
             if i == n {
@@ -54,8 +55,10 @@ pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, rods: &mut [Rod]) -> f64 {
                 node.per_mass = 1.0 / mass;
             }
         }
-        let neighbour = j.checked_sub(1).map(|other| &*rods[other].material);
-        rods[j].material = blocks(&new, neighbour);
+        rods.push(new);
+    }
+    for (pack, material) in packs.iter_mut().zip(materials(layout, |j, i| rods[j][i])) {
+        pack.material = material;
     }
     tip
 }

@@ -1,17 +1,15 @@
 //! Conversion of the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{
-    Array, BLOCK, GROUP, Material, Motion, Node, Past, Positions, StepTotals, blocks,
-};
+use super::kernel::{Array, Layout, Material, Motion, Node, Past, StepTotals, blocks};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// One rod's arrays except its positions, which its neighbours read.
+/// The arrays of a pack of rods, except its positions, which its neighbours read.
 #[derive(Clone, Debug)]
-pub struct Rod {
+pub struct Pack {
     pub motion: Motion,
     pub material: Vec<Arc<Material>>,
     pub past: Past,
@@ -23,59 +21,78 @@ fn arrays<const K: usize>(length: usize) -> [Array; K] {
     std::array::from_fn(|_| Array::zeros(length))
 }
 
-fn length(segments: usize) -> usize {
-    (segments + 1).next_multiple_of(GROUP) + 2 * GROUP
+/// How the rods of a leaf are laid out.
+pub fn layout(leaf: &DiscreteLeaf) -> Layout {
+    let coupling = |gap| leaf.leaf.coupling(gap);
+    let alike = (1..leaf.rods() - 1).all(|gap| coupling(gap) == coupling(gap - 1));
+    Layout::new(leaf.rods(), leaf.segments(), alike)
 }
 
-pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
-    let n = leaf.segments();
-    let mut x = arrays::<3>(length(n));
-    for i in 0..=n {
+/// The positions of all nodes.
+pub fn positions(leaf: &DiscreteLeaf, state: &State, layout: Layout) -> [Array; 3] {
+    let mut x = arrays::<3>(layout.lengths()[0]);
+    for (j, i) in leaf.each(0..=leaf.segments()) {
         for c in 0..3 {
-            x[c][GROUP + i] = state.x[state.base(j) + i][c];
+            x[c][layout.at(j, i)] = state.x[state.base(j) + i][c];
         }
     }
-    Positions { x }
+    x
 }
 
-/// A rod at rest; blocks that it has in common with the rod `neighbour` are shared.
-pub fn rod(
-    leaf: &DiscreteLeaf,
-    physics: &Physics,
-    state: &State,
-    j: usize,
-    neighbour: Option<&Rod>,
-) -> Rod {
-    let n = leaf.segments();
-    let length = length(n);
-    let mut motion = Motion {
-        q: arrays(length),
-        v: arrays(length),
-        p: arrays(length),
-    };
-    motion.q[3].fill(1.0);
-    let mut last = DQuat::IDENTITY;
-    for i in 0..=n {
-        let q = state.q[state.base(j) + i];
-        // Signs of neighbouring quaternions are aligned once, and remain so.
-        let flipped = i > 0 && last.dot(q) < 0.0;
-        last = if flipped { -q } else { q };
-        for (array, value) in motion.q.iter_mut().zip(last.to_array()) {
-            array[GROUP + i] = value;
+/// The packs of a leaf at rest.
+pub fn packs(leaf: &DiscreteLeaf, physics: &Physics, state: &State, layout: Layout) -> Vec<Pack> {
+    let node = |j, i| node_data(leaf, physics, j, i);
+    let materials = materials(layout, node).into_iter().enumerate();
+    let packs = materials.map(|(p, material)| {
+        let length = layout.lengths()[1];
+        let remembered = if physics.retardation > 0.0 { length } else { 0 };
+        let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
+        let mut motion = Motion {
+            q: arrays(length),
+            v: arrays(length),
+            p: arrays(length),
+        };
+        motion.q[3].fill(1.0);
+        for j in layout.rods_of(p) {
+            let mut last = DQuat::IDENTITY;
+            for i in 0..=leaf.segments() {
+                let q = state.q[state.base(j) + i];
+                // Signs of neighbouring quaternions are aligned once, and remain so.
+                let flipped = i > 0 && last.dot(q) < 0.0;
+                last = if flipped { -q } else { q };
+                let at = layout.place(j, i).1;
+                for (array, value) in motion.q.iter_mut().zip(last.to_array()) {
+                    array[at] = value;
+                }
+            }
         }
+        Pack {
+            motion,
+            material,
+            past: Past {
+                one: past(),
+                two: past(),
+            },
+            totals: StepTotals::default(),
+        }
+    });
+    packs.collect()
+}
+
+/// The nodes of all packs in blocks; those that packs have in common are shared.
+pub fn materials(layout: Layout, node: impl Fn(usize, usize) -> Node) -> Vec<Vec<Arc<Material>>> {
+    let mut packs: Vec<Vec<Arc<Material>>> = Vec::with_capacity(layout.packs());
+    for p in 0..layout.packs() {
+        let mut nodes = vec![Node::default(); layout.entries()];
+        for j in layout.rods_of(p) {
+            for i in 0..=layout.segments {
+                nodes[layout.place(j, i).1] = node(j, i);
+            }
+        }
+        let blocks = blocks(&nodes, packs.last().map(|pack| &**pack));
+        packs.push(blocks);
     }
-    let data: Vec<_> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
-    let remembered = if physics.retardation > 0.0 { length } else { 0 };
-    let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
-    let (one, two) = (past(), past());
-    let mut rod = Rod {
-        motion,
-        material: blocks(&data, neighbour.map(|rod| &*rod.material)),
-        past: Past { one, two },
-        totals: StepTotals::default(),
-    };
-    rod.pad(n);
-    rod
+    packs
 }
 
 /// Properties of node `i` of rod `j`, and of the segment after it.
@@ -96,7 +113,8 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         if shifts && (i < n || !joined) {
             node.mass = inertia.mass;
             node.per_mass = 1.0 / inertia.mass;
-            node.coupled = leaf.grid.weight(i);
+            let neighbours = [j > 0, j + 1 < leaf.rods()];
+            node.coupled = neighbours.map(|there| if there { leaf.grid.weight(i) } else { 0.0 });
         }
     }
     if i < n {
@@ -113,27 +131,17 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
     node
 }
 
-impl Rod {
+impl Pack {
     /// The block of a node, and its index there, by its index in the arrays.
     pub fn block(&self, at: usize) -> (&Material, usize) {
-        let i = at - GROUP;
-        (&self.material[i / BLOCK], i % BLOCK)
+        let length = self.material[0].mass.len();
+        (&self.material[at / length], at % length)
     }
 
     /// Length of rod whose loads act on a node.
     pub fn weight(&self, at: usize) -> f64 {
         let (material, i) = self.block(at);
         material.weight[i]
-    }
-
-    /// Sets the entries after the last node, up to the end of its group and of the next, to its
-    /// rotation: the segments read there, which have no stiffness, are then straight.
-    pub fn pad(&mut self, segments: usize) {
-        let last = GROUP + segments;
-        for q in &mut self.motion.q {
-            let value = q[last];
-            q[last + 1..=(last + 1).next_multiple_of(GROUP)].fill(value);
-        }
     }
 
     /// The arrays that determine the motion, without positions.
@@ -156,9 +164,13 @@ impl Rod {
         p * material.per_inertia[i] + d1 * (d1.dot(p) * material.per_spin[i])
     }
 
+    /// The quaternion of a node, normalised at intervals only.
+    pub fn quaternion(&self, at: usize) -> DQuat {
+        DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at]))
+    }
+
     pub fn rotation(&self, at: usize) -> DQuat {
-        // They are normalised at intervals only.
-        DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at])).normalize()
+        self.quaternion(at).normalize()
     }
 
     /// Velocity and angular momentum of a node.
@@ -166,12 +178,11 @@ impl Rod {
         (vector(&self.motion.v, at), vector(&self.motion.p, at))
     }
 
-    pub fn velocities(&self, segments: usize) -> impl Iterator<Item = Velocity> + '_ {
-        (GROUP..=GROUP + segments).map(move |at| {
-            let (linear, p) = self.moving(at);
-            let angular = self.spin(at, self.rotation(at), p);
-            Velocity { angular, linear }
-        })
+    /// Linear and angular velocity of a node.
+    pub fn velocity(&self, at: usize) -> Velocity {
+        let (linear, p) = self.moving(at);
+        let angular = self.spin(at, self.rotation(at), p);
+        Velocity { angular, linear }
     }
 }
 

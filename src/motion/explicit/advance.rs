@@ -3,7 +3,7 @@
 use super::Explicit;
 use crate::leaf::State;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::kernel::{Forces, GROUP};
+use crate::motion::kernel::Forces;
 use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use crate::motion::nodes::vector;
 use glam::DVec3;
@@ -23,15 +23,16 @@ impl Explicit {
     /// are stored as those of the last step if `remember`.
     pub(super) fn forces(&mut self, remember: bool) -> Vec<DVec3> {
         let rest = self.physics.rest(self.stepped);
-        let (law, segments) = (self.law(rest, remember), self.leaf.segments());
-        let mut forces = Vec::with_capacity(self.rods.len() * segments);
-        for (rod, positions) in self.rods.iter_mut().zip(&self.positions) {
+        let (law, layout) = (self.law(rest, remember), self.layout);
+        let mut forces = Vec::with_capacity(layout.rods * layout.segments);
+        for (p, pack) in self.packs.iter_mut().enumerate() {
             self.arch.dispatch(Forces {
-                segments,
-                positions,
-                motion: &rod.motion,
-                material: &rod.material,
-                past: &mut rod.past,
+                layout,
+                pack: p,
+                positions: &self.positions,
+                motion: &pack.motion,
+                material: &pack.material,
+                past: &mut pack.past,
                 law,
                 forces: &mut forces,
             });
@@ -48,9 +49,9 @@ impl Explicit {
 
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
-        let nodes = || self.leaf.each(GROUP..=GROUP + n);
-        let x = nodes().map(|(j, at)| vector(&self.positions[j].x, at));
-        let q = nodes().map(|(j, at)| self.rods[j].rotation(at));
+        let nodes = || self.leaf.each(0..=n);
+        let x = nodes().map(|(j, i)| vector(&self.positions, self.layout.at(j, i)));
+        let q = nodes().map(|(j, i)| self.rotation(j, i));
         State::new(n, x.collect(), q.collect())
     }
 
@@ -99,9 +100,9 @@ impl Method for Explicit {
         {
             return last;
         }
-        let path: Vec<_> = (self.rods.iter().zip(&self.positions))
-            .map(|(rod, x)| (x.clone(), rod.motion.clone(), rod.past.clone()))
-            .collect();
+        let packs = self.packs.iter();
+        let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
+        let path = (self.positions.clone(), moving);
         let (time, widths, work) = (self.stepped, self.widths, self.work);
         let mut exchange = Exchange::default();
         let left = self.time - self.stepped;
@@ -112,11 +113,12 @@ impl Method for Explicit {
         exchange += self.kick(0.0, 0.0, false).0;
         exchange.work += self.work_now();
         let state = self.now();
-        let n = self.leaf.segments();
-        let velocities = self.rods.iter().flat_map(|rod| rod.velocities(n));
-        let velocity: Vec<Velocity> = velocities.collect();
-        for ((rod, x), path) in self.rods.iter_mut().zip(&mut self.positions).zip(path) {
-            (*x, rod.motion, rod.past) = path;
+        let places = self.leaf.each(0..=self.leaf.segments());
+        let places = places.map(|(j, i)| self.layout.place(j, i));
+        let velocity: Vec<Velocity> = places.map(|(p, at)| self.packs[p].velocity(at)).collect();
+        self.positions = path.0;
+        for (pack, moving) in self.packs.iter_mut().zip(path.1) {
+            (pack.motion, pack.past) = moving;
         }
         (self.stepped, self.widths, self.work) = (time, widths, work);
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
@@ -140,10 +142,13 @@ impl Method for Explicit {
         ];
         numbers.extend(self.work.save());
         numbers.extend(self.balance.save());
-        for (rod, positions) in self.rods.iter().zip(&self.positions) {
-            let moving = positions.x.iter().chain(rod.moving_arrays());
-            numbers.extend(moving.flat_map(|array| array.iter()));
-        }
+        let moving = self.packs.iter().flat_map(|pack| pack.moving_arrays());
+        numbers.extend(
+            self.positions
+                .iter()
+                .chain(moving)
+                .flat_map(|array| array.iter()),
+        );
         numbers
     }
 
@@ -161,11 +166,13 @@ impl Method for Explicit {
         self.work.restore(&mut next);
         self.balance.restore(&mut next);
         self.last_snapshot = None;
-        for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
-            let moving = positions.x.iter_mut().chain(rod.moving_arrays_mut());
-            for value in moving.flat_map(|array| array.iter_mut()) {
-                *value = next();
-            }
+        let moving = self
+            .packs
+            .iter_mut()
+            .flat_map(|pack| pack.moving_arrays_mut());
+        let arrays = self.positions.iter_mut().chain(moving);
+        for value in arrays.flat_map(|array| array.iter_mut()) {
+            *value = next();
         }
         true
     }

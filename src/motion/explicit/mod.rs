@@ -25,14 +25,14 @@ mod work;
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
 use super::friction::rates;
-use super::kernel::{self, Block, GROUP, Law, Neighbour, Positions, Step};
+use super::kernel::{self, Array, Block, Law, Layout, Step};
 use super::method::{Method, Snapshot};
-use super::nodes::{self, Rod, vector};
+use super::nodes::{self, Pack, vector};
 use super::physics::Physics;
 use super::stable::StableStep;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use pulp::Arch;
 use rayon::prelude::*;
 use work::VaryingWork;
@@ -57,13 +57,16 @@ pub struct Explicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     arch: Arch,
-    positions: Vec<Positions>,
-    /// Their positions after the next step.
-    next: Vec<Positions>,
-    rods: Vec<Rod>,
+    layout: Layout,
+    positions: [Array; 3],
+    /// Positions after the next step.
+    next: [Array; 3],
+    packs: Vec<Pack>,
     block: Block,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
+    /// Length of rods whose loads act on it.
+    tip_weight: f64,
     step: f64,
     /// Time of the last step, and the time asked for, less than a step later.
     stepped: f64,
@@ -100,22 +103,20 @@ impl Explicit {
         if leaf.stiffest() == 0.0 {
             return Err(Rigid);
         }
-        let count = leaf.rods();
-        let joined = leaf.tips_move_together();
-        let tip_mass = |j| physics.inertia(&leaf, j, leaf.segments()).mass;
-        let positions = (0..count).map(|j| nodes::positions(&leaf, state, j));
-        let positions: Vec<_> = positions.collect();
-        let mut rods: Vec<Rod> = Vec::with_capacity(count);
-        for j in 0..count {
-            rods.push(nodes::rod(&leaf, &physics, state, j, rods.last()));
-        }
+        let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
+        let tip_mass = |j| physics.inertia(&leaf, j, last).mass;
+        let tip_weight = |j| leaf.grid.weight(last) * leaf.leaf.length(j);
+        let layout = nodes::layout(&leaf);
+        let positions = nodes::positions(&leaf, state, layout);
         let mut explicit = Explicit {
-            arch: kernel::arch(),
+            arch: kernel::widest_arch(),
+            packs: nodes::packs(&leaf, &physics, state, layout),
             next: positions.clone(),
             positions,
+            layout,
             block: Block::new(),
-            rods,
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
+            tip_weight: (0..count).map(tip_weight).sum(),
             step: 0.0,
             stepped: 0.0,
             time: 0.0,
@@ -125,7 +126,7 @@ impl Explicit {
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
             last_snapshot: None,
-            parallel: count > 1
+            parallel: layout.packs() > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
             leaf,
@@ -133,9 +134,9 @@ impl Explicit {
         };
         explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
         explicit.forces(true);
-        for rod in &mut explicit.rods {
+        for pack in &mut explicit.packs {
             // At rest earlier strains equal the present ones.
-            rod.past.two = rod.past.one.clone();
+            pack.past.two = pack.past.one.clone();
         }
         let start = explicit.snapshot();
         explicit.balance.begin(&start);
@@ -160,7 +161,7 @@ impl Explicit {
     /// fastest motions of all segments have equal frequencies. Time steps may then be as long
     /// as one, and the leaf is stopped.
     pub fn use_fictitious_masses(&mut self) {
-        let tip = fictitious::masses(&self.leaf, &self.physics, &mut self.rods);
+        let tip = fictitious::masses(&self.leaf, &self.physics, self.layout, &mut self.packs);
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
     }
@@ -168,8 +169,8 @@ impl Explicit {
     /// Sets all velocities to zero.
     pub fn stop(&mut self) {
         self.last_snapshot = None;
-        for rod in &mut self.rods {
-            for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
+        for pack in &mut self.packs {
+            for array in pack.motion.v.iter_mut().chain(&mut pack.motion.p) {
                 array.fill(0.0);
             }
         }
@@ -193,17 +194,33 @@ impl Explicit {
         energy
     }
 
-    /// The largest rotation between the ends of a segment before the last step, up to
+    fn rotation(&self, j: usize, i: usize) -> DQuat {
+        let (p, at) = self.layout.place(j, i);
+        self.packs[p].rotation(at)
+    }
+
+    /// Velocity and angular momentum of a node.
+    fn moving(&self, j: usize, i: usize) -> (DVec3, DVec3) {
+        let (p, at) = self.layout.place(j, i);
+        self.packs[p].moving(at)
+    }
+
+    /// The largest rotation between the ends of a segment, up to
     /// 2 pi, since signs of quaternions are aligned.
     fn largest_turn(&self) -> f64 {
-        let deltas = self.rods.iter().map(|rod| rod.totals.largest_delta);
+        let deltas = (0..self.layout.rods).flat_map(|j| {
+            let (p, base) = self.layout.place(j, 0);
+            let pack = &self.packs[p];
+            (base..base + self.layout.segments)
+                .map(|at| (pack.quaternion(at + 1) - pack.quaternion(at)).length_squared())
+        });
         4.0 * (0.5 * deltas.fold(0.0, f64::max).sqrt()).min(1.0).asin()
     }
 
-    /// Whether numbers were finite and bending was resolved before the last step.
+    /// Whether numbers are finite and bending is resolved.
     fn trusted(&self) -> bool {
-        let finite = |rod: &Rod| rod.totals.twice_kinetic.is_finite();
-        self.largest_turn() <= RESOLVED_TURN && self.rods.iter().all(finite)
+        let finite = |pack: &Pack| pack.totals.twice_kinetic.is_finite();
+        self.largest_turn() <= RESOLVED_TURN && self.packs.iter().all(finite)
     }
 
     fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
@@ -230,37 +247,37 @@ impl Explicit {
         let rest = self.physics.mean_rest([from, to]);
         let before_kick = self.power(&loads);
         let mut work = 0.0;
-        let last = GROUP + self.leaf.segments();
-        let (rotation, before) = (self.rods[0].rotation(last), self.rods[0].moving(last));
+        let last = self.leaf.segments();
+        let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
-        self.step_rods(&loads, self.law(rest, remember), (keep, kick), drift);
+        self.step_packs(&loads, self.law(rest, remember), (keep, kick), drift);
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
-        for rod in &self.rods {
-            energy += rod.totals.twice_kinetic;
-            friction += self.physics.retardation * rod.totals.friction;
-            bent += rod.totals.rest;
+        for pack in &self.packs {
+            energy += pack.totals.twice_kinetic;
+            friction += self.physics.retardation * pack.totals.friction;
+            bent += pack.totals.rest;
         }
         if let Some(mass) = self.tip_mass {
-            let mut force = loads.tip_force;
-            for rod in &self.rods {
-                force += rod.weight(last) * loads.gravity;
-                force -= DVec3::from(rod.totals.last_force);
+            let mut force = loads.tip_force + self.tip_weight * loads.gravity;
+            for pack in &self.packs {
+                force -= DVec3::from(pack.totals.last_force);
             }
             let after = keep * before.0 + force * (kick / mass);
             energy += mass * (0.5 * (before.0 + after)).length_squared();
-            let tip = vector(&self.next[0].x, last) + drift * after;
-            for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
+            let tip = vector(&self.next, self.layout.at(0, last)) + drift * after;
+            for j in 0..self.layout.rods {
+                let (p, at) = self.layout.place(j, last);
                 for c in 0..3 {
-                    rod.motion.v[c][last] = after[c];
-                    positions.x[c][last] = tip[c];
+                    self.packs[p].motion.v[c][at] = after[c];
+                    self.positions[c][self.layout.at(j, last)] = tip[c];
                 }
             }
         }
         work += 0.5 * length * (before_kick + self.power(&loads));
         if loads.tip_moment != DVec3::ZERO {
-            let momentum = 0.5 * (before.1 + self.rods[0].moving(last).1);
-            let spin = self.rods[0].spin(last, rotation, momentum);
+            let momentum = 0.5 * (before.1 + self.moving(0, last).1);
+            let spin = self.packs[0].spin(self.layout.place(0, last).1, rotation, momentum);
             work += length * loads.tip_moment.dot(spin);
         }
         if self.physics.rest_changes() {
@@ -286,33 +303,30 @@ impl Explicit {
     }
 
     /// Moves all nodes except a shared tip; the previous positions are left in `next`.
-    fn step_rods(&mut self, loads: &Loads, law: Law, kick: (f64, f64), drift: f64) {
-        let (arch, segments) = (self.arch, self.leaf.segments());
+    fn step_packs(&mut self, loads: &Loads, law: Law, kick: (f64, f64), drift: f64) {
+        let (arch, layout) = (self.arch, self.layout);
         let mut loads = *loads;
         if self.tip_mass.is_some() {
             // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (all, leaf) = (&self.positions, &self.leaf);
-        let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
-            let neighbour = |other: usize, gap: usize| {
-                (other < all.len()).then(|| Neighbour {
-                    positions: &all[other],
-                    stiffness: leaf.coupling(gap).to_array(),
-                })
-            };
+        let (positions, leaf) = (&self.positions, &self.leaf);
+        let coupled = leaf.coupled();
+        let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
+            // Those beyond the first and the last rod have no weight. The others of a pack are
+            // alike.
+            let coupling = |gap: usize| leaf.coupling(gap.min(layout.rods - 2)).to_array();
+            let rods = layout.rods_of(p);
             let step = Step {
-                segments,
-                positions: &all[j],
+                layout,
+                pack: p,
+                positions,
                 next,
-                neighbours: [
-                    neighbour(j.wrapping_sub(1), j.wrapping_sub(1)),
-                    neighbour(j + 1, j),
-                ],
-                motion: &mut rod.motion,
-                material: &rod.material,
-                past: &mut rod.past,
+                coupling: coupled.then(|| [rods.start.saturating_sub(1), rods.start].map(coupling)),
+                motion: &mut pack.motion,
+                material: &pack.material,
+                past: &mut pack.past,
                 law,
                 loads,
                 keep: kick.0,
@@ -321,18 +335,25 @@ impl Explicit {
                 normalise,
                 block,
             };
-            rod.totals = step.make(arch);
-            rod.pad(segments);
+            pack.totals = arch.dispatch(step);
         };
+        let [x, y, z] = self
+            .next
+            .each_mut()
+            .map(|array| &mut array[layout.front()..]);
+        let length = layout.entries();
         if self.parallel {
-            (self.rods.par_iter_mut().zip(&mut self.next).enumerate())
-                .with_min_len(share(all.len()))
-                .for_each_init(Block::new, |block, (j, (rod, next))| {
-                    one(block, j, rod, next);
+            let next = (x.par_chunks_mut(length).zip(y.par_chunks_mut(length)))
+                .zip(z.par_chunks_mut(length));
+            (self.packs.par_iter_mut().zip(next).enumerate())
+                .with_min_len(share(layout.packs()))
+                .for_each_init(Block::new, |block, (p, (pack, ((x, y), z)))| {
+                    one(block, p, pack, [x, y, z]);
                 });
         } else {
-            for (j, (rod, next)) in self.rods.iter_mut().zip(&mut self.next).enumerate() {
-                one(&mut self.block, j, rod, next);
+            let next = (x.chunks_mut(length).zip(y.chunks_mut(length))).zip(z.chunks_mut(length));
+            for (p, (pack, ((x, y), z))) in self.packs.iter_mut().zip(next).enumerate() {
+                one(&mut self.block, p, pack, [x, y, z]);
             }
         }
         std::mem::swap(&mut self.positions, &mut self.next);

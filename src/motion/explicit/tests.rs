@@ -1,4 +1,5 @@
 use super::*;
+use crate::lanes;
 use crate::leaf::{Grid, Leaf};
 use crate::relax::start;
 use crate::scenario::Scenario;
@@ -76,29 +77,28 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
     let expected = by_element(leaf, &state);
     let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
     let allowed = 1e-12 * largest.fold(0.0, f64::max);
-    for arch in [kernel::arch(), Arch::Scalar] {
+    for arch in [kernel::widest_arch(), lanes::arch(), Arch::Scalar] {
         let mut explicit = explicit(leaf.clone(), &state);
         explicit.arch = arch;
         explicit.set_damping(0.0);
         let h = 1e-6;
         explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
-        for (j, rod) in explicit.rods.iter().enumerate() {
-            for i in 1..=n {
-                let (v, p) = rod.moving(GROUP + i);
-                let (force, moment) = expected[state.base(j) + i];
-                let moment_error = (p / (0.5 * h) - moment).length();
-                assert!(moment_error < allowed, "{j} {i}: {moment_error}");
-                if i == n {
-                    tip += force;
-                } else {
-                    let (material, at) = rod.block(GROUP + i);
-                    let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
-                    assert!(error < allowed, "{j} {i}: {error}");
-                }
+        for (j, i) in leaf.each(1..=n) {
+            let (v, p) = explicit.moving(j, i);
+            let (force, moment) = expected[state.base(j) + i];
+            let moment_error = (p / (0.5 * h) - moment).length();
+            assert!(moment_error < allowed, "{j} {i}: {moment_error}");
+            if i == n {
+                tip += force;
+            } else {
+                let (pack, at) = explicit.layout.place(j, i);
+                let (material, at) = explicit.packs[pack].block(at);
+                let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
+                assert!(error < allowed, "{j} {i}: {error}");
             }
         }
-        let v = explicit.rods[2].moving(GROUP + n).0;
+        let v = explicit.moving(2, n).0;
         let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
         assert!(error < allowed, "tip: {error}");
         // Clamped ends do not move.
@@ -118,14 +118,15 @@ fn like_blocks_are_shared() {
         let leaf = discrete(&toml.collect::<String>(), segments);
         let state = start(&leaf);
         let explicit = explicit(leaf, &state);
-        let blocks = explicit.rods.iter().flat_map(|rod| &rod.material);
+        let blocks = explicit.packs.iter().flat_map(|pack| &pack.material);
         let places: Vec<_> = blocks.map(std::sync::Arc::as_ptr).collect();
         (places.iter().collect::<HashSet<_>>().len(), places.len())
     };
     // The clamped end, the middle and the tip.
-    assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 8));
-    assert_eq!(distinct("rods = 5, length = 1.0", 50), (1, 5));
-    assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (2, 3));
+    assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 5));
+    // Two rods at a time: the first and the last have one neighbour.
+    assert_eq!(distinct("rods = 9, length = 1.0", 50), (3, 5));
+    assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (3, 3));
 }
 
 /// A constant factor of the rest curvature is equivalent to other curvatures.

@@ -6,9 +6,9 @@
 
 use super::Explicit;
 use crate::leaf::{DiscreteLeaf, Loads};
-use crate::motion::kernel::{Array, GROUP};
 use crate::motion::nodes::vector;
 use crate::motion::physics::Physics;
+use glam::DVec3;
 
 /// What the work of varying loads and rest curvatures depends on.
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +70,7 @@ impl Explicit {
     /// Power of the excess of `loads` over those at time 0, at the present velocities.
     pub(super) fn power(&self, loads: &Loads) -> f64 {
         match self.physics.loads_change() {
-            true => self.excess(loads, |j| &self.rods[j].motion.v),
+            true => self.excess(loads, |j, i| self.moving(j, i).0),
             false => 0.0,
         }
     }
@@ -81,7 +81,7 @@ impl Explicit {
         let mut work = 0.0;
         if self.physics.loads_change() {
             let loads = self.physics.loads(self.time);
-            work -= self.excess(&loads, |j| &self.positions[j].x);
+            work -= self.excess(&loads, |j, i| vector(&self.positions, self.layout.at(j, i)));
         }
         if self.physics.rest_changes() {
             let VaryingWork {
@@ -102,17 +102,16 @@ impl Explicit {
     }
 
     /// Sum of the excess of `loads` over those at time 0, times vectors of the nodes.
-    fn excess<'a>(&'a self, loads: &Loads, vectors: impl Fn(usize) -> &'a [Array; 3]) -> f64 {
-        let last = GROUP + self.leaf.segments();
+    fn excess(&self, loads: &Loads, vectors: impl Fn(usize, usize) -> DVec3) -> f64 {
         let excess = *loads - self.work.loads;
         let mut sum = 0.0;
-        for (j, rod) in self.rods.iter().enumerate() {
-            let vectors = vectors(j);
-            for at in GROUP..=last {
-                sum += rod.weight(at) * excess.gravity.dot(vector(vectors, at));
+        for j in 0..self.layout.rods {
+            for i in 0..=self.layout.segments {
+                let (p, at) = self.layout.place(j, i);
+                sum += self.packs[p].weight(at) * excess.gravity.dot(vectors(j, i));
             }
             if j == 0 || !self.leaf.leaf.joined() {
-                sum += excess.tip_force.dot(vector(vectors, last));
+                sum += excess.tip_force.dot(vectors(j, self.layout.segments));
             }
         }
         sum

@@ -1,4 +1,4 @@
-//! Material data of a rod, for the loops over its nodes.
+//! Material data of rods, for the loops over their nodes.
 
 use super::BLOCK;
 use std::sync::Arc;
@@ -24,8 +24,8 @@ pub struct Node {
     pub per_spin: f64,
     /// Length of rod whose loads act on the node.
     pub weight: f64,
-    /// Fraction of the length whose coupling acts on the node.
-    pub coupled: f64,
+    /// Fraction of the length whose coupling to the rods before and after acts on the node.
+    pub coupled: [f64; 2],
 }
 
 /// The nodes of a block, one array for each number of a [`Node`], and derived
@@ -33,9 +33,16 @@ pub struct Node {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Material {
-    pub stretch: [[f64; BLOCK]; 3],
-    pub rest_length: [f64; BLOCK],
-    pub bend: [[f64; BLOCK]; 3],
+    /// Whether all segments are as stiff along d3 as along d2, and straight at rest.
+    pub round: bool,
+    /// H2/ds, and the excess of H1/ds and H3/ds over it.
+    pub shear: [f64; BLOCK],
+    pub stretch_excess: [[f64; BLOCK]; 2],
+    /// H1/ds times the rest length: minus the force along d1 without strains.
+    pub rest_force: [f64; BLOCK],
+    /// A2/ds, and the excess of A1/ds and A3/ds over it.
+    pub bend: [f64; BLOCK],
+    pub bend_excess: [[f64; BLOCK]; 2],
     pub rest_turn: [[f64; BLOCK]; 3],
     /// A u0: minus the moment where the segment is straight.
     pub rest_moment: [[f64; BLOCK]; 3],
@@ -44,7 +51,7 @@ pub struct Material {
     pub per_inertia: [f64; BLOCK],
     pub per_spin: [f64; BLOCK],
     pub weight: [f64; BLOCK],
-    pub coupled: [f64; BLOCK],
+    pub coupled: [[f64; BLOCK]; 2],
 }
 
 impl Material {
@@ -56,10 +63,18 @@ impl Material {
             }
             array
         };
+        let round = |node: &Node| {
+            let [_, bend_2, bend_3] = node.bend;
+            let [_, shear_2, shear_3] = node.stretch;
+            bend_2 == bend_3 && shear_2 == shear_3 && node.rest_turn[1..] == [0.0, 0.0]
+        };
         Material {
-            stretch: [0, 1, 2].map(|c| gather(&|node| node.stretch[c])),
-            rest_length: gather(&|node| node.rest_length),
-            bend: [0, 1, 2].map(|c| gather(&|node| node.bend[c])),
+            round: nodes.iter().all(round),
+            shear: gather(&|node| node.stretch[1]),
+            stretch_excess: [0, 2].map(|c| gather(&|node| node.stretch[c] - node.stretch[1])),
+            rest_force: gather(&|node| node.stretch[0] * node.rest_length),
+            bend: gather(&|node| node.bend[1]),
+            bend_excess: [0, 2].map(|c| gather(&|node| node.bend[c] - node.bend[1])),
             rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
             rest_moment: [0, 1, 2].map(|c| gather(&|node| node.bend[c] * node.rest_turn[c])),
             mass: gather(&|node| node.mass),
@@ -67,19 +82,19 @@ impl Material {
             per_inertia: gather(&|node| node.per_inertia),
             per_spin: gather(&|node| node.per_spin),
             weight: gather(&|node| node.weight),
-            coupled: gather(&|node| node.coupled),
+            coupled: [0, 1].map(|side| gather(&|node| node.coupled[side])),
         }
     }
 }
 
-/// A rod's nodes in blocks. Blocks that equal the previous one, or the one
-/// at the same position in the rod `neighbour`, are shared: they stay in the innermost
+/// The nodes of a pack in blocks. Blocks that equal the previous one, or the one
+/// at the same position in the pack before, are shared: they stay in the innermost
 /// cache, and most leaves have few that differ.
-pub fn blocks(nodes: &[Node], neighbour: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
+pub fn blocks(nodes: &[Node], before: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
     let mut blocks: Vec<Arc<Material>> = Vec::with_capacity(nodes.len().div_ceil(BLOCK));
     for nodes in nodes.chunks(BLOCK) {
         let material = Material::new(nodes);
-        let above = neighbour.and_then(|rod| rod.get(blocks.len()));
+        let above = before.and_then(|pack| pack.get(blocks.len()));
         let near = [blocks.last(), above].into_iter().flatten();
         let same = { near }.find(|other| ***other == material).cloned();
         blocks.push(same.unwrap_or_else(|| Arc::new(material)));

@@ -1,7 +1,7 @@
-//! The explicit method's loop over a rod: a whole time step, from the forces of
+//! The explicit method's loop over a pack of rods: a whole time step, from the forces of
 //! its segments to the new positions of its nodes.
 //!
-//! It processes the rod in blocks. The forces of a block's segments
+//! It processes the pack in blocks. The forces of a block's segments
 //! ([`segments`]) stay in the innermost caches until its nodes have
 //! moved ([`nodes`]). Nodes that have moved are not read again: the force of the segment before
 //! the next block's first node is carried over from the previous block, and
@@ -9,31 +9,26 @@
 //! to the old ones.
 
 mod array;
+mod layout;
 mod material;
 mod nodes;
 mod segments;
 
 pub use self::array::Array;
+pub use self::layout::Layout;
 pub use self::material::{Material, Node, blocks};
 use self::segments::{Nodes, SegmentSums};
 use crate::lanes::Lanes;
-pub use crate::lanes::{GROUP, arch};
+pub use crate::lanes::{WIDTH, widest_arch};
 use crate::leaf::Loads;
-use pulp::{Arch, Simd};
+use pulp::Simd;
 use std::sync::Arc;
 
-/// Nodes of a block. Measured: with half as many, steps take 1.06 times as long,
-/// due to the beginnings and ends of the loops; twice as many gain nothing.
-pub const BLOCK: usize = 32 * GROUP;
+/// Nodes of a block. Measured: with half as many, steps of short rods take 1.05 times as long,
+/// due to the beginnings and ends of the loops; more gain nothing.
+pub const BLOCK: usize = 224;
 
-/// Positions of a rod's nodes, one array per component. Nodes come in groups, and arrays are
-/// a group longer at both ends: node i is at GROUP + i; the padding is read, but not used.
-#[derive(Clone, Debug)]
-pub struct Positions {
-    pub x: [Array; 3],
-}
-
-/// Other variables of the motion.
+/// What moves besides the positions: arrays of a pack.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Rotations as quaternions, normalised up to rounding and the truncation error of [`nodes`].
@@ -68,55 +63,56 @@ pub struct Law {
     pub remember: bool,
 }
 
-/// Forces of the segments of a block on their ends.
+/// Forces of the segments of a block on their ends. Node i of the block is at WIDTH + i, and at
+/// WIDTH - 1 the last one of the block before.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct Block {
-    /// Force N of the segment from node i to i + 1, node i of the block at
-    /// GROUP + i; at GROUP - 1 the last segment's of the block before.
-    n: [[f64; GROUP + BLOCK]; 3],
+    /// Force N of the segment from node i to i + 1.
+    n: [[f64; WIDTH + BLOCK]; 3],
     /// Twice the moment on its left and on its right end.
-    left: [[f64; GROUP + BLOCK]; 3],
-    right: [[f64; GROUP + BLOCK]; 3],
-    /// 2/|s|^2 (see [`segments`]).
-    twice_inverse: [f64; BLOCK],
+    left: [[f64; WIDTH + BLOCK]; 3],
+    right: [[f64; WIDTH + BLOCK]; 3],
 }
 
 impl Block {
     pub fn new() -> Self {
-        let zeros = [[0.0; GROUP + BLOCK]; 3];
+        let zeros = [[0.0; WIDTH + BLOCK]; 3];
         Block {
             n: zeros,
             left: zeros,
             right: zeros,
-            twice_inverse: [0.0; BLOCK],
         }
     }
 
-    /// Proceeds to the next block after one of `nodes` nodes.
-    fn advance(&mut self, nodes: usize) {
+    /// The entries before a pack.
+    fn begin(&mut self) {
         for array in self.n.iter_mut().chain(&mut self.right) {
-            array[GROUP - 1] = array[GROUP + nodes - 1];
+            array[WIDTH - 1] = 0.0;
+        }
+    }
+
+    /// Proceeds to the next block after a whole one.
+    fn advance(&mut self) {
+        for array in self.n.iter_mut().chain(&mut self.right) {
+            array[WIDTH - 1] = array[WIDTH + BLOCK - 1];
         }
     }
 }
 
-/// Coupling with a neighbour.
-#[derive(Clone, Copy)]
-pub struct Neighbour<'a> {
-    pub positions: &'a Positions,
-    /// Force per displacement and unit of sigma.
-    pub stiffness: [f64; 3],
-}
-
-/// A time step of a rod: a kick by all forces, of length `kick`, velocities
+/// A time step of a pack: a kick by all forces, of length `kick`, velocities
 /// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
 pub struct Step<'a> {
-    pub segments: usize,
-    pub positions: &'a Positions,
-    /// Their positions after the step, except a shared tip, which is set elsewhere.
-    pub next: &'a mut Positions,
-    pub neighbours: [Option<Neighbour<'a>>; 2],
+    pub layout: Layout,
+    /// Which pack.
+    pub pack: usize,
+    /// Of the whole leaf.
+    pub positions: &'a [Array; 3],
+    /// Those of the pack after the step, except a shared tip, which is set elsewhere.
+    pub next: [&'a mut [f64]; 3],
+    /// Force per displacement and unit of sigma of the coupling to the rod before each, and
+    /// after it, if there is any coupling.
+    pub coupling: Option<[[f64; 3]; 2]>,
     pub motion: &'a mut Motion,
     /// Block by block.
     pub material: &'a [Arc<Material>],
@@ -133,7 +129,7 @@ pub struct Step<'a> {
     pub block: &'a mut Block,
 }
 
-/// Sums over a rod in a step.
+/// Sums over a pack in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepTotals {
     /// Twice the kinetic energy in the middle of the kick.
@@ -142,81 +138,69 @@ pub struct StepTotals {
     pub friction: f64,
     /// Derivative of the elastic energy with respect to the factor of the rest curvature.
     pub rest: f64,
-    /// Largest (2 sin(psi/4))^2 of a segment bent by psi, before the step.
-    pub largest_delta: f64,
-    /// Force of the last segment.
+    /// Force of the rods' last segments.
     pub last_force: [f64; 3],
 }
 
-impl Step<'_> {
-    pub fn make(self, arch: Arch) -> StepTotals {
-        match (self.law.damped, self.law.changes) {
-            (true, true) => arch.dispatch(Dispatched::<true, true>(self)),
-            (true, false) => arch.dispatch(Dispatched::<true, false>(self)),
-            (false, true) => arch.dispatch(Dispatched::<false, true>(self)),
-            (false, false) => arch.dispatch(Dispatched::<false, false>(self)),
-        }
-    }
+/// Nodes of the blocks of a pack of `rods`, up to the last node, in whole groups of `width`: the
+/// index of the first and their number.
+fn spans(layout: Layout, rods: usize, width: usize) -> impl Iterator<Item = (usize, usize)> {
+    let end = (rods - 1) * layout.stride + layout.segments + 1;
+    (0..end).step_by(BLOCK).map(move |start| {
+        let nodes = (end - start).next_multiple_of(width);
+        (start, nodes.min(BLOCK))
+    })
 }
 
-/// Nodes of the block that begins at node `start` of a rod, in whole groups.
-fn length(segments: usize, start: usize) -> usize {
-    ((segments + 1).next_multiple_of(GROUP) - start).min(BLOCK)
-}
-
-struct Dispatched<'a, const DAMPED: bool, const CHANGES: bool>(Step<'a>);
-
-impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, DAMPED, CHANGES> {
+impl pulp::WithSimd for Step<'_> {
     type Output = StepTotals;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> StepTotals {
-        let mut step = self.0;
-        let segments = step.segments;
+    fn with_simd<S: Simd>(mut self, simd: S) -> StepTotals {
+        let (layout, rods) = (self.layout, self.layout.rods_of(self.pack));
         let mut totals = StepTotals::default();
         let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
-        for array in step.block.n.iter_mut().chain(&mut step.block.right) {
-            array[GROUP - 1] = 0.0;
-        }
-        let mut start = 0;
-        while start <= segments {
-            let nodes = length(segments, start);
-            let range = (GROUP + start, nodes);
-            let part = Nodes {
-                range,
-                x: &step.positions.x,
-                q: &step.motion.q,
-                material: &step.material[start / BLOCK],
-                law: &step.law,
+        self.block.begin();
+        for (start, count) in spans(layout, rods.len(), S::F64_LANES) {
+            let nodes = Nodes {
+                start,
+                count,
+                first: layout.at(rods.start, start),
+                x: self.positions,
+                q: &self.motion.q,
+                material: &self.material[start / BLOCK],
+                law: &self.law,
             };
-            let (past, block) = (&mut *step.past, &mut *step.block);
-            segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block, &mut sums);
-            // The tip is the last node; no segment follows it.
-            if start + nodes > segments {
-                let tip = GROUP + segments - start;
-                for c in 0..3 {
-                    totals.last_force[c] = block.n[c][tip - 1];
-                    block.n[c][tip] = step.loads.tip_force[c];
-                    block.left[c][tip] = 2.0 * step.loads.tip_moment[c];
+            let (past, block) = (&mut *self.past, &mut *self.block);
+            segments::forces(simd, nodes, past, block, &mut sums);
+            for rod in 0..rods.len() {
+                // No segment follows the last node.
+                let tip = (rod * layout.stride + layout.segments).wrapping_sub(start);
+                if tip < count {
+                    for c in 0..3 {
+                        totals.last_force[c] += block.n[c][WIDTH + tip - 1];
+                        block.n[c][WIDTH + tip] = self.loads.tip_force[c];
+                        block.left[c][WIDTH + tip] = 2.0 * self.loads.tip_moment[c];
+                    }
                 }
             }
-            energy = energy + step.kick_and_drift(simd, range);
-            step.block.advance(nodes);
-            start += nodes;
+            energy = energy + self.kick_and_drift(simd, (start, count));
+            self.block.advance();
         }
         // Velocities were sums of two.
         totals.twice_kinetic = 0.25 * energy.sum();
         totals.friction = sums.friction.sum();
         totals.rest = sums.rest.sum();
-        totals.largest_delta = sums.largest_delta.largest();
         totals
     }
 }
 
-/// Only the forces of a rod's segments, written to `forces`.
+/// Only the forces of a pack's segments, written to `forces`.
 pub struct Forces<'a> {
-    pub segments: usize,
-    pub positions: &'a Positions,
+    pub layout: Layout,
+    /// Which pack.
+    pub pack: usize,
+    pub positions: &'a [Array; 3],
     pub motion: &'a Motion,
     pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
@@ -229,26 +213,25 @@ impl pulp::WithSimd for Forces<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        let (layout, rods) = (self.layout, self.layout.rods_of(self.pack));
         let mut block = Block::new();
         let sums = &mut SegmentSums::zero(simd);
-        let mut start = 0;
-        while start < self.segments {
-            let nodes = length(self.segments, start);
-            let part = Nodes {
-                range: (GROUP + start, nodes),
-                x: &self.positions.x,
+        for (start, count) in spans(layout, rods.len(), S::F64_LANES) {
+            let nodes = Nodes {
+                start,
+                count,
+                first: layout.at(rods.start, start),
+                x: self.positions,
                 q: &self.motion.q,
                 material: &self.material[start / BLOCK],
                 law: &self.law,
             };
-            let (past, block) = (&mut *self.past, &mut block);
-            match self.law.damped {
-                true => segments::forces::<S, true, true>(simd, part, past, block, sums),
-                false => segments::forces::<S, false, true>(simd, part, past, block, sums),
-            }
-            let own = GROUP..GROUP + nodes.min(self.segments - start);
-            (self.forces).extend(own.map(|at| [0, 1, 2].map(|c| block.n[c][at])));
-            start += nodes;
+            segments::forces(simd, nodes, self.past, &mut block, sums);
+            let of_segments = (0..count).filter(|at| {
+                let (rod, i) = ((start + at) / layout.stride, (start + at) % layout.stride);
+                rod < rods.len() && i < layout.segments
+            });
+            (self.forces).extend(of_segments.map(|at| [0, 1, 2].map(|c| block.n[c][WIDTH + at])));
         }
     }
 }

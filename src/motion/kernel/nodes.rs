@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::segments::quaternion;
-use super::{BLOCK, GROUP, Motion, Neighbour, Step};
+use super::{BLOCK, Motion, Step, WIDTH};
 use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
 /// cos and sin(a)/a as series in a^2, for angles of a step (halved). Due to truncation
@@ -15,17 +15,16 @@ const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
 impl Step<'_> {
-    /// Moves the nodes of `range` (index of the first, count) with the forces in
+    /// Moves the nodes of the block `range` (index of the first, count) with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
     /// kick. Every node rotates as a torque-free body with one axis of symmetry:
     /// about its angular momentum, and about its own axis.
     #[inline(always)]
     pub fn kick_and_drift<S: Simd>(&mut self, simd: S, range: (usize, usize)) -> Lanes<S> {
-        // In two loops, as for the forces.
-        let moving = match self.neighbours {
-            [None, None] => self.translate(simd, range, []),
-            [Some(one), None] | [None, Some(one)] => self.translate(simd, range, [one]),
-            [Some(one), Some(two)] => self.translate(simd, range, [one, two]),
+        // In two loops: the processor overlaps iterations of short ones.
+        let moving = match self.coupling {
+            Some(coupling) => self.translate::<S, true>(simd, range, coupling),
+            None => self.translate::<S, false>(simd, range, [[0.0; 3]; 2]),
         };
         let turning = match self.normalise {
             true => self.rotate::<S, true>(simd, range),
@@ -36,28 +35,37 @@ impl Step<'_> {
 
     /// Velocities and positions.
     #[inline(always)]
-    fn translate<S: Simd, const K: usize>(
+    fn translate<S: Simd, const COUPLED: bool>(
         &mut self,
         simd: S,
         range: (usize, usize),
-        neighbours: [Neighbour; K],
+        coupling: [[f64; 3]; 2],
     ) -> Lanes<S> {
-        let nodes = range.1;
+        let (start, nodes) = range;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[(range.0 - GROUP) / BLOCK];
-        let (weight, coupled) = (own(&material.weight), own(&material.coupled));
+        let material = &blocks[start / BLOCK];
+        let weight = own(&material.weight);
+        let coupled = cut(&material.coupled, (0, nodes));
         let (mass, per_mass) = (own(&material.mass), own(&material.per_mass));
-        let n_right = cut(&self.block.n, (GROUP, nodes));
-        let n_left = cut(&self.block.n, (GROUP - 1, nodes));
-        let x = cut(&self.positions.x, range);
-        let mut next = cut_mut(&mut self.next.x, range);
+        let n_right = cut(&self.block.n, (WIDTH, nodes));
+        let n_left = cut(&self.block.n, (WIDTH - 1, nodes));
+        let stride = self.layout.stride;
+        let first = self.layout.at(self.layout.rods_of(self.pack).start, start);
+        let of_rods = |first| cut(self.positions, (first, nodes));
+        let (before, x, after) = (
+            of_rods(first - stride),
+            of_rods(first),
+            of_rods(first + stride),
+        );
+        let [next_x, next_y, next_z] = &mut self.next;
+        let mut next = [
+            slice_mut(next_x, range),
+            slice_mut(next_y, range),
+            slice_mut(next_z, range),
+        ];
         let mut v = cut_mut(&mut self.motion.v, range);
-        let (mut neighbour, mut ties) = ([x; K], [Vectors::splat(simd, [0.0; 3]); K]);
-        for k in 0..K {
-            neighbour[k] = cut(&neighbours[k].positions.x, range);
-            ties[k] = Vectors::splat(simd, neighbours[k].stiffness);
-        }
+        let [to_before, to_after] = coupling.map(|coupling| Vectors::splat(simd, coupling));
         let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
         let (keep, kick) = (Lanes::splat(simd, self.keep), Lanes::splat(simd, self.kick));
         let step = Lanes::splat(simd, self.drift);
@@ -68,17 +76,18 @@ impl Step<'_> {
             let force = Vectors::load(simd, &n_right, at) - Vectors::load(simd, &n_left, at);
             let mut force = gravity.times(weight, force);
             let x = Vectors::load(simd, &x, at);
-            let share = Lanes::load(simd, coupled, at);
-            for k in 0..K {
-                let gap = Vectors::load(simd, &neighbour[k], at) - x;
-                force = (gap * ties[k]).times(share, force);
+            if COUPLED {
+                let pull = (Vectors::load(simd, &before, at) - x) * to_before;
+                force = pull.times(Lanes::load(simd, coupled[0], at), force);
+                let pull = (Vectors::load(simd, &after, at) - x) * to_after;
+                force = pull.times(Lanes::load(simd, coupled[1], at), force);
             }
             let per_mass = Lanes::load(simd, per_mass, at);
-            let before = Vectors::load(simd, &v, at);
-            let after = force.times(kick * per_mass, before.scale(keep));
-            after.store(&mut v, at);
-            after.times(step, x).store(&mut next, at);
-            let twice = before + after;
+            let old = Vectors::load(simd, &v, at);
+            let new = force.times(kick * per_mass, old.scale(keep));
+            new.store(&mut v, at);
+            new.times(step, x).store(&mut next, at);
+            let twice = old + new;
             energy = (twice.dot(twice)).times(Lanes::load(simd, mass, at), energy);
             at += S::F64_LANES;
         }
@@ -92,13 +101,13 @@ impl Step<'_> {
         simd: S,
         range: (usize, usize),
     ) -> Lanes<S> {
-        let nodes = range.1;
+        let (start, nodes) = range;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[(range.0 - GROUP) / BLOCK];
+        let material = &blocks[start / BLOCK];
         let (per_inertia, per_spin) = (own(&material.per_inertia), own(&material.per_spin));
-        let left = cut(&self.block.left, (GROUP, nodes));
-        let right = cut(&self.block.right, (GROUP - 1, nodes));
+        let left = cut(&self.block.left, (WIDTH, nodes));
+        let right = cut(&self.block.right, (WIDTH - 1, nodes));
         let Motion { q, p, .. } = &mut *self.motion;
         let [i, j, k, l] = q;
         let q = [

@@ -20,10 +20,14 @@
 //! vectors along w to themselves, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
 //! written as 1 + B delta. B is a polynomial in delta ([`B`]): a segment costs one
 //! division and no root.
+//!
+//! What is the same along all directors needs none of them: H and A are split into their
+//! values along d2 and the excess along d1 and d3. For round sections that are straight at
+//! rest d1 alone is left, which saves a quarter of the operations.
 
-use super::{Array, Block, GROUP, Law, Material, Past};
+use super::{Array, Block, Law, Material, Past, WIDTH};
 use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice};
-use crate::rotation::{B, directors};
+use crate::rotation::{B, Quaternions};
 use pulp::Simd;
 use std::ops::Deref;
 
@@ -45,11 +49,17 @@ fn rate<S: Simd>(
     before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
 }
 
+/// The nodes of a block.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
-    /// Index of the first, count.
-    pub range: (usize, usize),
+    /// Index of the first in the arrays of the pack, and their number.
+    pub start: usize,
+    pub count: usize,
+    /// Index of the first in the arrays of the leaf.
+    pub first: usize,
+    /// Of the leaf.
     pub x: &'a [Array; 3],
+    /// Of the pack.
     pub q: &'a [Array; 4],
     pub material: &'a Material,
     pub law: &'a Law,
@@ -58,11 +68,10 @@ pub struct Nodes<'a> {
 /// Sums of the loops over segments: see [`super::StepTotals`].
 #[derive(Clone, Copy)]
 pub struct SegmentSums<S: Simd> {
-    /// If `DAMPED`.
+    /// With internal friction.
     pub friction: Lanes<S>,
-    /// If `CHANGES`.
+    /// If rest curvatures vary.
     pub rest: Lanes<S>,
-    pub largest_delta: Lanes<S>,
 }
 
 impl<S: Simd> SegmentSums<S> {
@@ -72,157 +81,195 @@ impl<S: Simd> SegmentSums<S> {
         SegmentSums {
             friction: zero,
             rest: zero,
-            largest_delta: zero,
         }
     }
 }
 
 /// Forces and moments of the segments after `nodes`, written to `block`.
 #[inline(always)]
-pub fn forces<S: Simd, const DAMPED: bool, const CHANGES: bool>(
+pub fn forces<S: Simd>(
     simd: S,
     nodes: Nodes,
     past: &mut Past,
     block: &mut Block,
     sums: &mut SegmentSums<S>,
 ) {
-    let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
-    // In two loops: the processor overlaps iterations of short ones.
-    bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block, sums);
-    stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block, sums);
+    let (law, round) = (nodes.law, nodes.material.round);
+    match (law.damped, law.changes) {
+        (false, false) if round => loops::<S, true, false, false>(simd, nodes, past, block, sums),
+        (false, false) => loops::<S, false, false, false>(simd, nodes, past, block, sums),
+        (false, true) => loops::<S, false, false, true>(simd, nodes, past, block, sums),
+        (true, _) => loops::<S, false, true, true>(simd, nodes, past, block, sums),
+    }
 }
 
-/// Bending: M, R tau and 2/|s|^2, for [`stretch`].
+/// Smallest |s|^2: between two rods, whose segment has no stiffness, it could be zero.
+const LEAST: f64 = 1e-8;
+
+/// Up to this delta, of a segment bent by 0.2, so many terms of B are accurate to rounding.
+const SHORT: f64 = 0.01;
+const TERMS: usize = 5;
+
+/// B(delta).
 #[inline(always)]
-fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
+fn series<S: Simd>(delta: Lanes<S>) -> Lanes<S> {
+    let [a, b, c, d, e, ..] = B;
+    let short: [f64; TERMS] = [a, b, c, d, e];
+    match delta.largest() < SHORT {
+        true => delta.polynomial(&short),
+        false => delta.polynomial(&B),
+    }
+}
+
+/// The directors of the quaternion `s` of any length, `twice` being 2/|s|^2: with additions in
+/// place of some multiplications, of which there are more here.
+#[inline(always)]
+fn directors<S: Simd>((s, sw): Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 3] {
+    let one = Lanes::splat(twice.simd, 1.0);
+    let r = s.scale(twice);
+    let (xx, yy, zz) = (s.x * r.x, s.y * r.y, s.z * r.z);
+    let (xy, xz, yz) = (s.x * r.y, s.x * r.z, s.y * r.z);
+    let (wx, wy, wz) = (sw * r.x, sw * r.y, sw * r.z);
+    [
+        Vectors::new(one - (yy + zz), xy + wz, xz - wy),
+        Vectors::new(xy - wz, one - (xx + zz), yz + wx),
+        Vectors::new(xz + wy, yz - wx, one - (xx + yy)),
+    ]
+}
+
+#[inline(always)]
+fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
     nodes: Nodes,
-    (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
+    past: &mut Past,
     block: &mut Block,
     sums: &mut SegmentSums<S>,
 ) {
-    let ((start, count), q) = (nodes.range, nodes.q);
-    let (material, law) = (nodes.material, nodes.law);
-    // All arrays have one length: an index valid for one is valid for the others.
-    let (range, own) = ((start, count), (GROUP, count));
-    let (q0, q1) = (cut(q, range), cut(q, (start + 1, count)));
-    let stiffness = cut(&material.bend, (0, count));
-    let rest_turn = cut(&material.rest_turn, (0, count));
+    let Nodes {
+        start,
+        count,
+        material,
+        law,
+        ..
+    } = nodes;
+    let (x0, x1) = (
+        cut(nodes.x, (nodes.first, count)),
+        cut(nodes.x, (nodes.first + 1, count)),
+    );
+    let (q0, q1) = (
+        cut(nodes.q, (start, count)),
+        cut(nodes.q, (start + 1, count)),
+    );
+    let own = |array| slice(array, (0, count));
+    let (shear, bend) = (own(&material.shear), own(&material.bend));
+    let stretch_excess = cut(&material.stretch_excess, (0, count));
+    let bend_excess = cut(&material.bend_excess, (0, count));
+    let rest_force = own(&material.rest_force);
     let rest_moment = cut(&material.rest_moment, (0, count));
-    let mut moment = cut_mut(&mut block.left, own);
-    let mut tangent = cut_mut(&mut block.right, own);
-    let twice_inverse = &mut block.twice_inverse[..count];
-    let mut past = DAMPED.then(|| (cut_mut(past_one, range), cut_mut(past_two, range)));
+    let rest_turn = cut(&material.rest_turn, (0, count));
+    let mut force = cut_mut(&mut block.n, (WIDTH, count));
+    let mut left = cut_mut(&mut block.left, (WIDTH, count));
+    let mut right = cut_mut(&mut block.right, (WIDTH, count));
+    let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
+    let mut past = DAMPED.then(|| {
+        let range = (start, count);
+        (
+            (cut_mut(one_v, range), cut_mut(two_v, range)),
+            (cut_mut(one_psi, range), cut_mut(two_psi, range)),
+        )
+    });
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
     let (two, four) = (Lanes::splat(simd, 2.0), Lanes::splat(simd, 4.0));
-    let SegmentSums {
-        friction: mut power,
-        rest: mut lost,
-        mut largest_delta,
-    } = *sums;
+    let (quarter, least) = (Lanes::splat(simd, 0.25), Lanes::splat(simd, LEAST));
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
         let (b, bw) = quaternion(simd, &q1, at);
         let (d, dw) = (b - a, bw - aw);
         let delta = d.x.times(d.x, d.y * d.y) + d.z.times(d.z, dw * dw);
-        largest_delta = largest_delta.max(delta);
-        let inverse = (four - delta).recip();
+        let inverse = (four - delta).max(least).recip();
         let twice = inverse + inverse;
         let (even, odd) = (a.times_from(bw, b.scale(aw)), a.cross(b));
-        let w = even - odd;
-        (even + odd).scale(twice).store(&mut tangent, at);
-        let stiffness = Vectors::load(simd, &stiffness, at);
-        // The moment A (2 sigma w - u0) and its component along w, as far as possible
-        // before sigma is known: the series has a long latency.
-        let slope = w * stiffness;
-        let mut at_rest = Vectors::load(simd, &rest_moment, at);
-        if CHANGES {
-            at_rest = at_rest.scale(rest);
-        }
-        let (slope_along, rest_along) = (w.dot(slope), w.dot(at_rest));
-        let series = delta.polynomial(&B);
+        // Along the directors in the middle, and along the lab axes.
+        let (w, w_lab) = (even - odd, even + odd);
+        let series = series(delta);
         let two_sigma = series.times(delta + delta, two);
-        let mut m = slope.scale(two_sigma) - at_rest;
-        let mut along = slope_along * two_sigma - rest_along;
+        // The moment A (2 sigma w - u0) = A2 2 sigma w + extra.
+        let bend = Lanes::load(simd, bend, at);
+        let load = |arrays: &[&[f64]; 3]| Vectors::load(simd, arrays, at);
+        let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, bend_excess[c], at));
+        let stiff = bend * two_sigma;
+        let mut extra = -load(&rest_moment);
         if CHANGES {
-            lost = lost + Vectors::load(simd, &rest_turn, at).dot(m);
+            extra = extra.scale(rest);
         }
-        if let Some((one, two)) = &mut past {
+        extra.x = (excess_1 * two_sigma).times(w.x, extra.x);
+        if !ROUND {
+            extra.z = (excess_3 * two_sigma).times(w.z, extra.z);
+        }
+        if CHANGES {
+            sums.rest = sums.rest + load(&rest_turn).dot(w.times(stiff, extra));
+        }
+        if let Some((_, (one, two))) = &mut past {
             let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
-            let friction = rate * stiffness;
-            power = power + rate.dot(friction);
-            let friction = friction.scale(retardation);
-            m = m + friction;
-            along = along + w.dot(friction);
+            let friction = Vectors::new(
+                rate.x * (bend + excess_1),
+                rate.y * bend,
+                rate.z * (bend + excess_3),
+            );
+            sums.friction = sums.friction + rate.dot(friction);
+            extra = friction.times(retardation, extra);
         }
-        let c = series * (four * twice) * along;
-        (w.times_from(c, m.scale(two_sigma))).store(&mut moment, at);
-        twice.store(twice_inverse, at);
-        at += S::F64_LANES;
-    }
-    *sums = SegmentSums {
-        friction: power,
-        rest: lost,
-        largest_delta,
-    };
-}
+        let along_extra = match ROUND {
+            true => extra.x * w.x,
+            false => extra.dot(w),
+        };
+        // |w|^2 = sin^2(psi/2).
+        let squared = (delta * delta).times_from(quarter, delta);
+        let along = stiff.times(squared, along_extra);
+        let four_inverse = twice + twice;
+        let c = series * (four_inverse + four_inverse) * along;
+        let mut m = w_lab.scale(two_sigma * stiff - c);
 
-/// Stretch and shear, and the forces and moments on the ends.
-#[inline(always)]
-fn stretch<S: Simd, const DAMPED: bool>(
-    simd: S,
-    nodes: Nodes,
-    (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
-    block: &mut Block,
-    sums: &mut SegmentSums<S>,
-) {
-    let ((start, count), x, q) = (nodes.range, nodes.x, nodes.q);
-    let (material, law) = (nodes.material, nodes.law);
-    let (range, after, own) = ((start, count), (start + 1, count), (GROUP, count));
-    let (x0, x1) = (cut(x, range), cut(x, after));
-    let (q0, q1) = (cut(q, range), cut(q, after));
-    let stiffness = cut(&material.stretch, (0, count));
-    let rest_length = slice(&material.rest_length, (0, count));
-    let mut force = cut_mut(&mut block.n, own);
-    let mut left = cut_mut(&mut block.left, own);
-    let mut right = cut_mut(&mut block.right, own);
-    let twice_inverse = &block.twice_inverse[..count];
-    let mut past = DAMPED.then(|| (cut_mut(past_one, range), cut_mut(past_two, range)));
-    let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
-    let retardation = Lanes::splat(simd, law.retardation);
-    let mut power = sums.friction;
-    let mut at = 0;
-    while at + S::F64_LANES <= count {
-        let (a, aw) = quaternion(simd, &q0, at);
-        let (b, bw) = quaternion(simd, &q1, at);
-        // Midpoint frame: the rotation matrix of s, not normalised.
-        let (s, sw) = (a + b, aw + bw);
-        let directors = directors((s, sw), Lanes::load(simd, twice_inverse, at));
+        // Along the lab axes: R (v x n) = dx x N.
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
-        let length = Lanes::load(simd, rest_length, at);
-        let v = dx.onto(directors);
-        let mut strain = Vectors::new(v.x - length, v.y, v.z);
-        let stiffness = Vectors::load(simd, &stiffness, at);
-        if let Some((one, two)) = &mut past {
-            let rate = rate((one, two), (v, at), rates, law.remember);
-            strain = rate.times(retardation, strain);
-            power = power + rate.dot(rate * stiffness);
-        }
-        let n = strain * stiffness;
-        // Along the lab axes from here on: R (v x n) = dx x N.
-        let n = n.along(directors);
+        let shear = Lanes::load(simd, shear, at);
+        let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, stretch_excess[c], at));
+        let rest_force = Lanes::load(simd, rest_force, at);
+        let directors = directors((a + b, aw + bw), twice);
+        let n = if ROUND {
+            let [d1, ..] = directors;
+            m = d1.times(two_sigma * extra.x, m);
+            d1.times(excess_1 * d1.dot(dx) - rest_force, dx.scale(shear))
+        } else {
+            m = m + extra.scale(two_sigma).along(directors);
+            let v = dx.onto(directors);
+            let mut extra = Vectors::new(
+                excess_1 * v.x - rest_force,
+                Lanes::splat(simd, 0.0),
+                excess_3 * v.z,
+            );
+            if let Some(((one, two), _)) = &mut past {
+                let rate = rate((one, two), (v, at), rates, law.remember);
+                let friction = Vectors::new(
+                    rate.x * (shear + excess_1),
+                    rate.y * shear,
+                    rate.z * (shear + excess_3),
+                );
+                sums.friction = sums.friction + rate.dot(friction);
+                extra = friction.times(retardation, extra);
+            }
+            extra.along(directors) + dx.scale(shear)
+        };
         n.store(&mut force, at);
         let g = dx.cross(n);
-        let m = Vectors::load(simd, &left, at).along(directors);
-        let t = m.less_cross(Vectors::load(simd, &right, at), g);
+        let t = m.less_cross(w_lab.scale(twice), g);
         (g + t).store(&mut left, at);
         (g - t).store(&mut right, at);
         at += S::F64_LANES;
     }
-    sums.friction = power;
 }
 
 /// Vector and scalar parts of unit quaternions.
