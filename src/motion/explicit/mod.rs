@@ -266,11 +266,13 @@ impl Explicit {
             let after = keep * before.0 + force * (kick / mass);
             energy += mass * (0.5 * (before.0 + after)).length_squared();
             let tip = vector(&self.next, self.layout.at(0, last)) + drift * after;
-            for j in 0..self.layout.rods {
-                let (p, at) = self.layout.place(j, last);
-                for c in 0..3 {
-                    self.packs[p].motion.v[c][at] = after[c];
-                    self.positions[c][self.layout.at(j, last)] = tip[c];
+            for (p, pack) in self.packs.iter_mut().enumerate() {
+                for (k, j) in self.layout.rods_of(p).enumerate() {
+                    let at = [k * self.layout.stride + last, self.layout.at(j, last)];
+                    for c in 0..3 {
+                        pack.motion.v[c][at[0]] = after[c];
+                        self.positions[c][at[1]] = tip[c];
+                    }
                 }
             }
         }

@@ -124,8 +124,8 @@ fn like_blocks_are_shared() {
     };
     // The clamped end, the middle and the tip.
     assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 5));
-    // Two rods at a time: the first and the last have one neighbour.
-    assert_eq!(distinct("rods = 9, length = 1.0", 50), (3, 5));
+    // Four rods at a time: the first and the last have one neighbour.
+    assert_eq!(distinct("rods = 13, length = 1.0", 50), (3, 4));
     assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (3, 3));
 }
 
