@@ -16,7 +16,7 @@ const OTHERWISE: &str = "the semi-implicit method";
 
 /// Steps between checks of the bending, which are free, and of the energy.
 const BENDING_CHECKED: usize = 200;
-const ENERGY_CHECKED: usize = 1000;
+const ENERGY_CHECKED: usize = 2000;
 
 impl Explicit {
     /// Forces of all segments at the present positions, rod by rod. Strains
