@@ -45,7 +45,7 @@ const NORMALISED: usize = 8;
 
 /// Number of segments from which rods are distributed to threads. Measured: below
 /// it waking the threads costs more than it saves.
-const PARALLEL_SEGMENTS: usize = 1000;
+const PARALLEL_SEGMENTS: usize = 3000;
 
 /// Number of rods that are not divided further: about two portions for every thread.
 fn share(rods: usize) -> usize {
