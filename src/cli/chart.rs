@@ -11,8 +11,6 @@ use crate::report::words::contender;
 use crate::scenario::Scenario;
 use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
-use crate::report;
-
 use super::progress::fraction_of;
 use super::relax::possible_value;
 use super::request::{Delivered, Job, Request, VerbTraits};
@@ -109,17 +107,9 @@ impl Chart {
         let scaling = chart.scaling.iter();
         let mut confirmed = scaling.map(|scaling| scaling.unconfirmed.is_empty());
         let success = chart.confirmed() && confirmed.all(|confirmed| confirmed);
-        let mut files = Vec::new();
-        let written = job.write(&chart).and_then(|written| {
-            files.extend(written);
-            if let Some(scaling) = &chart.scaling {
-                files.extend(job.write(scaling)?);
-            }
-            Ok(None)
-        });
-        job.deliver_written(&chart, success, written, |_| {
-            report::chart_report(&chart, files)
-        })
+        let scaling = chart.scaling.iter().map(|scaling| job.write(scaling));
+        let written = [job.write(&chart)].into_iter().chain(scaling);
+        job.deliver_written(&chart, success, &chart, written)
     }
 
     /// The leaves of `--rods`.

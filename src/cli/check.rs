@@ -4,8 +4,6 @@ use clap::Args;
 
 use crate::study::{self, Check as Checked, CheckOptions, Verdict};
 
-use crate::report;
-
 use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
@@ -50,6 +48,6 @@ impl Check {
             job.remark(Some(reason));
         }
         let success = matches!(check.verdict, Verdict::Agree);
-        job.deliver(&check, success, |files| report::check_report(&check, files))
+        job.deliver(&check, success)
     }
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 
 use crate::limit::Limit;
-use crate::report;
 use crate::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
 
 use super::progress::fraction_of;
@@ -91,9 +90,7 @@ impl Fit {
         })?;
         drop(line);
         job.remark(fit.remarks.first());
-        job.deliver(&fit, fit.is_success(), |files| {
-            report::fit_report(&fit, files)
-        })
+        job.deliver(&fit, fit.is_success())
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::files::{self, Document, Selection, Written};
 use crate::report::table::list_files;
-use crate::report::{Refused, json};
+use crate::report::{Refused, Reported, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
 
@@ -29,6 +29,9 @@ pub struct Job<'r> {
     /// Whether several run in parallel.
     pub(super) parallel: bool,
 }
+
+/// The lines that list files, or why these could not be written.
+pub type Listed = Result<Vec<String>, Refusal>;
 
 /// The delivered result of a scenario.
 pub struct Delivered {
@@ -77,40 +80,38 @@ impl Job<'_> {
     }
 
     /// Writes the files of a result; returns the line that lists them, if there are any.
-    pub fn write<R: Written>(&self, result: &R) -> Result<Option<String>, Refusal> {
+    pub fn write<R: Written>(&self, result: &R) -> Listed {
         let files = files::write_all(&self.folder, &self.document(result), &self.selection.kinds)?;
         Ok(self.list_files(&files))
     }
 
     /// The line that lists files, if there are any.
-    pub fn list_files(&self, files: &[PathBuf]) -> Option<String> {
-        (!files.is_empty()).then(|| list_files(&self.folder, files))
+    pub fn list_files(&self, files: &[PathBuf]) -> Vec<String> {
+        let list = (!files.is_empty()).then(|| list_files(&self.folder, files));
+        list.into_iter().collect()
     }
 
-    /// Writes the files of a result and returns its output: JSON, or the report, which is
-    /// given the list of the files.
-    pub fn deliver<R: Written>(
+    /// Writes the files of a result and returns its output: JSON, or the report.
+    pub fn deliver<R: Written + Reported>(
         &self,
         result: &R,
         success: bool,
-        report: impl FnOnce(Option<String>) -> String,
     ) -> Result<Delivered, Refusal> {
-        self.deliver_written(result, success, self.write(result), report)
+        self.deliver_written(result, success, result, [self.write(result)])
     }
 
-    /// The same for files that were written before, or could not be: the result is output
-    /// in either case.
+    /// The same for files that are written as they are listed, up to one that cannot be:
+    /// the result is output in either case.
     pub fn deliver_written<R: Written>(
         &self,
         result: &R,
         success: bool,
-        written: Result<Option<String>, Refusal>,
-        report: impl FnOnce(Option<String>) -> String,
+        report: &impl Reported,
+        written: impl IntoIterator<Item = Listed>,
     ) -> Result<Delivered, Refusal> {
-        let (files, error) = match written {
-            Ok(files) => (files, None),
-            Err(error) => (None, Some(error.to_string())),
-        };
+        let (mut files, mut written) = (Vec::new(), written.into_iter());
+        let error = written.try_for_each(|list| list.map(|list| files.extend(list)));
+        let error = error.err().map(|error| error.to_string());
         let mut json = Vec::new();
         if self.json || !self.single {
             let mut document = self.document(result);
@@ -119,7 +120,7 @@ impl Job<'_> {
         }
         let report = match self.json {
             true => String::new(),
-            false => report(files),
+            false => report.report(files),
         };
         Ok(Delivered {
             status: Status::of(success),

@@ -8,14 +8,11 @@ use std::time::Instant;
 
 use clap::{Args, ValueHint};
 
-use crate::files;
-use crate::files::{Journal, Kind};
-use crate::report::FileError;
+use crate::files::{self, Journal, Kind};
+use crate::report::{self, FileError};
 use crate::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };
-
-use crate::report;
 
 use super::progress::{fraction_of, time_left};
 use super::request::{Delivered, Job, Request, VerbTraits};
@@ -131,21 +128,21 @@ impl Map {
             });
         }
         let work = report::MapWork {
+            map: &map,
             known: counts[0],
             computed: counts[1],
             seconds: clock.elapsed().as_secs_f64(),
         };
-        let report = |files| report::map_report(&map, work, files);
-        let Some(shard) = self.shard else {
-            return job.deliver(&map, true, report);
+        let written = match self.shard {
+            None => job.write(&map),
+            Some(shard) if keeps_rows => {
+                let name = shard.file_name();
+                files::write_rows(folder, &name, &map.request, &map.rows)?;
+                Ok(vec![folder.join(name).display().to_string()])
+            }
+            Some(_) => Ok(Vec::new()),
         };
-        let mut written = None;
-        if keeps_rows {
-            let name = shard.file_name();
-            files::write_rows(folder, &name, &map.request, &map.rows)?;
-            written = Some(folder.join(name).display().to_string());
-        }
-        job.deliver_written(&map, true, Ok(written), report)
+        job.deliver_written(&map, true, &work, [written])
     }
 
     /// The rows that need not be computed: those of the shard or, for a whole map, all

@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
-use crate::report::{self, numbers::brief};
+use crate::report::numbers::brief;
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
 use super::progress::{ProgressLine, fraction_of};
@@ -120,9 +120,7 @@ impl Relax {
         let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
         let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;
         let success = equilibrium.outcome.is_success() && !unwanted;
-        job.deliver(&equilibrium, success, |files| {
-            report::relax_report(&equilibrium, files)
-        })
+        job.deliver(&equilibrium, success)
     }
 
     /// The method with its options; refused if they do not fit the method.
@@ -206,7 +204,6 @@ impl Relax {
             let leaf = found.equilibrium.clone();
             found.equilibrium = leaf.at_stations(&job.scenario, job.selection.stations);
         }
-        let success = !all.found.is_empty();
-        job.deliver(&all, success, |files| report::all_report(&all, files))
+        job.deliver(&all, !all.found.is_empty())
     }
 }

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
 use crate::memory;
-use crate::report::{self, FileError, numbers::brief};
+use crate::report::{FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
 use super::progress::{self, ProgressLine, fraction_between};
@@ -104,17 +104,13 @@ impl Simulate {
         let record = recording.record(simulation, stopped)?;
         job.remark(record.remark());
         let written = recording.finish(&job.document(&record));
-        let written = match written {
-            Ok(files) => Ok(job.list_files(&files)),
-            Err(error) => {
-                // The motion so far need not be lost.
-                write_checkpoint(recording);
-                Err(error.into())
-            }
-        };
-        job.deliver_written(&record, stopped.is_none(), written, |files| {
-            report::simulate_report(&record, files)
-        })
+        if written.is_err() {
+            // The motion so far need not be lost.
+            write_checkpoint(recording);
+        }
+        let written = written.map(|files| job.list_files(&files));
+        let written = [written.map_err(Refusal::from)];
+        job.deliver_written(&record, stopped.is_none(), &record, written)
     }
 }
 

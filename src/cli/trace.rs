@@ -7,7 +7,7 @@ use crate::study::{
     TraceShow, Vary,
 };
 
-use crate::report::{self, numbers::brief};
+use crate::report::numbers::brief;
 
 use super::progress::fraction_between;
 use super::request::{Delivered, Job, Request, VerbTraits};
@@ -126,9 +126,7 @@ impl Trace {
         .map_err(name_option)?;
         drop(line);
         job.remark(boundary.remark.as_ref());
-        job.deliver(&boundary, boundary.complete, |files| {
-            report::boundary_report(&boundary, files)
-        })
+        job.deliver(&boundary, boundary.complete)
     }
 
     fn one(&self, job: &Job, vary: &Vary) -> Result<Delivered, Refusal> {
@@ -159,9 +157,7 @@ impl Trace {
         drop(line);
         trace.show.clone_from(&self.show);
         job.remark(trace.remark.as_ref());
-        job.deliver(&trace, trace.complete, |files| {
-            report::trace_report(&trace, files)
-        })
+        job.deliver(&trace, trace.complete)
     }
 }
 

@@ -3,42 +3,42 @@
 use crate::report::numbers::power_of_ten;
 use crate::study::{All, Found};
 
+use super::Reported;
 use super::numbers::{seconds, veins};
-use super::table::{Lines, lay_out};
+use super::table::{Lines, labelled};
 use super::words::stable_or_index;
 
-/// The equilibria, lowest energy first.
-pub fn report(all: &All, files: Option<String>) -> String {
-    let leaf = all.found.first();
-    let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
-    let heading = format!("{}: {veins}, all shapes", all.scenario);
-    lay_out(&heading, &lines(all, files))
-}
-
-/// The lines of the report.
-pub fn lines(all: &All, files: Option<String>) -> Lines {
-    let mut lines = Lines::new();
-    for (number, found) in all.found.iter().enumerate() {
-        let name = if number == 0 { "found" } else { "" };
-        lines.push((name, line(number, found)));
+impl Reported for All {
+    fn heading(&self) -> String {
+        let leaf = self.found.first();
+        let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+        format!("{}: {veins}, all shapes", self.scenario)
     }
-    let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
-    let stable = all.found.iter().filter(stable).count();
-    let others = all.found.len() - stable;
-    let failed = match all.failed {
-        0 => String::new(),
-        failed => format!(", {failed} of them without coming to rest"),
-    };
-    let (starts, time) = (all.starts, seconds(all.wall_seconds));
-    let work = format!(
-        "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
-    );
-    lines.push(("work", work));
-    lines.extend(files.map(|files| ("written", files)));
-    lines.extend(all.remark.clone().map(|remark| ("remark", remark)));
-    let more = "there may be more: no number of starts proves that these are all";
-    lines.push(("remark", more.into()));
-    lines
+
+    /// The equilibria, lowest energy first.
+    fn lines(&self) -> Lines {
+        let found = self.found.iter().enumerate();
+        let mut lines = labelled("found", found.map(|(number, found)| line(number, found)));
+        let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
+        let stable = self.found.iter().filter(stable).count();
+        let others = self.found.len() - stable;
+        let failed = match self.failed {
+            0 => String::new(),
+            failed => format!(", {failed} of them without coming to rest"),
+        };
+        let (starts, time) = (self.starts, seconds(self.wall_seconds));
+        let work = format!(
+            "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
+        );
+        lines.push(("work", work));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        let more = "there may be more: no number of starts proves that these are all";
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("remark", Some(more.into()))].concat()
+    }
 }
 
 fn line(number: usize, found: &Found) -> String {

@@ -4,37 +4,38 @@ use std::io::{self, Write};
 
 use crate::study::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint};
 
+use super::Reported;
 use super::numbers::{brief, power_of_ten, seconds, veins_of};
-use super::table::{Lines, csv_without_header, labelled, lay_out};
+use super::table::{Lines, csv_without_header, labelled};
 
-/// The curves, their ends and their special points.
-pub fn report(boundary: &Boundary, files: Option<String>) -> String {
-    let veins = veins_of(boundary.rods, boundary.joined);
-    let heading = format!("{}: {veins}, the boundary", boundary.scenario);
-    lay_out(&heading, &lines(boundary, files))
-}
+impl Reported for Boundary {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, the boundary", self.scenario)
+    }
 
-/// The lines of the report.
-pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
-    let vary = (0..2).map(|i| {
-        let (keys, [from, to]) = (&boundary.keys[i], boundary.ranges[i]);
-        format!("{keys} from {} to {}", keys.text(from), keys.text(to))
-    });
-    let mut lines = labelled("vary", vary.collect());
-    let second = &boundary.keys[1];
-    let start = format!("at {second} = {}", second.text(boundary.start));
-    lines.push(("begun", start));
-    let curves = boundary.curves.iter().enumerate();
-    let curves = curves.flat_map(|(number, curve)| curve_lines(boundary, number, curve));
-    lines.extend(labelled("curve", curves.collect()));
-    let points = boundary.curves.iter().flat_map(|curve| &curve.points);
-    let worst = points.map(|point| point.error).reduce(f64::max);
-    lines.extend(worst.map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))));
-    lines.extend((boundary.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
-    lines.push(("work", format!("{} in all", seconds(boundary.wall_seconds))));
-    lines.extend(files.map(|files| ("written", files)));
-    lines.extend((boundary.remark.iter()).map(|remark| ("remark", remark.clone())));
-    lines
+    fn lines(&self) -> Lines {
+        let vary = self.keys.iter().zip(self.ranges).map(|(keys, [from, to])| {
+            format!("{keys} from {} to {}", keys.text(from), keys.text(to))
+        });
+        let mut lines = labelled("vary", vary);
+        let second = &self.keys[1];
+        let start = format!("at {second} = {}", second.text(self.start));
+        lines.push(("begun", start));
+        let curves = self.curves.iter().enumerate();
+        let curves = curves.flat_map(|(number, curve)| curve_lines(self, number, curve));
+        lines.extend(labelled("curve", curves));
+        let points = self.curves.iter().flat_map(|curve| &curve.points);
+        let worst = points.map(|point| point.error).reduce(f64::max);
+        lines.extend(worst.map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))));
+        lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
+        lines.push(("work", format!("{} in all", seconds(self.wall_seconds))));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        labelled("remark", self.remark.clone())
+    }
 }
 
 /// The kind of a curve, its ends and its special points.

@@ -6,8 +6,9 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::Reported;
 use super::numbers::{power_of_ten, seconds, veins_of};
-use super::table::{labelled, lay_out};
+use super::table::{Lines, labelled};
 use super::words::contender;
 use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
@@ -31,24 +32,23 @@ const COLUMNS: [&str; 15] = [
     "pareto",
 ];
 
-/// The reference for errors, the Pareto front, the fastest method for every accuracy,
-/// and peers.
-pub fn report(chart: &Chart, files: Vec<String>) -> String {
-    let mut lines = labelled("errors", reference(chart.reference.as_ref()));
-    lines.push(("measured", measured(chart)));
-    lines.extend(labelled("front", front(chart)));
-    lines.extend(labelled("fastest", fastest(chart)));
-    lines.extend(labelled("failed", failed(chart)));
-    lines.extend(labelled("peers", peers(chart)));
-    if let Some(scaling) = &chart.scaling {
-        lines.extend(labelled("veins", veins(scaling)));
+impl Reported for Chart {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, speed against accuracy", self.scenario)
     }
-    let remarks = chart.remarks.iter();
-    lines.extend(remarks.map(|remark| ("remark", remark.clone())));
-    lines.extend(labelled("written", files));
-    let veins = veins_of(chart.rods, chart.joined);
-    let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
-    lay_out(&heading, &lines)
+
+    fn lines(&self) -> Lines {
+        let mut lines = labelled("errors", reference(self.reference.as_ref()));
+        lines.push(("measured", measured(self)));
+        lines.extend(labelled("front", front(self)));
+        lines.extend(labelled("fastest", fastest(self)));
+        lines.extend(labelled("failed", failed(self)));
+        lines.extend(labelled("peers", peers(self)));
+        lines.extend((self.scaling.iter()).flat_map(|it| labelled("veins", veins(it))));
+        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.clone())));
+        lines
+    }
 }
 
 fn reference(reference: Option<&Reference>) -> Vec<String> {
@@ -281,12 +281,12 @@ mod tests {
         for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        let text = report(&chart, Vec::new());
+        let text = chart.report(Vec::new());
         assert!(text.contains("that is NOT CONFIRMED"), "{text}");
         let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
         assert!(text.contains(failed), "{text}");
         chart.reference = None;
-        let text = report(&chart, Vec::new());
+        let text = chart.report(Vec::new());
         assert!(
             text.contains("  errors   not known: no equilibrium was found"),
             "{text}"

@@ -5,32 +5,33 @@ use glam::DVec3;
 use crate::bvp::Solution;
 use crate::study::{Check, Place, Quantity, Verdict};
 
+use super::Reported;
 use super::numbers::{
     bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, significant, veins,
 };
 use super::relax::found;
-use super::table::{Lines, labelled, lay_out};
+use super::table::{Lines, labelled};
 use super::words::{equilibrium_of_index, headline, shooting};
 
-/// The verdict, the results of both methods, and their differences.
-pub fn report(check: &Check, files: Option<String>) -> String {
-    let relaxed = &check.relaxed;
-    let mut lines = vec![("verdict", judgement(check))];
-    lines.extend(results(check));
-    lines.extend(labelled("differ", differences(check)));
-    lines.extend(labelled("error", errors(check)));
-    if let Some(solution) = check.solution() {
-        lines.extend(shooting_details(solution));
+impl Reported for Check {
+    fn heading(&self) -> String {
+        let (name, veins) = (&self.relaxed.scenario, veins(&self.relaxed));
+        format!("{name}: {veins}, relaxed and by shooting")
     }
-    // Otherwise the verdict explains why the leaf is not at rest.
-    if let (Some(remark), true) = (&relaxed.remark, check.shot.is_some()) {
-        lines.push(("remark", remark.clone()));
+
+    fn lines(&self) -> Lines {
+        let mut lines = vec![("verdict", judgement(self))];
+        lines.extend(results(self));
+        lines.extend(labelled("differ", differences(self)));
+        lines.extend(labelled("error", errors(self)));
+        lines.extend(self.solution().into_iter().flat_map(shooting_details));
+        // Otherwise the verdict explains why the leaf is not at rest.
+        if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
+            lines.push(("remark", remark.clone()));
+        }
+        lines.extend(labelled("doubtful", self.relaxed.doubts.clone()));
+        lines
     }
-    lines.extend(labelled("doubtful", relaxed.doubts.clone()));
-    lines.extend(files.map(|files| ("written", files)));
-    let veins = veins(relaxed);
-    let heading = format!("{}: {veins}, relaxed and by shooting", relaxed.scenario);
-    lay_out(&heading, &lines)
 }
 
 fn judgement(check: &Check) -> String {
@@ -142,7 +143,7 @@ mod tests {
 
     #[test]
     fn another_equilibrium_is_called_unstable() {
-        let report = report(&sample::check(1, 8, 0.1), None);
+        let report = sample::check(1, 8, 0.1).report(Vec::new());
         for part in [
             "fan: 1 vein, relaxed and by shooting\n",
             "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad\n",

@@ -8,10 +8,10 @@ use std::path::Path;
 
 use csv::StringRecord;
 
-use super::FileError;
 use super::numbers::{brief, seconds};
-use super::table::{csv_without_header, labelled, lay_out};
+use super::table::{Lines, csv_without_header, labelled};
 use super::words::map_shows;
+use super::{FileError, Reported};
 use crate::study::{Map, MapOutcome, MapRequest, MapRow};
 
 /// The columns after those of the varied keys.
@@ -36,9 +36,9 @@ const COLUMNS: [&str; 15] = [
 /// Most jumps that are listed.
 const JUMPS: usize = 5;
 
-/// The work done for a map.
-#[derive(Clone, Copy)]
-pub struct Work {
+/// A map, and the work that was done for it.
+pub struct MapWork<'m> {
+    pub map: &'m Map,
     /// Rows that were known before.
     pub known: usize,
     /// Rows that were computed.
@@ -47,30 +47,34 @@ pub struct Work {
     pub seconds: f64,
 }
 
-/// The varied numbers, the work, and how often each method had each outcome.
-pub fn report(map: &Map, work: Work, files: Option<String>) -> String {
-    let request = &map.request;
-    let mut lines: Vec<(&str, String)> = Vec::new();
-    for axis in &request.axes {
-        let ends = [axis.values.first(), axis.values.last()];
-        let [from, to] = ends.map(|end| end.map_or(String::new(), |&v| axis.keys.text(v)));
-        let spacing = if axis.log { ", logarithmic" } else { "" };
-        let count = axis.values.len();
-        let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
-        lines.push(("vary", text));
+impl Reported for MapWork<'_> {
+    fn heading(&self) -> String {
+        let name = &self.map.request.base.scenario().name;
+        format!("{name}: {}", map_shows(self.map.show))
     }
-    let (known, confirmed) = map.known_and_confirmed();
-    let cells = request.cells();
-    let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
-    lines.push(("cells", cells));
-    let (known, computed, time) = (work.known, work.computed, seconds(work.seconds));
-    let rows = format!("{known} were there, {computed} computed in {time}");
-    lines.push(("rows", rows));
-    lines.extend(labelled("found", counts(map)));
-    lines.extend(labelled("jumps", jumps(map)));
-    lines.extend(files.map(|files| ("written", files)));
-    let (name, what) = (&request.base.scenario().name, map_shows(map.show));
-    lay_out(&format!("{name}: {what}"), &lines)
+
+    fn lines(&self) -> Lines {
+        let request = &self.map.request;
+        let mut lines = Lines::new();
+        for axis in &request.axes {
+            let ends = [axis.values.first(), axis.values.last()];
+            let [from, to] = ends.map(|end| end.map_or(String::new(), |&v| axis.keys.text(v)));
+            let spacing = if axis.log { ", logarithmic" } else { "" };
+            let count = axis.values.len();
+            let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
+            lines.push(("vary", text));
+        }
+        let (known, confirmed) = self.map.known_and_confirmed();
+        let cells = request.cells();
+        let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
+        lines.push(("cells", cells));
+        let (known, computed, time) = (self.known, self.computed, seconds(self.seconds));
+        let rows = format!("{known} were there, {computed} computed in {time}");
+        lines.push(("rows", rows));
+        lines.extend(labelled("found", counts(self.map)));
+        lines.extend(labelled("jumps", jumps(self.map)));
+        lines
+    }
 }
 
 /// The first few pairs of cells between which the leaf jumps to another equilibrium.

@@ -24,23 +24,41 @@ pub mod words;
 use serde::Serialize;
 
 use crate::scenario::{Scenario, printable};
+use table::{Lines, labelled};
 
-pub use all::{lines as all_lines, report as all_report};
-pub use boundary::{
-    boundary_table, is_special, lines as boundary_lines, report as boundary_report, sides,
-};
+pub use boundary::{boundary_table, is_special, sides};
 pub use centerlines::{centerlines, modes_table};
-pub use chart::{chart_table, report as chart_report, scaling_table};
-pub use check::report as check_report;
+pub use chart::{chart_table, scaling_table};
 pub use error::FileError;
-pub use fit::{fitted, report as fit_report, table as fit_table};
-pub use map::{Work as MapWork, lines, map_table, read_rows, report as map_report, table};
-pub use relax::{lines as relax_lines, report as relax_report};
+pub use fit::{fitted, table as fit_table};
+pub use map::{MapWork, lines, map_table, read_rows, table};
 pub use sensitivity::table as sensitivity_table;
-pub use simulate::{lines as simulate_lines, report as simulate_report};
-pub use trace::{
-    error_location, lines as trace_lines, report as trace_report, slope_unit, trace_table,
-};
+pub use trace::{error_location, slope_unit, trace_table};
+
+/// A result with a report: labelled lines under a heading.
+pub trait Reported {
+    fn heading(&self) -> String;
+
+    fn lines(&self) -> Lines;
+
+    /// What follows the list of the files that were written.
+    fn remarks(&self) -> Lines {
+        Lines::new()
+    }
+
+    /// All lines but that list.
+    fn summary(&self) -> Lines {
+        [self.lines(), self.remarks()].concat()
+    }
+
+    /// The text for the console.
+    fn report(&self, files: Vec<String>) -> String {
+        let parts = [self.lines(), labelled("written", files), self.remarks()];
+        let lines = parts.iter().flatten();
+        let lines = lines.map(|(name, line)| format!("  {name:<9}{line}\n"));
+        self.heading() + "\n" + &lines.collect::<String>()
+    }
+}
 
 /// A result with its input, as JSON: the content of a verb's file, and the output of
 /// `--json`.

@@ -3,57 +3,58 @@
 use crate::relax::{Equilibrium, Mode, Outcome, Sensitivity};
 use crate::report::words::{shooting, verdict};
 
-use super::margin;
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
-use super::table::{Lines, labelled, lay_out};
+use super::table::{Lines, labelled};
+use super::{Reported, margin};
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
 
-/// The method, the result, its accuracy, and the files.
-pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
-    let (name, veins) = (&equilibrium.scenario, veins(equilibrium));
-    let heading = format!("{name}: {veins}, method {}", equilibrium.method);
-    lay_out(&heading, &lines(equilibrium, files))
-}
+impl Reported for Equilibrium {
+    fn heading(&self) -> String {
+        let (name, veins) = (&self.scenario, veins(self));
+        format!("{name}: {veins}, method {}", self.method)
+    }
 
-/// The lines of the report.
-pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
-    let mut lines = vec![("found", found(equilibrium))];
-    if let Some(saddle) = &equilibrium.stability.saddle {
-        let (index, energy) = (saddle.negative_eigenvalues, significant(saddle.energy));
-        let tip = point(saddle.tip.to_array(), decimals(equilibrium));
-        let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
-        lines.push(("left", left));
-    }
-    // Where shooting failed, the shape is not that of the leaf: it has no energy, and
-    // its tip is meaningless.
-    if let Some(energy) = equilibrium.energy.filter(|energy| energy.is_finite()) {
-        if let [tip] = equilibrium.tips.as_slice() {
-            lines.push(("tip", point(tip.to_array(), decimals(equilibrium))));
+    fn lines(&self) -> Lines {
+        let mut lines = vec![("found", found(self))];
+        if let Some(saddle) = &self.stability.saddle {
+            let (index, energy) = (saddle.negative_eigenvalues, significant(saddle.energy));
+            let tip = point(saddle.tip.to_array(), decimals(self));
+            let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
+            lines.push(("left", left));
         }
-        lines.push(("energy", significant(energy)));
+        // Where shooting failed, the shape is not that of the leaf: it has no energy, and
+        // its tip is meaningless.
+        if let Some(energy) = self.energy.filter(|energy| energy.is_finite()) {
+            if let [tip] = self.tips.as_slice() {
+                lines.push(("tip", point(tip.to_array(), decimals(self))));
+            }
+            lines.push(("energy", significant(energy)));
+        }
+        if let Some(reaction) = &self.reaction {
+            let force = reaction.force.to_array().map(significant).join(", ");
+            lines.push(("reaction", format!("({force}) on the holder of the tip")));
+        }
+        lines.extend(waves(self).map(|waves| ("waves", waves)));
+        lines.push(("error", error(self)));
+        lines.extend(modes(self).map(|modes| ("modes", modes)));
+        lines.extend(labelled("changes", changes(self)));
+        let margin = self.margin.as_ref().map(margin::lines);
+        lines.extend(labelled("margin", margin.unwrap_or_default()));
+        if !self.accuracy.segments.is_empty() {
+            lines.push(("model", self.model.description.clone()));
+        }
+        lines.push(("work", work(self)));
+        lines
     }
-    if let Some(reaction) = &equilibrium.reaction {
-        let force = reaction.force.to_array().map(significant).join(", ");
-        lines.push(("reaction", format!("({force}) on the holder of the tip")));
+
+    fn remarks(&self) -> Lines {
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
     }
-    lines.extend(waves(equilibrium).map(|waves| ("waves", waves)));
-    lines.push(("error", error(equilibrium)));
-    lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));
-    lines.extend(labelled("changes", changes(equilibrium)));
-    let margin = equilibrium.margin.as_ref().map(margin::lines);
-    lines.extend(labelled("margin", margin.unwrap_or_default()));
-    if !equilibrium.accuracy.segments.is_empty() {
-        lines.push(("model", equilibrium.model.description.clone()));
-    }
-    lines.push(("work", work(equilibrium)));
-    lines.extend(files.map(|files| ("written", files)));
-    lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
-    lines.extend(labelled("doubtful", equilibrium.doubts.clone()));
-    lines
 }
 
 /// The kind of equilibrium, or the residual.

@@ -3,33 +3,37 @@
 use crate::report::numbers::power_of_ten;
 use crate::simulate::Record;
 
+use super::Reported;
 use super::numbers::{brief, point, seconds, significant, veins_of};
-use super::table::{Lines, lay_out};
+use super::table::{Lines, labelled};
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
 
-/// The time reached, the steps, and the energies.
-pub fn report(record: &Record, files: Option<String>) -> String {
-    let veins = veins_of(record.rods, record.joined);
-    let method = record.scheme.name();
-    let heading = format!("{}: {veins}, method {method}", record.scenario);
-    lay_out(&heading, &lines(record, files))
-}
+impl Reported for Record {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, method {}", self.scenario, self.scheme)
+    }
 
-/// The lines of the report.
-pub fn lines(record: &Record, files: Option<String>) -> Lines {
-    let mut lines = vec![
-        ("moved", moved(record)),
-        ("grid", format!("{} segments a vein", record.segments)),
-        ("step", step(record)),
-    ];
-    lines.extend(energy(record));
-    lines.extend(tip(record));
-    lines.push(("speed", speed(record)));
-    lines.extend(files.map(|files| ("written", files)));
-    lines.extend(record.remark().map(|remark| ("remark", remark)));
-    lines
+    fn lines(&self) -> Lines {
+        let mut lines = vec![
+            ("moved", moved(self)),
+            ("grid", format!("{} segments a vein", self.segments)),
+            ("step", step(self)),
+        ];
+        lines.extend(energy(self));
+        if let [tip] = self.tips.as_slice() {
+            let decimals = (DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
+            lines.push(("tip", point(tip.to_array(), decimals as usize)));
+        }
+        lines.push(("speed", speed(self)));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        labelled("remark", self.remark())
+    }
 }
 
 fn moved(record: &Record) -> String {
@@ -82,14 +86,6 @@ fn energy(record: &Record) -> Lines {
     vec![("energy", parts.join(", ")), ("balance", balance)]
 }
 
-fn tip(record: &Record) -> Option<(&'static str, String)> {
-    let [tip] = record.tips.as_slice() else {
-        return None;
-    };
-    let decimals = (DECIMALS - record.length.log10().floor()).clamp(0.0, 15.0);
-    Some(("tip", point(tip.to_array(), decimals as usize)))
-}
-
 fn speed(record: &Record) -> String {
     let wall = record.wall_seconds;
     let work = record.steps * record.rods * record.segments;
@@ -118,7 +114,7 @@ mod tests {
             percent: 70.0,
         });
         record.duration = 40.0;
-        let report = report(&record, None);
+        let report = record.report(Vec::new());
         for part in [
             "swing: 1 vein, method explicit\n",
             "  moved    diverged: only to t = 10 in ",

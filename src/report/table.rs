@@ -1,7 +1,7 @@
 //! Layout of results: labelled lines for the console, rows for CSV.
 
 use std::collections::HashMap;
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -13,19 +13,9 @@ use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Vis
 pub type Lines = Vec<(&'static str, String)>;
 
 /// Lines of which only the first is labelled.
-pub fn labelled(name: &'static str, lines: Vec<String>) -> Lines {
+pub fn labelled(name: &'static str, lines: impl IntoIterator<Item = String>) -> Lines {
     let names = std::iter::once(name).chain(std::iter::repeat(""));
     names.zip(lines).collect()
-}
-
-/// Formats labelled lines under a heading.
-pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
-    let mut text = format!("{heading}\n");
-    for (name, line) in lines {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "  {name:<9}{line}");
-    }
-    text
 }
 
 /// Lists files in a folder.

@@ -7,8 +7,9 @@ use serde::Serialize;
 use crate::scenario::Units;
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
+use super::Reported;
 use super::numbers::{power_of_ten, seconds, short, veins_of};
-use super::table::{Lines, csv_without_header, labelled, lay_out};
+use super::table::{Lines, csv_without_header, labelled};
 use super::words::{branch_end, stable_or_index};
 
 /// `value` is that of the varied number. Branches and points are numbered from 1. The tip is
@@ -35,37 +36,36 @@ const COLUMNS: [&str; 16] = [
 /// Further columns if tips are held: the force on their holder.
 const REACTION: [&str; 3] = ["reaction_x", "reaction_y", "reaction_z"];
 
-/// The branches, their ends, and where the index changes.
-pub fn report(trace: &Trace, files: Option<String>) -> String {
-    let veins = veins_of(trace.rods, trace.joined);
-    let heading = format!("{}: {veins}, followed", trace.scenario);
-    lay_out(&heading, &lines(trace, files))
-}
-
-/// The lines of the report.
-pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
-    let [from, to] = trace.range.map(|value| trace.keys.text(value));
-    let mut lines = vec![("vary", format!("{} from {from} to {to}", trace.keys))];
-    let branches = trace.branches.iter().enumerate();
-    let branches = branches.flat_map(|(number, branch)| branch_lines(trace, number, branch));
-    lines.extend(labelled("branch", branches.collect()));
-    if let Some(law) = &trace.law {
-        lines.extend(labelled("law", law_lines(trace, law)));
+impl Reported for Trace {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, followed", self.scenario)
     }
-    let errors = trace.branches.iter().flat_map(|branch| &branch.points);
-    let errors = errors.filter_map(|point| point.error);
-    lines.extend(errors.reduce(f64::max).map(|worst| {
-        let (worst, segments) = (power_of_ten(worst), trace.segments);
-        let what = error_location(trace);
-        let error = format!("{what} within {worst}, followed on {segments} segments a vein");
-        ("error", error)
-    }));
-    let (count, time) = (trace.factorizations, seconds(trace.wall_seconds));
-    let work = format!("{count} factorisations to follow, {time} in all");
-    lines.push(("work", work));
-    lines.extend(files.map(|files| ("written", files)));
-    lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
-    lines
+
+    fn lines(&self) -> Lines {
+        let [from, to] = self.range.map(|value| self.keys.text(value));
+        let mut lines = vec![("vary", format!("{} from {from} to {to}", self.keys))];
+        let branches = self.branches.iter().enumerate();
+        let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
+        lines.extend(labelled("branch", branches));
+        lines.extend((self.law.iter()).flat_map(|law| labelled("law", law_lines(self, law))));
+        let errors = self.branches.iter().flat_map(|branch| &branch.points);
+        let errors = errors.filter_map(|point| point.error);
+        lines.extend(errors.reduce(f64::max).map(|worst| {
+            let (worst, segments) = (power_of_ten(worst), self.segments);
+            let what = error_location(self);
+            let error = format!("{what} within {worst}, followed on {segments} segments a vein");
+            ("error", error)
+        }));
+        let (count, time) = (self.factorizations, seconds(self.wall_seconds));
+        let work = format!("{count} factorisations to follow, {time} in all");
+        lines.push(("work", work));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        labelled("remark", self.remark.clone())
+    }
 }
 
 /// How a branch ended, its ends and its critical points.

@@ -4,8 +4,8 @@
 use super::Viewed;
 use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
+use crate::report::is_special;
 use crate::report::numbers::brief;
-use crate::report::{boundary_lines, is_special};
 use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
 
@@ -24,7 +24,6 @@ impl Viewed for Boundary {
             false => format!("{count}, not all followed to their ends"),
         };
         view.success = self.complete;
-        view.summary = boundary_lines(self, None);
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         view.leaves = points.map(|point| leaf(point, &view.drawn)).collect();
         view.chart = Some(chart(self));

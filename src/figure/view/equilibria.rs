@@ -3,9 +3,9 @@
 use super::Viewed;
 use super::data::{Leaf, View};
 use crate::figure::drawing::Drawing;
+use crate::report::Reported;
 use crate::report::numbers::short;
 use crate::report::words::equilibrium_of_index;
-use crate::report::{all_lines, relax_lines};
 use crate::scenario::Scenario;
 use crate::study::{All, Found};
 
@@ -24,7 +24,6 @@ impl Viewed for All {
             view.verdict += &format!(", the first {MOST} shown");
         }
         view.success = count > 0;
-        view.summary = all_lines(self, None);
         let shown = self.found.iter().take(MOST).enumerate();
         view.leaves = shown
             .map(|(k, found)| leaf(k + 1, found, &view.drawn))
@@ -42,7 +41,7 @@ fn leaf(number: usize, found: &Found, drawn: &[usize]) -> Leaf {
     let energy = short(leaf.energy.unwrap_or(f64::NAN));
     let label = format!("{number}. {kind}, energy {energy}");
     Leaf {
-        summary: relax_lines(leaf, None),
+        summary: leaf.summary(),
         ..Leaf::full(label, &leaf.shape.stations, &leaf.shape.rods, drawn)
     }
 }

@@ -7,7 +7,6 @@ use super::data::{Leaf, ModeShape, View, vectors};
 use crate::figure::drawing::Drawing;
 use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
-use crate::report::relax_lines;
 use crate::report::words::verdict;
 use crate::scenario::Scenario;
 
@@ -15,7 +14,6 @@ impl Viewed for Equilibrium {
     fn fill(&self, view: &mut View) {
         view.verdict = verdict(self);
         view.success = self.outcome.is_success();
-        view.summary = relax_lines(self, None);
         let shape = &self.shape;
         let leaf = Leaf::full("at rest".into(), &shape.stations, &shape.rods, &view.drawn);
         view.leaves.push(leaf);

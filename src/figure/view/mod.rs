@@ -31,7 +31,7 @@ pub mod vtk;
 use super::drawing::{Drawing, color_of_vein};
 use super::svg::{self, hex};
 use super::veins::is_drawn;
-use crate::report::json;
+use crate::report::{Reported, json};
 use crate::scenario::{self, Scenario};
 use crate::simulate::Record;
 use crate::study::Trace;
@@ -51,7 +51,7 @@ const SCRIPTS: [&str; 5] = [
 ];
 
 /// A result that has a page.
-pub trait Viewed {
+pub trait Viewed: Reported {
     /// Fills in the data of the page.
     #[doc(hidden)]
     fn fill(&self, view: &mut View);
@@ -103,7 +103,7 @@ pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
         title: scenario.name.clone(),
         verdict: String::new(),
         success: true,
-        summary: Vec::new(),
+        summary: result.summary(),
         units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
         gravity: scenario.gravity,
         longest: scenario::longest(&scenario.rods),

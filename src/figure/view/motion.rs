@@ -4,7 +4,6 @@ use super::Viewed;
 use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
 use crate::report::numbers::short;
-use crate::report::simulate_lines;
 use crate::scenario::Scenario;
 use crate::simulate::{Moment, Record};
 
@@ -25,7 +24,6 @@ impl Viewed for Record {
             }
         };
         view.success = self.stopped.is_none();
-        view.summary = simulate_lines(self, None);
         let shapes = self.film.iter().map(|still| {
             let time = self.moments[still.moment].time;
             let (label, curves) = (format!("t = {}", short(time)), &still.curves);

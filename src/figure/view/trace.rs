@@ -4,7 +4,6 @@ use super::Viewed;
 use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
 use crate::report::numbers::{brief, significant};
-use crate::report::trace_lines;
 use crate::report::words::equilibrium_of_index;
 use crate::scenario::Scenario;
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
@@ -22,7 +21,6 @@ impl Viewed for Trace {
             (count, false) => format!("{count} of the branches, not all followed to their ends"),
         };
         view.success = self.complete;
-        view.summary = trace_lines(self, None);
         let points = self.branches.iter().flat_map(|branch| &branch.points);
         view.leaves = points.map(|point| leaf(self, point, &view.drawn)).collect();
         view.chart = Some(chart(self, view));
