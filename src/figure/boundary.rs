@@ -7,8 +7,7 @@ use std::collections::BTreeSet;
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
-use super::indices::write_indices;
-use super::labels::Labels;
+use super::labels::{Labels, write_indices};
 use super::map::{DARKEST_INDEX, fill_index, name};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
@@ -17,7 +16,7 @@ use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
 use crate::branch::Kind;
-use crate::report::numbers::{number_of_veins, power_of_ten, short};
+use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
 use crate::report::sides;
 use crate::report::words::stable_or_index;
 use crate::scenario::Scenario;
@@ -116,15 +115,10 @@ fn letter(number: usize) -> String {
 }
 
 fn notes(boundary: &Boundary) -> Vec<String> {
-    let points: usize = boundary.curves.iter().map(|curve| curve.points.len()).sum();
-    let mut notes = vec![
-        number_of_veins(boundary.rods),
-        match boundary.curves.len() {
-            1 => format!("{points} points on 1 curve"),
-            curves => format!("{points} points on {curves} curves"),
-        },
-    ];
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    let curves = counted(boundary.curves.len(), "curve", "curves");
+    let points_on = format!("{} points on {curves}", points().count());
+    let mut notes = vec![number_of_veins(boundary.rods), points_on];
     let worst = points().map(|point| point.error).fold(0.0, f64::max);
     if worst > 0.0 {
         notes.push(format!("tips within {}", power_of_ten(worst)));

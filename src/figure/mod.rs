@@ -7,22 +7,18 @@
 //! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
 //! `png` write the same drawing in both formats.
 
-mod all;
 mod axes;
 mod axis;
 mod boundary;
 mod chart;
 mod chart_panel;
 mod check;
-mod differences;
 mod drawing;
 mod energy;
 mod film;
 mod filmstrip;
 mod fit;
 mod font;
-mod gravity;
-mod indices;
 mod labels;
 mod leaf;
 mod map;
@@ -32,7 +28,6 @@ mod page;
 mod panels;
 pub mod png;
 mod round;
-mod sensitivity;
 mod setting;
 mod small;
 mod space;
@@ -41,7 +36,6 @@ mod trace;
 mod veins;
 pub mod view;
 
-pub use all::draw as all;
 pub use boundary::draw as boundary;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
@@ -49,13 +43,17 @@ pub use energy::draw as energy;
 pub use film::write as film;
 pub use filmstrip::draw as filmstrip;
 pub use fit::draw as fit;
-pub use leaf::draw as leaf;
+pub use leaf::{draw as leaf, draw_all as all, draw_sensitivity as sensitivity};
 pub use map::draw as map;
 pub use modes::draw as modes;
-pub use sensitivity::draw as sensitivity;
 pub use trace::draw as trace;
 
 pub use drawing::Drawing;
+
+use crate::scenario::Scenario;
+
+/// Draws a result of a scenario.
+pub type Figure<R> = fn(&R, &Scenario) -> Drawing;
 
 #[cfg(test)]
 mod tests {

@@ -2,8 +2,7 @@
 
 use super::drawing::{Anchor, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color};
 use super::font::Font;
-use super::markers::Marker;
-use super::markers::{clamp_marker, tip_marker};
+use super::markers::{Marker, clamp_marker, tip_marker};
 use super::veins::Veins;
 use glam::DVec2;
 

@@ -9,8 +9,7 @@ use glam::{DVec2, DVec3};
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Drawing, Stroke};
-use super::gravity;
-use super::markers::leaf_markers;
+use super::markers::{draw_gravity, leaf_markers};
 use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
 use super::setting::Setting;
 use super::space::{Margins, Scene, View, surrounding_box};
@@ -90,7 +89,7 @@ fn draw_flat(
     if let Some(gravity) = setting.gravity {
         let direction = DVec2::new(gravity[across], -gravity[up]);
         let (points, toward) = (veins.points().map(place), toward.dot(gravity) > 0.0);
-        gravity::draw(page, cell, points, direction, toward);
+        draw_gravity(page, cell, points, direction, toward);
     }
 }
 

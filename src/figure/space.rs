@@ -6,8 +6,7 @@ use glam::{DVec2, DVec3};
 use super::drawing::{
     Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
 };
-use super::gravity;
-use super::markers::leaf_markers;
+use super::markers::{draw_gravity, leaf_markers};
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
 use super::round::{multiples, round_step};
 use super::setting::Setting;
@@ -291,7 +290,7 @@ impl Scene {
         let corners = (0..8).map(|k| self.place(corner(k)));
         let names = self.edges.iter().map(|edge| self.middle(edge));
         let toward = toward.dot(gravity) > 0.0;
-        gravity::draw(page, self.cell, corners.chain(names), direction, toward);
+        draw_gravity(page, self.cell, corners.chain(names), direction, toward);
     }
 
     /// The middle of an edge on the page.

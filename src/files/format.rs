@@ -6,7 +6,7 @@ use std::slice;
 use serde::Serialize;
 
 use crate::figure::view::{Shape, vtk};
-use crate::figure::{Drawing, png, svg};
+use crate::figure::{self, png, svg};
 use crate::report::Document;
 use crate::scenario::Scenario;
 use crate::words::words;
@@ -17,7 +17,7 @@ pub enum Format<R> {
     /// A table, or another text or array.
     Table(&'static str, fn(&R, &mut dyn Write) -> io::Result<()>),
     /// A figure as a vector image and as a raster image.
-    Figure([&'static str; 2], fn(&R, &Scenario) -> Drawing),
+    Figure([&'static str; 2], figure::Figure<R>),
     /// The leaf in space, for which its scenario is needed.
     Space(
         &'static str,

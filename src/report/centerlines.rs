@@ -1,12 +1,12 @@
-//! `centerlines.csv` and `modes.csv`: every rod at every station, for
-//! spreadsheets and scripts.
+//! Tables of a leaf: `centerlines.csv`, `modes.csv` and `sensitivity.csv`, with every rod at
+//! every station, for spreadsheets and scripts.
 
 use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::table::csv_without_header;
-use crate::relax::{Equilibrium, NodeState};
+use super::table::{append_csv, csv_without_header, header};
+use crate::relax::{Equilibrium, NodeState, Sensitivity};
 use crate::shape::weights;
 
 /// Nodes of the finest grid that a cubic interpolates.
@@ -89,4 +89,35 @@ fn columns(node: &NodeState) -> [f64; 19] {
     ]
     // Adding zero turns -0 into 0.
     .map(|value| value + 0.0)
+}
+
+/// The derivative of a station's position with respect to a number; rods are counted from 1.
+const SENSITIVITY_HEADER: [&str; 8] =
+    ["key", "value", "rod", "sigma", "d_x", "d_y", "d_z", "error"];
+
+/// Cells of a row.
+type Row<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
+
+/// `sensitivity.csv`: a row for every number and station, or for the tips where only
+/// they are known.
+pub fn sensitivity_table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let all = leaf.sensitivities.iter().flatten();
+    out.write_all(&header(&SENSITIVITY_HEADER))?;
+    append_csv(all.flat_map(rows), out)
+}
+
+fn rows(of: &Sensitivity) -> Vec<Row<'_>> {
+    let row = |(rod, sigma): (usize, f64), d: &DVec3, error| -> Row {
+        (&of.key, of.value, rod + 1, sigma, d.to_array(), error)
+    };
+    if of.positions.is_empty() {
+        let tips = of.tips.iter().enumerate();
+        return tips.map(|(j, d)| row((j, 1.0), d, of.tip_error)).collect();
+    }
+    let rods = of.positions.iter().enumerate();
+    rods.flat_map(|(j, rod)| {
+        let nodes = of.stations.iter().zip(rod);
+        nodes.map(move |(sigma, d)| row((j, *sigma), d, of.positions_error))
+    })
+    .collect()
 }

@@ -1,39 +1,34 @@
 //! Output of results: as lines on the console, as rows of tables, as JSON.
 
-mod all;
 pub mod base64;
-mod boundary;
 mod centerlines;
 mod chart;
 mod check;
-mod error;
 mod fit;
 pub mod json;
 mod map;
-mod margin;
 pub mod numbers;
 mod relax;
 #[cfg(test)]
 pub mod sample;
-mod sensitivity;
 mod simulate;
 pub mod table;
 mod trace;
 pub mod words;
+
+use std::io;
+use std::path::Path;
 
 use serde::Serialize;
 
 use crate::scenario::{Scenario, printable};
 use table::{Lines, labelled};
 
-pub use boundary::{boundary_table, is_special, sides};
-pub use centerlines::{centerlines, modes_table};
+pub use centerlines::{centerlines, modes_table, sensitivity_table};
 pub use chart::{chart_table, scaling_table};
-pub use error::FileError;
 pub use fit::{fitted, table as fit_table};
 pub use map::{MapWork, lines, map_table, read_rows, table};
-pub use sensitivity::table as sensitivity_table;
-pub use trace::{error_location, slope_unit, trace_table};
+pub use trace::{boundary_table, error_location, is_special, sides, slope_unit, trace_table};
 
 /// A result with a report: labelled lines under a heading.
 pub trait Reported {
@@ -109,5 +104,30 @@ impl<'a, R> Document<'a, R> {
             input,
             refused: None,
         }
+    }
+}
+
+/// Why a file could not be written or read, and what to change.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct FileError(pub String);
+
+impl FileError {
+    /// A file cannot be written, for the system's reason. A previous file is unchanged.
+    pub fn write(file: &Path, reason: io::Error) -> Self {
+        let file = file.display();
+        FileError(format!(
+            "cannot write {file}: {reason}; make room there or name another folder with --out DIR"
+        ))
+    }
+
+    /// A file cannot be read, for the system's reason.
+    pub fn read(file: &Path, reason: io::Error) -> Self {
+        FileError(format!("cannot read {}: {reason}", file.display()))
+    }
+
+    /// A file belongs to another run or map, or is damaged.
+    pub fn unfit(file: &Path, why: &str) -> Self {
+        FileError(format!("{} {why}", file.display()))
     }
 }

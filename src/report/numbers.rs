@@ -23,19 +23,18 @@ pub fn veins_of(count: usize, joined: bool) -> String {
 
 /// As in `5 veins`.
 pub fn number_of_veins(count: usize) -> String {
-    match count {
-        1 => "1 vein".into(),
-        count => format!("{count} veins"),
-    }
+    counted(count, "vein", "veins")
+}
+
+/// A number of things, as `one` or `many` of them are called.
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// The number of negative eigenvalues in brackets, if known.
 pub fn eigenvalues(count: Option<usize>) -> String {
-    match count {
-        Some(1) => " (1 negative eigenvalue)".into(),
-        Some(count) => format!(" ({count} negative eigenvalues)"),
-        None => String::new(),
-    }
+    let count = count.map(|it| counted(it, "negative eigenvalue", "negative eigenvalues"));
+    count.map_or(String::new(), |count| format!(" ({count})"))
 }
 
 /// The grids of a relaxation.

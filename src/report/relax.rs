@@ -1,13 +1,20 @@
-//! The text report of a relaxation.
+//! The text reports of a relaxation, with the stability margin of the leaf, and of all
+//! equilibria of a leaf.
 
-use crate::relax::{Equilibrium, Mode, Outcome, Sensitivity};
-use crate::report::words::{shooting, verdict};
+use glam::DVec3;
 
+use super::Reported;
 use super::numbers::{
-    bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
+    bound, brief, counted, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
 use super::table::{Lines, labelled};
-use super::{Reported, margin};
+use super::words::stable_or_index;
+use crate::relax::{
+    Barrier, Direction, Equilibrium, Fate, Loss, Margin, Mode, Outcome, Push, Sensitivity,
+};
+use crate::report::numbers::power_of_ten;
+use crate::report::words::{shooting, verdict};
+use crate::study::{All, Found};
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
@@ -42,7 +49,7 @@ impl Reported for Equilibrium {
         lines.push(("error", error(self)));
         lines.extend(modes(self).map(|modes| ("modes", modes)));
         lines.extend(labelled("changes", changes(self)));
-        let margin = self.margin.as_ref().map(margin::lines);
+        let margin = self.margin.as_ref().map(margin_lines);
         lines.extend(labelled("margin", margin.unwrap_or_default()));
         if !self.accuracy.segments.is_empty() {
             lines.push(("model", self.model.description.clone()));
@@ -168,4 +175,176 @@ fn work(equilibrium: &Equilibrium) -> String {
     format!(
         "{steps} steps, {factorizations} factorisations, {evaluations} force evaluations in {time}"
     )
+}
+
+/// Decimals of positions that were found on one grid.
+const DECIMALS: usize = 3;
+
+/// The lines about a margin, the smallest push first.
+fn margin_lines(margin: &Margin) -> Vec<String> {
+    let lost = margin.pushes.iter().filter(|push| push.force.is_some());
+    let mut lines: Vec<String> = lost
+        .filter(|push| !push.mirrored)
+        .map(|push| destabilizing_push(margin, push))
+        .collect();
+    lines.extend(stable_directions(margin));
+    let unknown = margin.pushes.iter();
+    let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
+    lines.extend(unknown.map(|push| {
+        let least = force(margin, push.more_than.unwrap_or_default());
+        let why = push.remark.as_deref().unwrap_or_default();
+        let which = directions(margin, push);
+        format!("a push {which} is known up to {least} only, under which it is stable: {why}")
+    }));
+    match &margin.barrier {
+        Some(found) => lines.push(barrier(margin, found)),
+        None if margin.climbs > 0 => {
+            let what = "no pass to another equilibrium found";
+            lines.push(format!("{what} from {} places", margin.climbs));
+        }
+        None => {}
+    }
+    lines.extend(margin.remark.clone());
+    lines
+}
+
+/// A push under which stability is lost.
+fn destabilizing_push(margin: &Margin, push: &Push) -> String {
+    let at = force(margin, push.force.unwrap_or_default());
+    let then = match push.then {
+        Some(Fate::BendsAside) => "makes it bend aside",
+        Some(Fate::Snaps) | None => "snaps it",
+    };
+    let rest = (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip)));
+    let error = push.error.map(|error| format!(", within {}", bound(error)));
+    let weights = (push.per_weight).map(|part| format!(" ({} weights)", brief(part)));
+    let place = match margin.every_tip {
+        true => "at every tip",
+        false => "at the tip",
+    };
+    format!(
+        "a push of {at} {} {place} {then}{}{}{}",
+        directions(margin, push),
+        rest.unwrap_or_default(),
+        error.unwrap_or_default(),
+        weights.unwrap_or_default(),
+    )
+}
+
+/// Directions in which the leaf stays stable up to the largest push.
+fn stable_directions(margin: &Margin) -> Option<String> {
+    let none = margin.pushes.iter();
+    let none = none.filter(|push| push.kind == Loss::NoneUpTo);
+    let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
+    let largest = force(margin, margin.largest_push?);
+    (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
+}
+
+fn barrier(margin: &Margin, barrier: &Barrier) -> String {
+    let energy = with_unit(barrier.energy, margin.units.energy().as_deref());
+    let error = (barrier.error).map(|error| format!(" within {}", bound(error)));
+    let lifted = barrier.height.map(|height| {
+        let height = with_unit(height, margin.units.length.as_deref());
+        format!(", as the leaf lifted by {height}")
+    });
+    format!(
+        "barrier of {energy}{}{}, over a saddle with tip {} to rest with tip {}",
+        error.unwrap_or_default(),
+        lifted.unwrap_or_default(),
+        tip(barrier.saddle.tip),
+        tip(barrier.neighbour.tip),
+    )
+}
+
+fn tip(tip: DVec3) -> String {
+    point(tip.to_array(), DECIMALS)
+}
+
+fn force(margin: &Margin, force: f64) -> String {
+    with_unit(force, margin.units.force.as_deref())
+}
+
+fn with_unit(value: f64, unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) => format!("{} {unit}", brief(value)),
+        None => brief(value),
+    }
+}
+
+/// The direction of a push, with that of its mirror image.
+fn directions(margin: &Margin, push: &Push) -> String {
+    let image = push.direction.opposite();
+    let mut pushes = margin.pushes.iter();
+    match pushes.any(|other| other.mirrored && other.direction == image) {
+        true => format!("{} ({} or {image})", word(push.direction), push.direction),
+        false => format!("{} ({})", word(push.direction), push.direction),
+    }
+}
+
+fn word(direction: Direction) -> &'static str {
+    match (direction.axis, direction.negative) {
+        (0, false) => "forwards",
+        (0, true) => "backwards",
+        (1, _) => "sideways",
+        (_, false) => "upwards",
+        (_, true) => "downwards",
+    }
+}
+
+impl Reported for All {
+    fn heading(&self) -> String {
+        let leaf = self.found.first();
+        let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+        format!("{}: {veins}, all shapes", self.scenario)
+    }
+
+    /// The equilibria, lowest energy first.
+    fn lines(&self) -> Lines {
+        let found = self.found.iter().enumerate();
+        let mut lines = labelled(
+            "found",
+            found.map(|(number, found)| equilibrium_line(number, found)),
+        );
+        let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
+        let stable = self.found.iter().filter(stable).count();
+        let others = self.found.len() - stable;
+        let failed = match self.failed {
+            0 => String::new(),
+            failed => format!(", {failed} of them without coming to rest"),
+        };
+        let (starts, time) = (self.starts, seconds(self.wall_seconds));
+        let work = format!(
+            "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
+        );
+        lines.push(("work", work));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        let more = "there may be more: no number of starts proves that these are all";
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("remark", Some(more.into()))].concat()
+    }
+}
+
+fn equilibrium_line(number: usize, found: &Found) -> String {
+    let leaf = &found.equilibrium;
+    let index = leaf.stability.negative_eigenvalues;
+    let stability = index.map_or("of unknown stability".into(), stable_or_index);
+    let tip = match &leaf.tips[..] {
+        [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
+        _ => String::new(),
+    };
+    let within = match leaf.accuracy.error_estimate {
+        Some(error) => format!(", within {}", power_of_ten(error)),
+        None => String::new(),
+    };
+    let plain = if found.plain {
+        ", the plain one among them"
+    } else {
+        ""
+    };
+    let starts = counted(found.starts, "start", "starts");
+    let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
+    format!("{number:>2}. energy {energy:.10}: {stability}{tip}{within} ({starts}{plain})")
 }

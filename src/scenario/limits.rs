@@ -6,8 +6,7 @@ use super::error::ScenarioError;
 use super::key::{Form, Key};
 use super::material;
 use super::raw::{Item, Raw};
-use super::scale::longest;
-use super::{Profile, Rod, Scale, Scenario};
+use super::{Profile, Rod, Scale, Scenario, longest};
 
 type Result = std::result::Result<(), ScenarioError>;
 

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::Profile;
 use super::error::ScenarioError;
 use super::key::Key;
-use super::radii::Radii;
 use super::raw::{Item, Raw};
-use super::section::{Outline, Property, Section};
+use super::section::{Outline, Property, Radii, Section};
 use super::value::MAGNITUDES;
 
 type Result<T> = std::result::Result<T, ScenarioError>;

@@ -15,19 +15,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `data.rs` defines the data of the page, one file per kind of result fills it in, and the
-//! scripts draw it. `three/` holds the part of three.js that is used, and how it is bundled.
+//! `data.rs` defines the data of the page, `results.rs` fills it in, and the scripts draw it.
+//! `three/` holds the part of three.js that is used, and how it is bundled.
 
-mod boundary;
 mod data;
-mod equilibria;
 pub mod glb;
-mod leaf;
-mod motion;
-mod trace;
-mod tubes;
+mod results;
 pub mod vtk;
 
+use super::Figure;
 use super::drawing::{Drawing, color_of_vein};
 use super::svg::{self, hex};
 use super::veins::is_drawn;
@@ -52,13 +48,13 @@ const SCRIPTS: [&str; 5] = [
 
 /// A result that has a page.
 pub trait Viewed: Reported {
+    /// The figure that replaces it in a browser without 3D graphics.
+    #[doc(hidden)]
+    const STILL: Figure<Self>;
+
     /// Fills in the data of the page.
     #[doc(hidden)]
     fn fill(&self, view: &mut View);
-
-    /// The figure that replaces it in a browser without 3D graphics.
-    #[doc(hidden)]
-    fn still(&self, scenario: &Scenario) -> Drawing;
 }
 
 /// One of several shapes: its time or number, its stations and its centrelines.
@@ -92,7 +88,7 @@ pub(crate) fn write<R: Viewed>(
 }
 
 /// The page of a result of this scenario: a self-contained HTML file.
-pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
+pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
     let count = scenario.rods.len();
     let drawn: Vec<usize> = (1..=count)
         .filter(|number| is_drawn(number - 1, count))
@@ -117,7 +113,7 @@ pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
         chart: None,
     };
     result.fill(&mut view);
-    assemble(&view, &result.still(scenario))
+    assemble(&view, &R::STILL(result, scenario))
 }
 
 fn assemble(view: &View, still: &Drawing) -> String {

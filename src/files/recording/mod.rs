@@ -6,7 +6,6 @@
 //! stopped can be kept instead, and resumed.
 
 mod checkpoint;
-mod checkpointer;
 mod energy;
 mod growing;
 mod motion;
@@ -18,7 +17,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 
-pub use checkpointer::Checkpointer;
+pub use checkpoint::Checkpointer;
 
 use super::{Kind, Selection, atomic, write_all};
 use crate::report::table::header;
@@ -26,8 +25,7 @@ use crate::report::{Document, FileError};
 use crate::scenario;
 use crate::shape::equally_spaced;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
-use checkpoint::{Checkpoint, Identity, damaged};
-use checkpointer::Latest;
+use checkpoint::{Checkpoint, Identity, Latest, damaged};
 use growing::{GrowingFile, kept_path};
 use motion::{Form, Size};
 
