@@ -3,13 +3,13 @@
 
 use std::sync::Arc;
 
-use serde::ser::{Serialize, Serializer};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::{Value, json};
 
 use super::error::ScenarioError;
 use super::key::Range;
 use super::section::{Outline, Property, Section};
-use super::written::{Written, in_time, list, number_or_list, quantity};
-use super::{Key, Profile, Rod, Scenario, Start};
+use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
 
 /// The sections of a scenario, and what else is theirs.
 struct Sections<'a> {
@@ -23,27 +23,32 @@ struct Sections<'a> {
 /// `"inf"`.
 impl Serialize for Scenario {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut top: Vec<(&str, Written)> = Vec::new();
         let sections = self.sections();
-        for key in Key::all() {
-            let Some(value) = self.written(key, sections.as_ref()) else {
-                continue;
-            };
-            match (key.parts(), top.last_mut()) {
-                (("", name), _) => top.push((name, value)),
-                ((table, name), Some((last, Written::Table(entries)))) if *last == table => {
-                    entries.push((name, value));
-                }
-                ((table, name), _) => top.push((table, Written::Table(vec![(name, value)]))),
+        let entry = |key: Key| Some((key.parts(), self.written(key, sections.as_ref())?));
+        let entries: Vec<_> = Key::all().filter_map(entry).collect();
+        let mut top = serializer.serialize_map(None)?;
+        for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
+            match &entries[0] {
+                (("", name), value) => top.serialize_entry(name, value)?,
+                ((table, _), _) => top.serialize_entry(table, &Table(entries))?,
             }
         }
-        Written::Table(top).serialize(serializer)
+        top.end()
+    }
+}
+
+/// The entries of a table, in the order of the format.
+struct Table<'e>(&'e [((&'static str, &'static str), Value)]);
+
+impl Serialize for Table<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|((_, name), value)| (name, value)))
     }
 }
 
 impl Scenario {
     /// The value of a key; `None` if other keys determine it.
-    fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Written<'_>> {
+    fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
         match key.parts().0 {
             "section" => return sections?.written(key),
             "stiffness" if sections.is_some() => return None,
@@ -51,23 +56,24 @@ impl Scenario {
             "dynamics" => return self.of_dynamics(key, sections),
             _ => {}
         }
+        let triples: [([Key; 3], fn(&Rod) -> &[Profile; 3]); 3] = [
+            (Key::COUPLE, |rod| &rod.couple_stiffness),
+            (Key::FORCE, |rod| &rod.force_stiffness),
+            (Key::REST, |rod| &rod.rest_curvature),
+        ];
+        for (keys, of) in triples {
+            if let Some(which) = keys.iter().position(|one| *one == key) {
+                return Some(quantity(self.rods.iter().map(|rod| &of(rod)[which])));
+            }
+        }
         Some(match key {
-            Key::Name => Written::Text(&self.name),
-            Key::UnitLength => Written::Text(self.units.length.as_deref()?),
-            Key::UnitForce => Written::Text(self.units.force.as_deref()?),
-            Key::Rods => Written::Whole(self.rods.len()),
+            Key::Name => json!(self.name),
+            Key::UnitLength => json!(self.units.length.as_deref()?),
+            Key::UnitForce => json!(self.units.force.as_deref()?),
+            Key::Rods => json!(self.rods.len()),
             Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
             Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
-            Key::Joined => Written::Switch(self.joined),
-            Key::Torsion | Key::Bending2 | Key::Bending3 => {
-                self.of_rods(Key::COUPLE, key, |rod| &rod.couple_stiffness)
-            }
-            Key::Axial | Key::Shear2 | Key::Shear3 => {
-                self.of_rods(Key::FORCE, key, |rod| &rod.force_stiffness)
-            }
-            Key::RestTwist | Key::RestBend2 | Key::RestBend3 => {
-                self.of_rods(Key::REST, key, |rod| &rod.rest_curvature)
-            }
+            Key::Joined => json!(self.joined),
             Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
             Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
                 // A single rod has no gaps: any number will do.
@@ -77,18 +83,18 @@ impl Scenario {
             Key::Gravity => list(self.gravity),
             Key::TipForce => list(self.tip_force),
             Key::TipMoment => list(self.tip_moment),
-            Key::Tolerance => Written::Number(self.tolerance),
+            Key::Tolerance => number(self.tolerance),
             _ => return None,
         })
     }
 
     /// The value of a key of `[tip]`.
-    fn of_tip(&self, key: Key) -> Option<Written<'_>> {
+    fn of_tip(&self, key: Key) -> Option<Value> {
         let held = self.held_tip.as_ref()?;
         let clamps = held.clamps.as_deref();
         Some(match key {
-            Key::TipHeld if clamps.is_some() => Written::Text("clamped"),
-            Key::TipHeld => Written::Text("pinned"),
+            Key::TipHeld if clamps.is_some() => json!("clamped"),
+            Key::TipHeld => json!("pinned"),
             Key::TipPosition => list(held.position),
             Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
             _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
@@ -96,7 +102,7 @@ impl Scenario {
     }
 
     /// The value of a key of `[dynamics]`.
-    fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Written<'_>> {
+    fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
             Key::Density if sections.is_some_and(|it| it.density) => return None,
@@ -105,19 +111,19 @@ impl Scenario {
             // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
             Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
-            Key::ExternalDamping => Written::Number(dynamics.external_damping),
-            Key::InternalDamping => Written::Number(dynamics.internal_damping),
-            Key::Duration => Written::Number(dynamics.duration),
-            Key::OutputInterval => Written::Number(dynamics.output_interval),
-            Key::Clamped => Written::Switch(dynamics.clamped),
-            Key::Start => Written::Text(match dynamics.start {
+            Key::ExternalDamping => number(dynamics.external_damping),
+            Key::InternalDamping => number(dynamics.internal_damping),
+            Key::Duration => number(dynamics.duration),
+            Key::OutputInterval => number(dynamics.output_interval),
+            Key::Clamped => json!(dynamics.clamped),
+            Key::Start => json!(match dynamics.start {
                 Start::Released => "released",
                 Start::AtRest => "at-rest",
             }),
             Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
             Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
             Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
-            Key::RestInTime => in_time(&dynamics.rest, 1.0, "factor", Written::Number)?,
+            Key::RestInTime => in_time(&dynamics.rest, 1.0, "factor", number)?,
             _ => return None,
         })
     }
@@ -146,28 +152,17 @@ impl Scenario {
             rotary_inertia: density && inertia,
         })
     }
-
-    /// One of three quantities of all rods.
-    fn of_rods(
-        &self,
-        keys: [Key; 3],
-        key: Key,
-        of: impl Fn(&Rod) -> &[Profile; 3],
-    ) -> Written<'static> {
-        let which = keys.iter().position(|one| *one == key).unwrap_or(0);
-        quantity(self.rods.iter().map(|rod| &of(rod)[which]))
-    }
 }
 
 impl Sections<'_> {
     /// The value of a key of `[section]`.
-    fn written(&self, key: Key) -> Option<Written<'static>> {
+    fn written(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {
             quantity(self.sections.iter().map(|section| of(section)))
         };
         Some(match key {
-            Key::SectionShape => Written::Text(match outline {
+            Key::SectionShape => json!(match outline {
                 Outline::Circle => "circle",
                 Outline::Ellipse => "ellipse",
                 Outline::Rectangle => "rectangle",
@@ -184,6 +179,56 @@ impl Sections<'_> {
     }
 }
 
+/// A number; JSON has no infinity: `"inf"`.
+fn number(number: f64) -> Value {
+    match number.is_infinite() {
+        true => json!("inf"),
+        false => json!(number),
+    }
+}
+
+fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
+    numbers.into_iter().map(number).collect()
+}
+
+/// A single number if all are the same.
+fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
+    let numbers: Vec<f64> = numbers.collect();
+    let first = numbers.first().copied().unwrap_or(0.0);
+    match numbers.iter().all(|number| *number == first) {
+        true => number(first),
+        false => list(numbers),
+    }
+}
+
+/// A quantity of all rods, in the shortest form.
+fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
+    let profiles: Vec<&Profile> = profiles.collect();
+    if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
+        return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
+    }
+    let kinks = profiles.iter().flat_map(|profile| profile.kinks());
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
+    let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
+        true => values(profiles[0]),
+        false => profiles.iter().map(|profile| values(profile)).collect(),
+    };
+    json!({ "at": at, "value": value })
+}
+
+/// A quantity in time; `None` if it is always the one at rest.
+fn in_time<T: Copy + PartialEq>(
+    schedule: &Schedule<T>,
+    at_rest: T,
+    name: &str,
+    written: impl Fn(T) -> Value,
+) -> Option<Value> {
+    let values = || schedule.value.iter().map(|&value| written(value));
+    let table = || json!({ "at": schedule.at, name: values().collect::<Value>() });
+    (*schedule != Schedule::constant(at_rest)).then(table)
+}
+
 /// Converts a scenario in JSON, or the `input` of a result, to TOML; `None` if the text
 /// is not a JSON object.
 pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, ScenarioError>> {
@@ -191,7 +236,7 @@ pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, Scenari
     if !text.trim_start().starts_with('{') {
         return None;
     }
-    let parsed = serde_json::from_str::<serde_json::Value>(text).map_err(|error| {
+    let parsed = serde_json::from_str::<Value>(text).map_err(|error| {
         let line = Some(error.line());
         ScenarioError::in_file(file, line, format!("not valid JSON: {error}"))
     });

@@ -20,7 +20,6 @@ mod schema;
 mod section;
 mod tip;
 mod value;
-mod written;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
