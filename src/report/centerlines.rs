@@ -14,44 +14,27 @@ const CUBIC: usize = 4;
 
 /// Names of the columns. Rods are numbered from 1; strains and stress
 /// resultants are components along the directors.
-const HEADER: [&str; 22] = [
-    "rod", "sigma", "s", "x", "y", "z", "qw", "qx", "qy", "qz", "v1", "v2", "v3", "u1", "u2", "u3",
-    "n1", "n2", "n3", "m1", "m2", "m3",
-];
+const HEADER: &str = "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3";
 
 /// `centerlines.csv`: one row per rod and station.
 pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv_without_header(out);
-    table.write_record(HEADER)?;
-    for (index, rod) in equilibrium.shape.rods.iter().enumerate() {
-        for (&sigma, node) in equilibrium.shape.stations.iter().zip(&rod.nodes) {
-            table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
-        }
-    }
-    table.flush()
+    let shape = &equilibrium.shape;
+    let rows = shape.rods.iter().zip(1..).flat_map(|(rod, number)| {
+        let nodes = shape.stations.iter().zip(&rod.nodes);
+        nodes.map(move |(sigma, node)| (number, *sigma, sigma * rod.length, columns(node)))
+    });
+    out.write_all(&header(HEADER))?;
+    append_csv::<(usize, _, _, _)>(rows, out)
 }
 
 /// Names of the columns. Modes and rods are numbered from 1; displacements and
 /// rotation vectors are along the lab axes.
-const MODES_HEADER: [&str; 12] = [
-    "mode",
-    "eigenvalue",
-    "error",
-    "frequency",
-    "rod",
-    "sigma",
-    "dx",
-    "dy",
-    "dz",
-    "rx",
-    "ry",
-    "rz",
-];
+const MODES_HEADER: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
 
 /// `modes.csv`: one row per mode, rod and station.
 pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(&header(MODES_HEADER))?;
     let mut table = csv_without_header(out);
-    table.write_record(MODES_HEADER)?;
     let shape = &equilibrium.shape;
     let place = |&at: &f64| (at, weights(&shape.curve_stations, at, CUBIC));
     let places: Vec<_> = shape.stations.iter().map(place).collect();
@@ -92,8 +75,7 @@ fn columns(node: &NodeState) -> [f64; 19] {
 }
 
 /// The derivative of a station's position with respect to a number; rods are counted from 1.
-const SENSITIVITY_HEADER: [&str; 8] =
-    ["key", "value", "rod", "sigma", "d_x", "d_y", "d_z", "error"];
+const SENSITIVITY_HEADER: &str = "key,value,rod,sigma,d_x,d_y,d_z,error";
 
 /// Cells of a row.
 type Row<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
@@ -102,7 +84,7 @@ type Row<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);
 /// they are known.
 pub fn sensitivity_table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let all = leaf.sensitivities.iter().flatten();
-    out.write_all(&header(&SENSITIVITY_HEADER))?;
+    out.write_all(&header(SENSITIVITY_HEADER))?;
     append_csv(all.flat_map(rows), out)
 }
 

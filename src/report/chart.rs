@@ -12,25 +12,9 @@ use super::table::{Lines, labelled};
 use super::words::contender;
 use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
-/// Names of the columns of both files; `chart.csv` lacks the first, `chart_rods.csv`
-/// the last.
-const COLUMNS: [&str; 15] = [
-    "rods",
-    "method",
-    "knob",
-    "seconds",
-    "seconds_min",
-    "seconds_q1",
-    "seconds_q3",
-    "runs",
-    "steps",
-    "factorizations",
-    "force_evaluations",
-    "true_error",
-    "error_estimate",
-    "outcome",
-    "pareto",
-];
+/// Names of the columns that both files have.
+const COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
+    factorizations,force_evaluations,true_error,error_estimate,outcome";
 
 impl Reported for Chart {
     fn heading(&self) -> String {
@@ -227,13 +211,13 @@ pub fn chart_table(chart: &Chart, out: &mut dyn Write) -> io::Result<()> {
         row["method"] = row["program"].take();
         row
     });
-    write_columns(&COLUMNS[1..], rows.chain(peers), out)
+    write_columns(&format!("{COLUMNS},pareto"), rows.chain(peers), out)
 }
 
 /// `chart_rods.csv`: one row per leaf and contender.
 pub fn scaling_table(scaling: &Scaling, out: &mut dyn Write) -> io::Result<()> {
-    let columns = &COLUMNS[..COLUMNS.len() - 1];
-    write_columns(columns, scaling.rows.iter().map(object), out)
+    let rows = scaling.rows.iter().map(object);
+    write_columns(&format!("rods,{COLUMNS}"), rows, out)
 }
 
 fn object(row: &impl Serialize) -> Value {
@@ -242,25 +226,25 @@ fn object(row: &impl Serialize) -> Value {
 
 /// Writes these columns; missing values, and numbers that are not finite, are empty cells.
 fn write_columns(
-    columns: &[&str],
+    columns: &str,
     rows: impl Iterator<Item = Value>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let mut table = csv::Writer::from_writer(out);
-    table.write_record(columns)?;
+    table.write_record(columns.split(','))?;
     for row in rows {
-        let cell = |column: &&str| match &row[*column] {
+        let cell = |column: &str| match &row[column] {
             Value::String(text) => text.clone(),
             Value::Bool(yes) => yes.to_string(),
             Value::Number(count) if count.is_u64() => match row["seconds"].is_null() {
                 // Nothing was measured.
-                true if *column == "runs" => String::new(),
+                true if column == "runs" => String::new(),
                 _ => count.to_string(),
             },
             Value::Number(number) => format!("{:e}", number.as_f64().unwrap_or(f64::NAN)),
             _ => String::new(),
         };
-        table.write_record(columns.iter().map(cell))?;
+        table.write_record(columns.split(',').map(cell))?;
     }
     table.flush()
 }

@@ -85,11 +85,10 @@ pub struct Refused {
 }
 
 impl Refused {
-    /// For a refused request, or a file that could not be written.
-    pub fn new(error: &str) -> Self {
+    pub fn new(error: &str, exit_status: i32) -> Self {
         Refused {
             error: printable(error).into(),
-            exit_status: 2,
+            exit_status,
         }
     }
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Reported;
 use super::numbers::{brief, power_of_ten, seconds, short, veins_of};
-use super::table::{Lines, csv_without_header, labelled};
+use super::table::{Lines, csv_without_header, header, labelled};
 use super::words::{branch_end, stable_or_index};
 use crate::scenario::Units;
 use crate::study::{
@@ -16,27 +16,11 @@ use crate::study::{
 
 /// `value` is that of the varied number. Branches and points are numbered from 1. The tip is
 /// the joint one, or the first rod's.
-const COLUMNS: [&str; 16] = [
-    "branch",
-    "point",
-    "kind",
-    "value",
-    "value_error",
-    "tip_x",
-    "tip_y",
-    "tip_z",
-    "error",
-    "energy",
-    "negative_eigenvalues",
-    "stable",
-    "multiplicity",
-    "margin_waves",
-    "margin_amplitude",
-    "twist",
-];
+const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
+    negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
 
 /// Further columns if tips are held: the force on their holder.
-const REACTION: [&str; 3] = ["reaction_x", "reaction_y", "reaction_z"];
+const REACTION: &str = ",reaction_x,reaction_y,reaction_z";
 
 impl Reported for Trace {
     fn heading(&self) -> String {
@@ -157,9 +141,9 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
 
 /// `trace.csv`: one row per branch and point.
 pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+    let (reaction, more) = if trace.held { (REACTION, 3) } else { ("", 0) };
+    out.write_all(&header(&[COLUMNS, reaction].concat()))?;
     let mut table = csv_without_header(out);
-    let more = if trace.held { REACTION.len() } else { 0 };
-    table.serialize((COLUMNS, &REACTION[..more]))?;
     for (number, branch) in trace.branches.iter().enumerate() {
         for point in &branch.points {
             let reaction = point.reaction.unwrap_or_default().to_array();
@@ -291,14 +275,12 @@ fn place_in_plane(boundary: &Boundary, point: &BoundaryPoint) -> String {
 
 /// `boundary.csv`: one row per curve and point, with columns named by the keys.
 pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()> {
+    let [first, second] = &boundary.keys;
+    let errors = "error_1,error_2,tip_x,tip_y,tip_z,error,index_before,index_behind";
+    out.write_all(&header(&format!(
+        "curve,point,kind,{first},{second},{errors}"
+    )))?;
     let mut table = csv_without_header(out);
-    let keys = boundary.keys.each_ref().map(ToString::to_string);
-    table.serialize((
-        ["curve", "point", "kind"],
-        keys,
-        ["error_1", "error_2", "tip_x", "tip_y", "tip_z", "error"],
-        ["index_before", "index_behind"],
-    ))?;
     for (number, curve) in boundary.curves.iter().enumerate() {
         for point in &curve.points {
             // The joint tip, or the first rod's; adding zero turns -0 into 0.

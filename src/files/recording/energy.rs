@@ -13,36 +13,16 @@ pub const FILE_NAME: &str = "energy.csv";
 /// Approximate bytes of a row.
 pub const BYTES: u64 = 200;
 
-pub const COLUMNS: [&str; 11] = [
-    "time",
-    "steps",
-    "kinetic",
-    "elastic",
-    "coupling",
-    "potential",
-    "dissipated",
-    "work",
-    "tip_x",
-    "tip_y",
-    "tip_z",
-];
+pub const COLUMNS: &str =
+    "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z";
 
 /// Cells of a row: the time, the steps, the energies and the tip.
 type Row = (f64, usize, [f64; 6], [f64; 3]);
 
 /// Appends a row.
 pub fn write(moment: &Moment, out: &mut Vec<u8>) -> io::Result<()> {
-    let e = &moment.energy;
-    let energies = [
-        e.kinetic,
-        e.elastic,
-        e.coupling,
-        e.potential,
-        e.dissipated,
-        e.work,
-    ];
-    let row: Row = (moment.time, moment.steps, energies, moment.tip.to_array());
-    append_csv([row], out)
+    let tip = moment.tip.to_array();
+    append_csv([(moment.time, moment.steps, moment.energy, tip)], out)
 }
 
 /// Reads all rows, exactly as they were written.

@@ -92,7 +92,7 @@ impl Recording {
             let form = recording.form;
             let start = form.start(recording.size, outputs(simulation));
             let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
-            let start = header(&energy::COLUMNS);
+            let start = header(energy::COLUMNS);
             let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
             recording.growing = Some([motion, energy]);
         }

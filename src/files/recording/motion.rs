@@ -12,10 +12,7 @@ const MOST_ROWS: usize = 200_000;
 
 /// Columns of the CSV file. Velocities and angular velocities are along the lab
 /// axes.
-const COLUMNS: [&str; 16] = [
-    "time", "rod", "sigma", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy",
-    "wz",
-];
+const COLUMNS: &str = "time,rod,sigma,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 
 /// Numbers per node of a NumPy array: the columns from `x` on.
 const NUMBERS: usize = 13;
@@ -74,7 +71,7 @@ impl Form {
     /// Bytes of an output, in a table approximately.
     pub fn bytes(self, size: Size) -> u64 {
         let row = match self {
-            Form::Table => COLUMNS.len() * DIGITS,
+            Form::Table => COLUMNS.split(',').count() * DIGITS,
             Form::Array => NUMBERS * size_of::<f64>(),
         };
         (size.rows() as u64).saturating_mul(row as u64)
@@ -83,7 +80,7 @@ impl Form {
     /// The header of a file with this number of outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
-            Form::Table => header(&COLUMNS),
+            Form::Table => header(COLUMNS),
             Form::Array => npy_header(size, outputs),
         }
     }
