@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
 
 use crate::files;
@@ -13,7 +12,7 @@ use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use super::progress::fraction_of;
 use super::relax::possible_value;
-use super::request::{Delivered, Job, Request, VerbTraits};
+use super::request::{Delivered, Job, Request, VerbTraits, words};
 use super::{Refusal, Status};
 
 /// Measure every method over its own accuracy, and chart time against true error.
@@ -31,7 +30,7 @@ pub struct Chart {
     seconds: f64,
 
     /// Chart these methods only
-    #[arg(long, value_name = "LIST", value_parser = contender_parser(), value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_parser = words::<Contender>(Contender::ALL.map(|it| possible_value(it.word(), it.method))), value_delimiter = ',')]
     methods: Vec<Contender>,
 
     /// Measurements of other programs, as benches/peers writes them; may repeat
@@ -41,12 +40,6 @@ pub struct Chart {
     /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     rods: Vec<usize>,
-}
-
-/// Parses the names of contenders; those of earlier releases are hidden aliases.
-fn contender_parser() -> impl TypedValueParser<Value = Contender> {
-    let words = Contender::ALL.map(|it| possible_value(it.word(), it.method));
-    PossibleValuesParser::new(words).try_map(|word| word.parse::<Contender>())
 }
 
 impl Chart {

@@ -10,13 +10,12 @@ use crate::scenario::Scenario;
 use crate::study::Base;
 
 use super::progress::ProgressLine;
+use super::request::Request;
 use super::{Refusal, Status, note};
 
 /// One scenario of a request, and where its files go.
 pub struct Job<'r> {
-    pub(super) overrides: &'r [String],
-    /// Whether the output is JSON.
-    pub(super) json: bool,
+    pub(super) request: &'r Request,
     pub scenario: Scenario,
     pub(super) base: Option<Base>,
     pub folder: PathBuf,
@@ -24,8 +23,6 @@ pub struct Job<'r> {
     pub(super) text: String,
     pub(super) file: String,
     pub(super) source: String,
-    /// Whether it is the only one.
-    pub(super) single: bool,
     /// Whether several run in parallel.
     pub(super) parallel: bool,
 }
@@ -53,7 +50,7 @@ impl Job<'_> {
 
     /// The scenario with one more entry overridden.
     pub fn with(&self, entry: &str) -> Result<Scenario, Refusal> {
-        let overrides = [self.overrides, &[entry.into()]].concat();
+        let overrides = [self.request.overrides.as_slice(), &[entry.into()]].concat();
         Ok(Scenario::from_toml_with(
             &self.text, &self.file, &overrides,
         )?)
@@ -69,7 +66,7 @@ impl Job<'_> {
 
     /// Prints a remark on the result to standard error if the output is JSON.
     pub fn remark(&self, remark: Option<impl Display>) {
-        if let (true, Some(remark)) = (self.json, remark) {
+        if let (true, Some(remark)) = (self.request.json, remark) {
             note(&format!("{}: {remark}", self.scenario.name));
         }
     }
@@ -113,12 +110,12 @@ impl Job<'_> {
         let error = written.try_for_each(|list| list.map(|list| files.extend(list)));
         let error = error.err().map(|error| error.to_string());
         let mut json = Vec::new();
-        if self.json || !self.single {
+        if self.request.json || !self.request.single() {
             let mut document = self.document(result);
-            document.refused = error.as_deref().map(Refused::new);
+            document.refused = error.as_deref().map(|error| Refused::new(error, 2));
             json::write(&document, &mut json)?;
         }
-        let report = match self.json {
+        let report = match self.request.json {
             true => String::new(),
             false => report.report(files),
         };

@@ -23,9 +23,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use clap::{Parser, Subcommand};
 
-use crate::files;
-use crate::files::Checkpointer;
-use crate::report::{FileError, Refused, json};
+use crate::files::{self, Checkpointer};
+use crate::report::{FileError, Refused, json, numbers::brief};
 use crate::scenario::printable;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
@@ -110,35 +109,31 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
         Err(error) if error.use_stderr() => {
             let message = error.render().to_string() + suggestion(&error);
             let message = message.trim_start_matches("error: ").trim_end();
-            return fail(message, Status::Refused, json) as u8;
+            return refuse(message, json) as u8;
         }
         // Help, or the version.
         Err(help) => help.exit(),
     };
     let interrupted = stop_at_once_on_interrupt();
     let status = interrupted.and_then(|()| command_line.run());
-    status.unwrap_or_else(|refusal| fail(&refusal.to_string(), Status::Refused, json)) as u8
+    status.unwrap_or_else(|refusal| refuse(&refusal.to_string(), json)) as u8
 }
 
 /// Whether standard output is JSON.
 static JSON: AtomicBool = AtomicBool::new(false);
 
 /// Reports an error on standard error and, with `json`, as JSON on standard output.
-fn fail(error: &str, status: Status, json: bool) -> Status {
+fn refuse(error: &str, json: bool) -> Status {
     note(&format!("error: {error}"));
     if json {
-        show_refused(error, status as i32);
+        show_refused(error, Status::Refused as i32);
     }
-    status
+    Status::Refused
 }
 
 fn show_refused(error: &str, exit_status: i32) {
     let mut bytes = Vec::new();
-    let refused = Refused {
-        exit_status,
-        ..Refused::new(error)
-    };
-    if json::write(&refused, &mut bytes).is_ok() {
+    if json::write(&Refused::new(error, exit_status), &mut bytes).is_ok() {
         // A failure to report the error cannot be reported.
         let _ = show(&bytes);
     }
@@ -202,8 +197,8 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
             // Clears the progress line.
             let _ = write!(io::stderr(), "\r\x1b[2K");
         }
-        let status = match kept.map(|kept| show_checkpoint(&kept)) {
-            Some(Status::Refused) => Status::Refused as i32,
+        let status = match kept {
+            Some(kept) if !show_checkpoint(&kept) => Status::Refused as i32,
             _ => INTERRUPTED,
         };
         if JSON.load(Ordering::Relaxed) {
@@ -224,19 +219,13 @@ fn checkpointer() -> MutexGuard<'static, Option<Checkpointer>> {
     CHECKPOINTER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reports the time of a checkpoint, or why it could not be written.
-fn show_checkpoint(kept: &Result<f64, FileError>) -> Status {
-    match kept {
-        Ok(time) => {
-            let time = crate::report::numbers::brief(*time);
-            note(&format!("stopped at t = {time}; go on with --resume"));
-            Status::Success
-        }
-        Err(error) => {
-            note(&format!("error: {error}"));
-            Status::Refused
-        }
-    }
+/// Reports the time of a checkpoint, or why it could not be written; returns whether it was.
+fn show_checkpoint(kept: &Result<f64, FileError>) -> bool {
+    note(&match kept {
+        Ok(time) => format!("stopped at t = {}; go on with --resume", brief(*time)),
+        Err(error) => format!("error: {error}"),
+    });
+    kept.is_ok()
 }
 
 /// Prints a line to standard error; failures are ignored.

@@ -1,14 +1,14 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::PossibleValue;
 
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
 use crate::report::numbers::brief;
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
 use super::progress::{ProgressLine, fraction_of};
-use super::request::{Delivered, Job, Request, VerbTraits};
+use super::request::{Delivered, Job, Request, VerbTraits, words};
 use super::{Refusal, Status};
 
 /// Eigenvalues that are reported by default.
@@ -24,7 +24,7 @@ pub struct Relax {
     request: Request,
 
     /// How the leaf is brought to rest
-    #[arg(long, value_name = "NAME", value_parser = method_parser(), default_value_t)]
+    #[arg(long, value_name = "NAME", value_parser = words::<Method>(Method::ALL.map(|it| possible_value(it.word(), it))), default_value_t)]
     method: Method,
 
     /// One fixed grid of N segments a rod, without extrapolation; left out: as fine as the tolerance needs
@@ -65,13 +65,7 @@ pub struct Relax {
     full_model: bool,
 }
 
-/// Parses the names of methods; those of earlier releases are hidden aliases.
-fn method_parser() -> impl TypedValueParser<Value = Method> {
-    let words = Method::ALL.map(|method| possible_value(method.word(), method));
-    PossibleValuesParser::new(words).try_map(|word| word.parse::<Method>())
-}
-
-/// The name of a method, with its alias from earlier releases.
+/// The name of a method, with its alias from earlier releases, which is hidden.
 pub fn possible_value(word: &'static str, method: Method) -> PossibleValue {
     let value = PossibleValue::new(word);
     match method {

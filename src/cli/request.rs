@@ -4,8 +4,11 @@
 use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
@@ -15,10 +18,11 @@ use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
+use crate::words::UnknownWord;
 
 pub use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of, time_left};
-use super::{Refusal, Status, fail, name_options, note, show, show_report};
+use super::{Refusal, Status, name_options, note, refuse, show, show_report};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -33,7 +37,7 @@ pub struct Request {
 
     /// Override one entry of the scenario, as in --set load.gravity=[0,0,-0.5]; may repeat
     #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
+    pub overrides: Vec<String>,
 
     /// Where files go [default: out/<name of the scenario>]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -79,6 +83,14 @@ fn kinds(list: &str) -> Result<Kinds, String> {
         .map(Kinds)
 }
 
+/// Parses one of these words.
+pub fn words<T>(words: impl IntoIterator<Item = PossibleValue>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = UnknownWord> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
+}
+
 /// How a verb treats its scenarios.
 #[derive(Clone, Copy, Default)]
 pub struct VerbTraits<'f> {
@@ -109,7 +121,7 @@ impl Request {
             self.show(&done)?;
             return match done.error {
                 // The JSON output includes it.
-                Some(error) => Ok(fail(&error, Status::Refused, false)),
+                Some(error) => Ok(refuse(&error, false)),
                 None => Ok(done.status),
             };
         }
@@ -123,8 +135,7 @@ impl Request {
                 return Err(format!("{other} and {file} are both named {name}: {why}").into());
             }
         }
-        let mut line = ProgressLine::new("scenarios");
-        let line = std::sync::Mutex::new(&mut line);
+        let line = Mutex::new(ProgressLine::new("scenarios"));
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
             let done = job.and_then(|job| run(&job));
@@ -154,8 +165,7 @@ impl Request {
     ) -> Result<(), Refusal> {
         let from_input = self.scenarios.iter().filter(|path| path.as_os_str() == "-");
         if from_input.count() > 1 {
-            let why = "standard input can be read only once: name one - and files";
-            return Err(why.into());
+            return Err("standard input can be read only once: name one - and files".into());
         }
         if self.scenarios.len() > 1 && selection.kinds.contains(&Kind::Csv) {
             let (folder, name) = self.table::<R>();
@@ -199,7 +209,7 @@ impl Request {
                 }
                 Err(error) => {
                     let mut json = Vec::new();
-                    json::write(&Refused::new(&error), &mut json)?;
+                    json::write(&Refused::new(&error, 2), &mut json)?;
                     (Status::Refused, Some(error), json)
                 }
             };
@@ -272,9 +282,8 @@ impl Request {
             let rods = scenario.rods.len();
             memory::Request::Stations { rods, stations }.weigh()?;
         }
-        let single = self.scenarios.len() == 1;
         let folder = match &self.out {
-            Some(out) if single => out.clone(),
+            Some(out) if self.single() => out.clone(),
             out => {
                 let out = out.as_deref().unwrap_or(Path::new("out"));
                 out.join(folder_name(&scenario.name))
@@ -288,7 +297,7 @@ impl Request {
             files::check_writable(&folder)?;
             files::check_inputs(&folder, &R::replaced(&selection.kinds), self.inputs(traits))?;
             let owner = files::owner(&source, &text);
-            if self.out.is_none() || !single {
+            if self.out.is_none() || !self.single() {
                 files::check_owner(&folder, &owner)?;
             }
             // JSON files do not hold the text of standard input.
@@ -296,8 +305,7 @@ impl Request {
             files::claim_folder(&folder, &owner, self.out.is_none() && unnamed)?;
         }
         Ok(Job {
-            overrides: &self.overrides,
-            json: self.json,
+            request: self,
             scenario,
             base,
             folder,
@@ -305,9 +313,13 @@ impl Request {
             text,
             file,
             source,
-            single,
-            parallel: traits.parallel && !single,
+            parallel: traits.parallel && !self.single(),
         })
+    }
+
+    /// Whether it is about one scenario only.
+    pub fn single(&self) -> bool {
+        self.scenarios.len() == 1
     }
 
     fn show(&self, done: &Delivered) -> Result<(), Refusal> {

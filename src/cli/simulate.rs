@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
 use crate::memory;
@@ -11,7 +10,7 @@ use crate::report::{FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
 use super::progress::{self, ProgressLine, fraction_between};
-use super::request::{Delivered, Job, Request, VerbTraits};
+use super::request::{Delivered, Job, Request, VerbTraits, words};
 use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
 /// Longer simulations, in seconds, are announced with their expected duration.
@@ -31,7 +30,7 @@ pub struct Simulate {
     request: Request,
 
     /// How the leaf is moved; left out: explicit, unless a rod is rigid
-    #[arg(long, value_name = "NAME", value_parser = method_parser())]
+    #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(|it| it.word().into())))]
     method: Option<Scheme>,
 
     /// N segments a rod; left out: 16, or as many as the rest shape needs
@@ -45,11 +44,6 @@ pub struct Simulate {
     /// Go on where the same run was stopped by Ctrl-C
     #[arg(long)]
     resume: bool,
-}
-
-/// Parses the names of methods.
-fn method_parser() -> impl TypedValueParser<Value = Scheme> {
-    PossibleValuesParser::new(Scheme::ALL.map(Scheme::word)).try_map(|word| word.parse::<Scheme>())
 }
 
 impl Simulate {
