@@ -1,15 +1,7 @@
 //! Two axes around a panel: grid, frame, ticks and names, with curves and markers
 //! inside. Every panel of numbers is drawn with them.
 
-use glam::DVec2;
-
-use super::axis::{Axis, Direction, Tick};
-use super::drawing::{
-    Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle,
-};
-use super::font::Font;
-use super::markers::Marker;
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE, title};
+use super::kit::*;
 
 const TICK: f64 = 4.0;
 const DIVISION: f64 = 2.0;

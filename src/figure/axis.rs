@@ -1,10 +1,9 @@
 //! An axis: maps values to fractions of its length, and places round ticks.
 
-use super::font::Font;
-use super::page::TICK_SIZE;
-use super::round::{multiples, round_step};
-use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 use std::ops::{Range, RangeInclusive};
+
+use super::kit::*;
+use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 
 /// Padding at both ends: as a fraction of a linear extent, and in decades.
 const PADDING: f64 = 0.06;

@@ -1,20 +1,10 @@
 //! The boundary of stability: curves in the plane of two numbers, with the index on both
 //! sides, and leaves from either side.
 
-use glam::DVec3;
 use std::collections::BTreeSet;
 
-use super::axes::Axes;
-use super::axis::Axis;
-use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
-use super::labels::{Labels, write_indices};
+use super::kit::*;
 use super::map::{DARKEST_INDEX, fill_index, name};
-use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
-use super::round::round_step;
-use super::setting::Setting;
-use super::small::SmallPanels;
-use super::veins::{Veins, length};
 use crate::branch::Kind;
 use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
 use crate::report::sides;

@@ -1,11 +1,8 @@
 //! Speed against accuracy: error against time, and time against the number of
 //! veins, for every method of relaxation.
 
-use super::axis::{Axis, Ticks};
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
-use super::drawing::{BLUE, Color, Drawing, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
-use super::markers::Marker;
-use super::page::{HEADER, LEFT, new_page};
+use super::kit::*;
 use crate::relax::Method;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;

@@ -1,13 +1,6 @@
 //! The panel of a chart: one line per series, with failures in lanes above.
 
-use glam::DVec2;
-
-use super::axes::Axes;
-use super::axis::Axis;
-use super::drawing::{Anchor, Color, Drawing, INK, NOTE, SHADOW, Stroke, circle, rectangle};
-use super::font::Font;
-use super::markers::Marker;
-use super::page::{Cell, Key, PANEL_AXIS, TICK_SIZE};
+use super::kit::*;
 
 const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.

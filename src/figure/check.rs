@@ -1,20 +1,8 @@
 //! The figure of a check: the relaxed leaf as lines, the boundary-value
 //! solution as dots, and their differences along the veins.
 
-use glam::DVec2;
-
-use super::axes::{Axes, Curve};
-use super::axis::{Axis, Ticks};
-use super::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
-use super::font::Font;
-use super::markers::{Marker, dot};
-use super::page::{
-    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH,
-    header, title,
-};
+use super::kit::*;
 use super::panels::Panels;
-use super::setting::Setting;
-use super::veins::Veins;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{equilibrium_of_index, headline, verdict};
 use crate::scenario::Scenario;

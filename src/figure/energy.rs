@@ -1,10 +1,6 @@
 //! The energies of a moving leaf and the position of its tip over time.
 
-use super::axes::{Axes, Curve};
-use super::axis::Axis;
-use super::drawing::{CURVES, Drawing, INK, Stroke};
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page};
-use super::setting::with_unit;
+use super::kit::*;
 use crate::motion::Energy;
 use crate::report::numbers::short;
 use crate::scenario::{Scenario, Units};

@@ -3,16 +3,11 @@
 use std::collections::HashMap;
 use std::io::{self, Write};
 
-use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use tiny_skia::Pixmap;
 
-use super::drawing::{Anchor, Color, DOT, Drawing, INK, NOTE, WHITE, vein_color};
-use super::page::{Cell, TEXT_SIZE};
+use super::kit::*;
 use super::png::paint;
-use super::setting::Setting;
-use super::space::{Margins, Scene, View, common_box};
-use super::veins::Veins;
 use crate::report::numbers::short;
 use crate::scenario::Scenario;
 use crate::simulate::{Record, Still};

@@ -1,14 +1,7 @@
 //! A moving leaf at several instants.
 
-use glam::DVec3;
-
-use super::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
 use super::energy::notes;
-use super::page::{HEADER, KeyRows, NOTE_BASE, letters, new_page};
-use super::setting::Setting;
-use super::small::{SIDE, SmallPanels};
-use super::space::{Scene, View};
-use super::veins::{Veins, is_drawable};
+use super::kit::*;
 use crate::report::numbers::short;
 use crate::scenario::Scenario;
 use crate::simulate::Record;

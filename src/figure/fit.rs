@@ -1,15 +1,7 @@
 //! A fit: results of experiments with the model and its confidence band, measured points
 //! over the veins, and the residuals of all data.
 
-use glam::{DVec2, DVec3};
-
-use super::axes::Axes;
-use super::axis::{Axis, Ticks};
-use super::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
-use super::markers::Marker;
-use super::page::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page,
-};
+use super::kit::*;
 use crate::report::numbers::{brief, power_of_ten};
 use crate::study::{Fit, FitLeaf, FitResidual};
 

@@ -1,12 +1,7 @@
 //! Labels where they cover neither curves nor each other: next to points of a panel, and, of
 //! a boundary, the index on both sides of its curves.
 
-use glam::DVec2;
-
-use super::axes::Axes;
-use super::drawing::{Anchor, Color, Drawing, INK, NOTE};
-use super::font::Font;
-use super::page::{Cell, TICK_SIZE};
+use super::kit::*;
 use crate::report::is_special;
 use crate::study::{Boundary, BoundaryCurve};
 

@@ -1,15 +1,7 @@
 //! A leaf at rest, all equilibria of a leaf, and how far its tip moves when a number changes.
 
-use glam::DVec2;
-
-use super::axes::Axes;
-use super::axis::{Axis, Ticks};
-use super::drawing::{Anchor, BLUE, Drawing, INK, rectangle};
-use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page};
+use super::kit::*;
 use super::panels::Panels;
-use super::setting::Setting;
-use super::small::{SIDE, SmallPanels};
-use super::veins::Veins;
 use crate::relax::{Equilibrium, Sensitivity};
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, stable_or_index, verdict};

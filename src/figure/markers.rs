@@ -1,13 +1,7 @@
 //! Markers of points in a panel, of the clamp and the tips of a leaf, of points of a second
 //! solution, and of the direction of gravity.
 
-use glam::{DVec2, DVec3};
-
-use super::drawing::{
-    Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, rectangle,
-};
-use super::page::{Cell, TICK_SIZE};
-use super::veins::Veins;
+use super::kit::*;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {

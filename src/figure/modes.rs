@@ -1,13 +1,6 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
-use glam::DVec3;
-
-use super::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
-use super::page::new_page;
-use super::setting::Setting;
-use super::small::{SIDE, SmallPanels};
-use super::space::{Scene, View};
-use super::veins::{Veins, tips};
+use super::kit::*;
 use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
 use crate::report::words::verdict;

@@ -1,10 +1,6 @@
 //! Page layout: sizes, cells and titles of panels, the header, and keys.
 
-use super::drawing::{Anchor, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color};
-use super::font::Font;
-use super::markers::{Marker, clamp_marker, tip_marker};
-use super::veins::Veins;
-use glam::DVec2;
+use super::kit::*;
 
 pub const WIDTH: f64 = 900.0;
 pub const LEFT: f64 = 64.0;

@@ -4,16 +4,7 @@
 //! the side view below the top view with the same xi axis, the front view to the
 //! right of the side view with the same zeta axis.
 
-use glam::{DVec2, DVec3};
-
-use super::axes::Axes;
-use super::axis::Axis;
-use super::drawing::{Drawing, Stroke};
-use super::markers::{draw_gravity, leaf_markers};
-use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
-use super::setting::Setting;
-use super::space::{Margins, Scene, View, surrounding_box};
-use super::veins::{Vein, Veins};
+use super::kit::*;
 
 const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.

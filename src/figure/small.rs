@@ -1,13 +1,6 @@
 //! Several leaves in small panels, seen by one camera, to one scale.
 
-use glam::{DVec2, DVec3};
-
-use super::drawing::{Color, Drawing, NOTE};
-use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
-use super::round::round_step;
-use super::setting::Setting;
-use super::space::{Camera, Margins, Scene, View, common_box};
-use super::veins::Veins;
+use super::kit::*;
 
 const COLUMNS: usize = 4;
 /// Margin to the left and right of the panels.

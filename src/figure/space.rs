@@ -1,16 +1,7 @@
 //! The panel in space: a parallel projection of the leaf in a box, with its shadow
 //! on the floor.
 
-use glam::{DVec2, DVec3};
-
-use super::drawing::{
-    Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
-};
-use super::markers::{draw_gravity, leaf_markers};
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
-use super::round::{multiples, round_step};
-use super::setting::Setting;
-use super::veins::{Piece, Vein, Veins};
+use super::kit::*;
 
 /// The direction from which the box is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,17 +1,7 @@
 //! Branches of equilibria: a coordinate of the tip against the number that
 //! varies, and the leaf at some of the points.
 
-use glam::DVec3;
-
-use super::axes::Axes;
-use super::axis::Axis;
-use super::drawing::{CURVES, Drawing, INK, Stroke};
-use super::labels::Labels;
-use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page};
-use super::setting::{Setting, with_unit};
-use super::small::SmallPanels;
-use super::veins::{Veins, length};
+use super::kit::*;
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};

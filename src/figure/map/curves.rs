@@ -1,15 +1,8 @@
 //! Results of one method along one axis, as curves below its strip of outcomes: the tip
 //! and the energy or, where waves are shown, the waves and the twist.
 
-use glam::DVec2;
-
 use super::panel::Varied;
-use crate::figure::axes::Axes;
-use crate::figure::axis::Axis;
-use crate::figure::drawing::{CURVES, Color, Drawing, Stroke};
-use crate::figure::markers::Marker;
-use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE};
-use crate::figure::setting::with_unit;
+use crate::figure::kit::*;
 use crate::study::{Map, MapRow, MapShow};
 
 /// Smaller variations are rounding.

@@ -4,13 +4,7 @@
 mod curves;
 mod panel;
 
-use glam::DVec2;
-
-use super::drawing::{Anchor, Drawing, INK, NOTE};
-use super::font::Font;
-use super::page::{
-    Cell, KeyRows, LEFT, NOTE_BASE, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, WIDTH, header,
-};
+use super::kit::*;
 use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 pub use panel::{DARKEST_INDEX, fill_index, name};
