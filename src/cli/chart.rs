@@ -7,7 +7,6 @@ use clap::{Args, ValueHint};
 use crate::files;
 use crate::relax;
 use crate::report::words::contender;
-use crate::scenario::Scenario;
 use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use super::progress::fraction_of;
@@ -57,7 +56,11 @@ impl Chart {
             let why = "a chart runs over all tolerances; it is that of --rods";
             return Err(format!("--tolerance: {why}").into());
         }
-        let leaves = self.leaves(job)?;
+        let leaves = self
+            .rods
+            .iter()
+            .map(|rods| job.with(&format!("leaf.rods={rods}")));
+        let leaves = leaves.collect::<Result<Vec<_>, _>>()?;
         let mut options = ChartOptions {
             seconds: self.seconds,
             ..ChartOptions::default()
@@ -103,12 +106,5 @@ impl Chart {
         let scaling = chart.scaling.iter().map(|scaling| job.write(scaling));
         let written = [job.write(&chart)].into_iter().chain(scaling);
         job.deliver_written(&chart, success, &chart, written)
-    }
-
-    /// The leaves of `--rods`.
-    fn leaves(&self, job: &Job) -> Result<Vec<Scenario>, Refusal> {
-        let rods = self.rods.iter();
-        rods.map(|rods| job.with(&format!("leaf.rods={rods}")))
-            .collect()
     }
 }

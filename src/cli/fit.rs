@@ -1,10 +1,11 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
 use crate::limit::Limit;
+use crate::scenario::text;
 use crate::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
 
 use super::progress::fraction_of;
@@ -58,10 +59,10 @@ impl Fit {
         let mut data = Data::default();
         let rods = base.scenario().rods.len();
         for file in &self.data {
-            data.read(&read(file)?, &file.display().to_string(), rods)?;
+            data.read(&text(file)?, &file.display().to_string(), rods)?;
         }
         let candidates = match &self.candidates {
-            Some(file) => FitRequest::read_candidates(&read(file)?, &file.display().to_string())?,
+            Some(file) => FitRequest::read_candidates(&text(file)?, &file.display().to_string())?,
             None => Vec::new(),
         };
         let request = FitRequest {
@@ -92,8 +93,4 @@ impl Fit {
         job.remark(fit.remarks.first());
         job.deliver(&fit, fit.is_success())
     }
-}
-
-fn read(file: &Path) -> Result<String, Refusal> {
-    Ok(crate::scenario::text(file)?)
 }

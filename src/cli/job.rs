@@ -58,10 +58,7 @@ impl Job<'_> {
 
     /// Its progress line; hidden if scenarios run in parallel, which share one.
     pub fn progress(&self) -> ProgressLine {
-        match self.parallel {
-            true => ProgressLine::hidden(),
-            false => ProgressLine::new(&self.scenario.name),
-        }
+        ProgressLine::new(&self.scenario.name, !self.parallel)
     }
 
     /// Prints a remark on the result to standard error if the output is JSON.

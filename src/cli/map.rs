@@ -135,23 +135,24 @@ impl Map {
         };
         let written = match self.shard {
             None => job.write(&map),
-            Some(shard) if keeps_rows => {
-                let name = shard.file_name();
-                files::write_rows(folder, &name, &map.request, &map.rows)?;
-                Ok(vec![folder.join(name).display().to_string()])
+            Some(_) if keeps_rows => {
+                let file = files::write_rows(folder, &self.file_name(), &map.request, &map.rows)?;
+                Ok(vec![file.display().to_string()])
             }
             Some(_) => Ok(Vec::new()),
         };
         job.deliver_written(&map, true, &work, [written])
     }
 
+    /// The file of the rows.
+    fn file_name(&self) -> String {
+        self.shard.map_or("map.csv".into(), Shard::file_name)
+    }
+
     /// The rows that need not be computed: those of the shard or, for a whole map, all
     /// in the folder.
     fn known(&self, folder: &Path, request: &MapRequest) -> Result<Vec<MapRow>, Refusal> {
-        let mut files = match self.shard {
-            Some(shard) => vec![folder.join(shard.file_name())],
-            None => vec![folder.join("map.csv")],
-        };
+        let mut files = vec![folder.join(self.file_name())];
         if self.shard.is_none() {
             files.extend(shards(folder));
         }
@@ -189,11 +190,8 @@ impl Map {
         if todo.is_empty() {
             return Ok(Vec::new());
         }
-        let name = self.shard.map_or("map.csv".into(), Shard::file_name);
-        let mut journal = match keeps_rows {
-            true => Some(Journal::open(&job.folder, &name, request, known)?),
-            false => None,
-        };
+        let open = || Journal::open(&job.folder, &self.file_name(), request, known);
+        let mut journal = keeps_rows.then(open).transpose()?;
         let mut line = job.progress();
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;
@@ -209,10 +207,7 @@ impl Map {
             });
             failed.is_none()
         });
-        match failed {
-            Some(error) => Err(error.into()),
-            None => Ok(rows),
-        }
+        failed.map_or(Ok(rows), |error| Err(error.into()))
     }
 }
 

@@ -6,7 +6,6 @@ mod fit;
 mod help;
 mod job;
 mod map;
-mod new;
 mod progress;
 mod relax;
 mod request;
@@ -44,7 +43,7 @@ enum Verb {
     Map(map::Map),
     Simulate(simulate::Simulate),
     Trace(trace::Trace),
-    New(new::New),
+    New(help::New),
     Schema(help::Schema),
     Completions(help::Completions),
     Man(help::Man),

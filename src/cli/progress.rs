@@ -20,7 +20,7 @@ const MIN_FRACTION: f64 = 1e-3;
 pub struct ProgressLine {
     scenario: String,
     start: Instant,
-    terminal: bool,
+    shown: bool,
     bar: Option<ProgressBar>,
     grids: Grids,
     shooting: Option<Corrections>,
@@ -29,23 +29,16 @@ pub struct ProgressLine {
 }
 
 impl ProgressLine {
-    pub fn new(scenario: &str) -> Self {
+    pub fn new(scenario: &str, shown: bool) -> Self {
         ProgressLine {
             scenario: scenario.into(),
             start: Instant::now(),
-            terminal: io::stderr().is_terminal(),
+            shown: shown && io::stderr().is_terminal(),
             bar: None,
             grids: Grids::default(),
             shooting: None,
             phase_start: Duration::ZERO,
         }
-    }
-
-    /// A line that is never shown.
-    pub fn hidden() -> Self {
-        let mut line = ProgressLine::new("");
-        line.terminal = false;
-        line
     }
 
     /// Shows the progress of a solver that runs to this tolerance.
@@ -84,7 +77,7 @@ impl ProgressLine {
     /// Shows a message made from the elapsed time.
     pub fn show(&mut self, message: impl FnOnce(Duration) -> String) {
         let elapsed = self.start.elapsed();
-        if !self.terminal || elapsed < LONG_RUN {
+        if !self.shown || elapsed < LONG_RUN {
             return;
         }
         let bar = self.bar.get_or_insert_with(|| {

@@ -118,12 +118,13 @@ impl Request {
         let job = |file: &Path| self.open::<R>(file, traits, &selection);
         if let [file] = self.scenarios.as_slice() {
             let done = run(&job(file)?)?;
-            self.show(&done)?;
-            return match done.error {
-                // The JSON output includes it.
-                Some(error) => Ok(refuse(&error, false)),
-                None => Ok(done.status),
-            };
+            match self.json {
+                true => show(&done.json)?,
+                false => show_report(&done.report)?,
+            }
+            // The JSON output includes an error.
+            let refused = done.error.map(|error| refuse(&error, false));
+            return Ok(refused.unwrap_or(done.status));
         }
         // All are checked before the first is solved.
         let jobs: Vec<_> = self.scenarios.iter().map(|file| job(file)).collect();
@@ -135,7 +136,7 @@ impl Request {
                 return Err(format!("{other} and {file} are both named {name}: {why}").into());
             }
         }
-        let line = Mutex::new(ProgressLine::new("scenarios"));
+        let line = Mutex::new(ProgressLine::new("scenarios", true));
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
             let done = job.and_then(|job| run(&job));
@@ -167,7 +168,7 @@ impl Request {
         if from_input.count() > 1 {
             return Err("standard input can be read only once: name one - and files".into());
         }
-        if self.scenarios.len() > 1 && selection.kinds.contains(&Kind::Csv) {
+        if !self.single() && selection.kinds.contains(&Kind::Csv) {
             let (folder, name) = self.table::<R>();
             files::check_inputs(folder, &[&name], self.inputs(traits))?;
             if self.out.is_none() {
@@ -239,9 +240,8 @@ impl Request {
 
     /// The files to write; refused if the verb has no such files.
     fn selection<R: Written>(&self, traits: VerbTraits) -> Result<Selection, Refusal> {
-        let has = R::kinds();
-        let has =
-            |kind: &Kind| has.contains(kind) || self.scenarios.len() > 1 && *kind == Kind::Csv;
+        let has: Vec<Kind> = R::names().map(Kind::of).collect();
+        let has = |kind: &Kind| has.contains(kind) || !self.single() && *kind == Kind::Csv;
         let stations = self.stations.map(|count| count as usize);
         if let (Some(count), false) = (stations, traits.stations) {
             return Err(format!("--stations {count}: the files of this verb have none").into());
@@ -320,13 +320,6 @@ impl Request {
     /// Whether it is about one scenario only.
     pub fn single(&self) -> bool {
         self.scenarios.len() == 1
-    }
-
-    fn show(&self, done: &Delivered) -> Result<(), Refusal> {
-        match self.json {
-            true => show(&done.json),
-            false => show_report(&done.report),
-        }
     }
 }
 

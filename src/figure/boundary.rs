@@ -17,8 +17,6 @@ const DIAGRAM: f64 = 400.0;
 const KEY: f64 = 210.0;
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const VISIBLE: f64 = 0.1;
-/// Most curves that the key names.
-const MOST_NAMED: usize = 7;
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
@@ -32,7 +30,7 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         .collect();
     let diagram = Cell::left_of_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
     let below = diagram.end().y + PANEL_AXIS;
-    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting).below(below);
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
     let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
     drawing.height = panels.end();
@@ -196,15 +194,11 @@ fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) ->
 
 fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
     let mut key = Key::right_of(cell);
-    for (c, curve) in boundary.curves.iter().enumerate().take(MOST_NAMED) {
-        let stroke = Stroke::new(CURVES[c % CURVES.len()], 1.8);
+    let curves = boundary.curves.iter().enumerate().map(|(c, curve)| {
         let what = sides(curve).unwrap_or_else(|| "not verified".into());
-        key.line(page, &format!("curve {}", c + 1), &what, stroke);
-    }
-    if boundary.curves.len() > MOST_NAMED {
-        let more = format!("and {} more", boundary.curves.len() - MOST_NAMED);
-        key.entry(page, "", &more, |_, _| ());
-    }
+        (format!("curve {}", c + 1), what)
+    });
+    key.curves(page, curves);
     if let Some(map) = &boundary.map {
         let found = map.index.iter().flatten().flatten();
         let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();

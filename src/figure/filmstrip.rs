@@ -18,12 +18,9 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: instants of the motion", record.scenario);
     let stills = record.stills.iter();
     let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(record, it)).collect();
-    let panels = SmallPanels::holding(shapes.iter(), shapes.len(), &setting);
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
-    let panels = match has_path {
-        true => panels.below(HEADER + KEY_LINE),
-        false => panels,
-    };
+    let top = if has_path { HEADER + KEY_LINE } else { HEADER };
+    let panels = SmallPanels::holding(shapes.iter(), shapes.len(), &setting, top);
     let mut notes = notes(record);
     let first = shapes.first();
     notes.extend(first.map_or(Vec::new(), |veins| veins.notes(&setting)));

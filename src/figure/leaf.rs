@@ -46,7 +46,7 @@ pub fn draw_all(all: &All, scenario: &Scenario) -> Drawing {
     let shown = &all.found[..all.found.len().min(MOST_EQUILIBRIA)];
     let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));
     let shapes: Vec<Veins> = shapes.collect();
-    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting);
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, HEADER);
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
     let count = all.found.len();
     let mut notes = vec![format!("{count} found from {} starts", all.starts)];

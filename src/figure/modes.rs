@@ -22,7 +22,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     let shapes: Vec<Veins> = shapes.collect();
     // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
-    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting);
+    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting, HEADER);
     let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
     notes.push(match modes.len() {
         count if count > MOST => format!("the lowest {MOST} of {count}"),

@@ -162,6 +162,9 @@ const ROW_ENTRY_GAP: f64 = 20.0;
 const ROW: f64 = 20.0;
 const SAMPLE_HEIGHT: f64 = 12.0;
 
+/// Most of many curves that a key names.
+const MOST_NAMED: usize = 7;
+
 /// The key of a panel: a column of samples with their names.
 pub struct Key {
     /// Left end and middle of the next entry's first line.
@@ -203,6 +206,21 @@ impl Key {
     /// Adds a line.
     pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
         self.entry(page, name, note, |page, cell| cell.line(page, stroke));
+    }
+
+    /// Adds the first of numbered curves with their names and notes.
+    pub fn curves(
+        &mut self,
+        page: &mut Drawing,
+        curves: impl ExactSizeIterator<Item = (String, String)>,
+    ) {
+        let more = curves.len().saturating_sub(MOST_NAMED);
+        for ((name, note), color) in curves.take(MOST_NAMED).zip(CURVES) {
+            self.line(page, &name, &note, Stroke::new(color, 1.8));
+        }
+        if more > 0 {
+            self.entry(page, "", &format!("and {more} more"), |_, _| ());
+        }
     }
 
     /// Adds a line with marked points.

@@ -49,7 +49,8 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
     // White.
     canvas.data_mut().fill(u8::MAX);
     let font = Font::embedded();
-    let place = Transform::from_translate(0.0, -(rows.start as f32)).pre_concat(page_to_pixels());
+    let place = Transform::from_translate(0.0, -(rows.start as f32));
+    let place = place.pre_scale(SCALE as f32, SCALE as f32);
     let [top, bottom] = [rows.start, rows.end].map(|row| f64::from(row) / SCALE);
     for mark in &drawing.marks {
         match mark {
@@ -89,10 +90,6 @@ fn heights(step: Step) -> impl Iterator<Item = f64> + Clone {
         Step::Close => [None; 3],
     };
     heights.into_iter().flatten()
-}
-
-fn page_to_pixels() -> Transform {
-    Transform::from_scale(SCALE as f32, SCALE as f32)
 }
 
 /// The path; `None` if there is nothing to paint, as for a single point.

@@ -32,11 +32,12 @@ pub struct SmallPanels {
 }
 
 impl SmallPanels {
-    /// `count` panels that can hold any of these shapes.
+    /// `count` panels from `top` on that can hold any of these shapes.
     pub fn holding<'a>(
         shapes: impl Iterator<Item = &'a Veins>,
         count: usize,
         setting: &Setting,
+        top: f64,
     ) -> Self {
         let bounds = common_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
@@ -48,7 +49,7 @@ impl SmallPanels {
             step: round_step(setting.scale() * GRID / scale),
             setting: setting.clone(),
             size,
-            top: HEADER,
+            top,
             count,
         }
     }
@@ -56,10 +57,6 @@ impl SmallPanels {
     /// Formats the width of a square of the grid.
     pub fn grid_width(&self) -> String {
         self.setting.format_length(self.step / self.setting.scale())
-    }
-
-    pub fn below(self, top: f64) -> Self {
-        SmallPanels { top, ..self }
     }
 
     pub fn cell(&self, index: usize) -> Cell {

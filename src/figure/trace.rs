@@ -5,7 +5,7 @@ use super::kit::*;
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};
-use crate::scenario::{Scenario, Units};
+use crate::scenario::Scenario;
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
 const DIAGRAM: f64 = 380.0;
@@ -15,9 +15,8 @@ const MORE: f64 = 220.0;
 const KEY: f64 = 190.0;
 const LAW: f64 = 240.0;
 const BETWEEN: f64 = 26.0;
-/// Most leaves drawn, and most branches named.
+/// Most leaves drawn.
 const MOST_LEAVES: usize = 8;
-const MOST_NAMED: usize = 7;
 /// Smaller differences are invisible in small panels: in lengths, and as a fraction of
 /// the largest.
 const VISIBLE: f64 = 0.04;
@@ -65,7 +64,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         });
         below = cell.end().y + PANEL_AXIS;
     }
-    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting).below(below);
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
     drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
@@ -163,34 +162,25 @@ fn most_varying(trace: &Trace) -> TraceShow {
     TraceShow::ALL[first + largest.unwrap_or(2)]
 }
 
-/// A quantity with its unit.
-fn name(quantity: TraceShow, units: &Units) -> String {
-    match quantity {
-        TraceShow::Energy => with_unit("energy", units.energy().as_deref()),
-        TraceShow::Twist => with_unit("mean twist", Some("rad")),
-        TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
-            let force = quantity.word().replace('_', ", ");
-            with_unit(&force, units.force.as_deref())
-        }
-        tip => with_unit(&format!("{tip} of the tip"), units.length.as_deref()),
-    }
-}
-
-/// Its axis, wide enough that rounding is invisible.
+/// The axis of a quantity with its unit, wide enough that rounding is invisible.
 fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
     let points = || trace.branches.iter().flat_map(|branch| &branch.points);
-    let values = points().map(|point| quantity.of(point));
-    let least = match quantity {
-        TraceShow::Twist => ROUNDING,
-        TraceShow::Energy | TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
-            0.0
+    let units = &trace.units;
+    let (name, least) = match quantity {
+        TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
+        TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
+        TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
+            let force = quantity.word().replace('_', ", ");
+            (with_unit(&force, units.force.as_deref()), 0.0)
         }
-        _ => {
+        tip => {
             let curves = points().take(1).flat_map(|point| &point.curves);
-            ROUNDING * curves.map(|curve| length(curve)).fold(0.0, f64::max)
+            let longest = curves.map(|curve| length(curve)).fold(0.0, f64::max);
+            let name = with_unit(&format!("{tip} of the tip"), units.length.as_deref());
+            (name, ROUNDING * longest)
         }
     };
-    Axis::holding(&name(quantity, &trace.units), values).at_least(least)
+    Axis::holding(&name, points().map(|point| quantity.of(point))).at_least(least)
 }
 
 fn tip(point: &TracePoint, axis: usize) -> f64 {
@@ -250,18 +240,14 @@ fn draw_branches(
 /// Draws the key: the branches, and the kinds of points that occur.
 fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     let mut key = Key::right_of(cell);
-    for (b, branch) in trace.branches.iter().enumerate().take(MOST_NAMED) {
+    let branches = trace.branches.iter().enumerate().map(|(b, branch)| {
         let name = match branch.from {
             None => "first branch".into(),
             Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
         };
-        let stroke = Stroke::new(CURVES[b % CURVES.len()], 1.8);
-        key.line(page, &name, branch_end(&branch.end), stroke);
-    }
-    if trace.branches.len() > MOST_NAMED {
-        let more = format!("and {} more", trace.branches.len() - MOST_NAMED);
-        key.entry(page, "", &more, |_, _| ());
-    }
+        (name, branch_end(&branch.end).into())
+    });
+    key.curves(page, branches);
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
     let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
     if critical().any(|point| !folds(point)) {

@@ -74,21 +74,18 @@ pub trait Written: Serialize + Sync + Sized + 'static {
         false
     }
 
-    /// All kinds of its files.
-    fn kinds() -> Vec<Kind> {
-        let names = Self::FORMATS.iter().flat_map(Format::names).copied();
-        let names = Self::JSON.into_iter().chain(names);
-        let names = names.chain(Self::BESIDES.iter().copied());
-        names.map(Kind::of).collect()
+    /// Names of all its files but those of optional parts.
+    fn names() -> impl Iterator<Item = &'static str> {
+        let names = Self::FORMATS.iter().flat_map(Format::names);
+        let names = names.chain(Self::BESIDES).copied();
+        Self::JSON.into_iter().chain(names)
     }
 
     /// Names of the files that are replaced or removed where files of these kinds are written.
     fn replaced(kinds: &[Kind]) -> Vec<&'static str> {
-        let names = Self::FORMATS.iter().flat_map(Format::names);
-        let names = Self::JSON.iter().chain(names).chain(Self::BESIDES);
-        let names = names.filter(|name| kinds.contains(&Kind::of(name)));
+        let names = Self::names().filter(|name| kinds.contains(&Kind::of(name)));
         let more = Self::MORE.iter().flat_map(Format::names);
-        names.chain(more).copied().collect()
+        names.chain(more.copied()).collect()
     }
 
     /// Its files of these kinds but JSON: their names and formats.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::files::{atomic, write_named, write_table};
+use crate::files::{atomic, write_named};
 use crate::report::{Document, FileError, json, lines, table};
 use crate::study::{Map, MapRequest, MapRow};
 
@@ -82,8 +82,7 @@ impl Journal {
         request: &MapRequest,
         known: &[MapRow],
     ) -> Result<Self, FileError> {
-        write_rows(folder, name, request, known)?;
-        let path = folder.join(name);
+        let path = write_rows(folder, name, request, known)?;
         let file = OpenOptions::new().append(true).open(&path);
         let file = file.map_err(|reason| FileError::write(&path, reason))?;
         Ok(Journal { path, file })
@@ -91,7 +90,9 @@ impl Journal {
 
     /// Appends rows with a single write.
     pub fn append(&mut self, request: &MapRequest, rows: &[MapRow]) -> Result<(), FileError> {
-        let written = lines(request, rows).and_then(|bytes| self.file.write_all(&bytes));
+        let mut bytes = Vec::new();
+        let written = lines(request, rows, &mut bytes);
+        let written = written.and_then(|()| self.file.write_all(&bytes));
         written.map_err(|reason| FileError::write(&self.path, reason))
     }
 }
@@ -102,8 +103,7 @@ pub fn write_rows(
     name: &str,
     request: &MapRequest,
     rows: &[MapRow],
-) -> Result<(), FileError> {
-    let file = folder.join(name);
-    let table = table(request, rows).map_err(|reason| FileError::write(&file, reason))?;
-    write_table(folder, name, &table).map(drop)
+) -> Result<PathBuf, FileError> {
+    atomic::make_folder(folder)?;
+    write_named(folder, name, |out| table(request, rows, out))
 }

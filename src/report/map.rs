@@ -9,7 +9,7 @@ use std::path::Path;
 use csv::StringRecord;
 
 use super::numbers::{brief, seconds};
-use super::table::{Lines, csv_without_header, labelled};
+use super::table::{Lines, append_csv, labelled};
 use super::words::map_shows;
 use super::{FileError, Reported};
 use crate::study::{Map, MapOutcome, MapRequest, MapRow};
@@ -105,7 +105,7 @@ fn counts(map: &Map) -> Vec<String> {
 
 /// `map.csv`: one row per cell and method.
 pub fn map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
-    out.write_all(&table(&map.request, &map.rows)?)
+    table(&map.request, &map.rows, out)
 }
 
 fn header(request: &MapRequest) -> StringRecord {
@@ -114,22 +114,15 @@ fn header(request: &MapRequest) -> StringRecord {
 }
 
 /// The header and all rows.
-pub fn table(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
-    let mut table = csv_without_header(Vec::new());
-    table.write_record(&header(request))?;
-    let mut bytes = table.into_inner().map_err(|error| error.into_error())?;
-    bytes.extend(lines(request, rows)?);
-    Ok(bytes)
+pub fn table(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
+    append_csv([header(request).iter().collect::<Vec<_>>()], out)?;
+    lines(request, rows, out)
 }
 
 /// The rows alone, each a whole line.
-pub fn lines(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
-    let mut table = csv_without_header(Vec::new());
-    for row in rows {
-        // The columns of the axes, then those of the row.
-        table.serialize((request.texts(row.cell), row))?;
-    }
-    table.into_inner().map_err(|error| error.into_error())
+pub fn lines(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
+    // The columns of the axes, then those of the row.
+    append_csv(rows.iter().map(|row| (request.texts(row.cell), row)), out)
 }
 
 /// Reads the rows of a file. Header lines may repeat, as in concatenated files. An

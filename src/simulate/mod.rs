@@ -21,14 +21,12 @@
 //! ```
 
 mod error;
-mod frame;
 mod record;
 mod stills;
 
 pub use crate::motion::Stopped;
 pub use error::{MOST_SECONDS, Refused};
-pub use frame::Frame;
-pub use record::{Imbalance, Moment, Record, Still};
+pub use record::{Frame, Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
 
 use std::time::{Duration, Instant};
@@ -265,8 +263,12 @@ impl Simulation {
     /// If the motion is not reliable any more; [`Simulation::frame`] then
     /// returns its present state.
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
-        let clock = Instant::now();
-        let frame = self.advance();
+        let (clock, unit) = (Instant::now(), self.physics.time);
+        let advanced = self.method.advance(self.output_time(self.made + 1));
+        let frame = advanced.map_err(|stopped| stopped.in_unit(unit)).map(|()| {
+            self.made += 1;
+            self.frame()
+        });
         self.moving += clock.elapsed();
         frame
     }
@@ -278,14 +280,6 @@ impl Simulation {
             true => duration,
             false => interval * number as f64,
         }
-    }
-
-    fn advance(&mut self) -> Result<Frame, Stopped> {
-        let until = self.output_time(self.made + 1);
-        let unit = self.physics.time;
-        (self.method.advance(until)).map_err(|stopped| stopped.in_unit(unit))?;
-        self.made += 1;
-        Ok(self.frame())
     }
 
     /// All numbers that determine the further motion, to continue it with identical bits

@@ -287,15 +287,16 @@ impl Recording {
         latest.take();
         drop(latest);
         let file = |name: &str| self.folder.join(name);
-        let other = file(self.form.other().file_name());
         let mut obsolete = vec![
             file(checkpoint::FILE_NAME),
-            kept_path(&file(self.form.file_name())),
-            kept_path(&other),
             kept_path(&file(energy::FILE_NAME)),
         ];
-        if kinds.contains(&Kind::Csv) {
-            obsolete.push(other);
+        for form in [Form::Table, Form::Array] {
+            let motion = file(form.file_name());
+            obsolete.push(kept_path(&motion));
+            if form != self.form && kinds.contains(&Kind::Csv) {
+                obsolete.push(motion);
+            }
         }
         for file in obsolete {
             // It may not exist.

@@ -61,13 +61,6 @@ impl Form {
         }
     }
 
-    pub fn other(self) -> Self {
-        match self {
-            Form::Table => Form::Array,
-            Form::Array => Form::Table,
-        }
-    }
-
     /// Bytes of an output, in a table approximately.
     pub fn bytes(self, size: Size) -> u64 {
         let row = match self {
