@@ -80,7 +80,6 @@ impl ChartPanel {
         lanes
     }
 
-    /// Height of the lanes.
     fn lanes_height(&self) -> f64 {
         match self.lanes().len() {
             0 => 0.0,

@@ -56,15 +56,6 @@ pub fn draw(fit: &Fit) -> Drawing {
     page
 }
 
-/// An axis of whole numbers from 1.
-fn numbers(name: &str, count: usize) -> Axis {
-    let ticks = (1..=count).map(|k| k as f64).collect();
-    Axis {
-        ticks: Ticks::At(ticks),
-        ..Axis::linear(name, 0.5, count as f64 + 0.5)
-    }
-}
-
 fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
     let what = format!("{kind} of the experiments");
@@ -74,7 +65,10 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
     });
     let mut up = Axis::holding(kind, values);
     up.emphasizes_zero = false;
-    let across = numbers("experiment", of.len());
+    let across = Axis {
+        ticks: Ticks::At((1..=of.len()).map(|k| k as f64).collect()),
+        ..Axis::linear("experiment", 0.5, of.len() as f64 + 0.5)
+    };
     let axes = Axes::titled(page, cell, [letter, &what], across, up);
     let line = |value: &dyn Fn(&FitResidual) -> f64| -> Vec<(f64, f64)> {
         let points = of.iter().enumerate();

@@ -71,26 +71,17 @@ impl Labels {
                     distance * DVec2::from_angle(angle)
                 })
             });
-            let mut best: Option<(f64, Cell)> = None;
-            for offset in places {
+            let cells = places.map(|offset| {
                 // Wide labels are placed farther to the side.
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
-                let cell = Cell::new(at + offset + side - 0.5 * size, size);
-                let clear = self.clearance(&cell);
-                if best.as_ref().is_none_or(|(least, _)| clear > *least) {
-                    best = Some((clear, cell));
-                }
-                if clear >= CLEAR {
-                    break;
-                }
-            }
-            if let Some((_, cell)) = best {
+                Cell::new(at + offset + side - 0.5 * size, size)
+            });
+            if let Some((_, cell)) = clearest(cells, |cell| self.clearance(cell)) {
                 self.write(page, cell, &text, INK);
             }
         }
     }
 
-    /// Draws a label in a cell.
     fn write(&mut self, page: &mut Drawing, cell: Cell, text: &str, color: Color) {
         page.centered_label(cell.middle(), text, TICK_SIZE, Anchor::Middle, color);
         self.drawn.push(cell);
@@ -114,7 +105,21 @@ impl Labels {
     }
 }
 
-/// The size of a label.
+/// The first of these labels that is clear enough, or the clearest of all.
+fn clearest<T>(labels: impl Iterator<Item = T>, clearance: impl Fn(&T) -> f64) -> Option<(f64, T)> {
+    let mut best: Option<(f64, T)> = None;
+    for label in labels {
+        let clear = clearance(&label);
+        if best.as_ref().is_none_or(|(most, _)| clear > *most) {
+            best = Some((clear, label));
+        }
+        if clear >= CLEAR {
+            break;
+        }
+    }
+    best
+}
+
 fn size(text: &str) -> DVec2 {
     DVec2::new(Font::embedded().width(text, TICK_SIZE), TICK_SIZE)
 }
@@ -143,18 +148,12 @@ pub fn write_indices(page: &mut Drawing, axes: &Axes, boundary: &Boundary, label
         if named[c] {
             continue;
         }
-        let mut best: Option<(f64, Sides)> = None;
-        for (at, normal) in curves[c].places() {
-            let sides = Sides::of(&curves, c, at, normal);
+        let places = curves[c].places().into_iter();
+        let sides = places.map(|(at, normal)| Sides::of(&curves, c, at, normal));
+        let best = clearest(sides, |sides| {
             let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
-            let room = room.fold(f64::INFINITY, f64::min);
-            if best.as_ref().is_none_or(|(most, _)| room > *most) {
-                best = Some((room, sides));
-            }
-            if room >= CLEAR {
-                break;
-            }
-        }
+            room.fold(f64::INFINITY, f64::min)
+        });
         if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST) {
             for (cell, text) in sides.texts {
                 labels.write(page, cell, &text, NOTE);

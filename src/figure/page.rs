@@ -64,7 +64,6 @@ impl Cell {
         [self.middle() - half, self.middle() + half]
     }
 
-    /// Draws that line.
     pub fn line(&self, page: &mut Drawing, stroke: Stroke) {
         let [from, to] = self.midline();
         page.line(from, to, stroke);
@@ -203,7 +202,6 @@ impl Key {
         self.at.y += ENTRY_GAP;
     }
 
-    /// Adds a line.
     pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
         self.entry(page, name, note, |page, cell| cell.line(page, stroke));
     }
@@ -231,7 +229,6 @@ impl Key {
         });
     }
 
-    /// Adds a marker.
     pub fn marker(&mut self, page: &mut Drawing, name: &str, note: &str, marker: (Marker, Color)) {
         let (marker, color) = marker;
         self.entry(page, name, note, |page, cell| {

@@ -124,7 +124,6 @@ impl Panels {
         }
     }
 
-    /// Where the panels end.
     pub fn end(&self) -> f64 {
         self.rows[1].0 + self.rows[1].1 + PANEL_AXIS + BOTTOM
     }

@@ -37,12 +37,10 @@ fn size(drawing: &Drawing) -> [u32; 2] {
     [drawing.width, drawing.height].map(|length| (length * SCALE).ceil() as u32)
 }
 
-/// Paints the whole drawing.
 pub fn paint(drawing: &Drawing) -> Pixmap {
     paint_rows(drawing, 0..size(drawing)[1])
 }
 
-/// Paints some rows of the drawing.
 fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
     let mut canvas = Pixmap::new(size(drawing)[0], rows.end - rows.start)
         .expect("a page has a width and a height");

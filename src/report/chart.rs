@@ -6,10 +6,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Reported;
-use super::numbers::{power_of_ten, seconds, veins_of};
-use super::table::{Lines, labelled};
-use super::words::contender;
+use super::kit::*;
 use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
 /// Names of the columns that both files have.

@@ -2,16 +2,10 @@
 
 use glam::DVec3;
 
+use super::kit::*;
+use super::relax::found;
 use crate::bvp::Solution;
 use crate::study::{Check, Place, Quantity, Verdict};
-
-use super::Reported;
-use super::numbers::{
-    bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, significant, veins,
-};
-use super::relax::found;
-use super::table::{Lines, labelled};
-use super::words::{equilibrium_of_index, headline, shooting};
 
 impl Reported for Check {
     fn heading(&self) -> String {

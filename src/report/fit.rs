@@ -2,11 +2,8 @@
 
 use std::io::{self, Write};
 
+use super::kit::*;
 use crate::study::{Fit, FitOutcome, FitParameter};
-
-use super::Reported;
-use super::numbers::{brief, seconds};
-use super::table::{Lines, labelled};
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;

@@ -8,10 +8,8 @@ use std::path::Path;
 
 use csv::StringRecord;
 
-use super::numbers::{brief, seconds};
-use super::table::{Lines, append_csv, labelled};
-use super::words::map_shows;
-use super::{FileError, Reported};
+use super::FileError;
+use super::kit::*;
 use crate::study::{Map, MapOutcome, MapRequest, MapRow};
 
 /// The columns after those of the varied keys.

@@ -22,13 +22,18 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::scenario::{Scenario, printable};
-use table::{Lines, labelled};
+use kit::*;
 
 pub use centerlines::{centerlines, modes_table, sensitivity_table};
 pub use chart::{chart_table, scaling_table};
 pub use fit::{fitted, table as fit_table};
 pub use map::{MapWork, lines, map_table, read_rows, table};
 pub use trace::{boundary_table, error_location, is_special, sides, slope_unit, trace_table};
+
+/// What reports are made of.
+mod kit {
+    pub use super::{Reported, numbers::*, table::*, words::*};
+}
 
 /// A result with a report: labelled lines under a heading.
 pub trait Reported {

@@ -3,17 +3,10 @@
 
 use glam::DVec3;
 
-use super::Reported;
-use super::numbers::{
-    bound, brief, counted, decimals, eigenvalues, grids, point, seconds, significant, veins,
-};
-use super::table::{Lines, labelled};
-use super::words::stable_or_index;
+use super::kit::*;
 use crate::relax::{
     Barrier, Direction, Equilibrium, Fate, Loss, Margin, Mode, Outcome, Push, Sensitivity,
 };
-use crate::report::numbers::power_of_ten;
-use crate::report::words::{shooting, verdict};
 use crate::study::{All, Found};
 
 /// Most modes that are listed.

@@ -1,11 +1,7 @@
 //! The text report of a simulation.
 
-use crate::report::numbers::power_of_ten;
+use super::kit::*;
 use crate::simulate::Record;
-
-use super::Reported;
-use super::numbers::{brief, point, seconds, significant, veins_of};
-use super::table::{Lines, labelled};
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;

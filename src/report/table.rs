@@ -18,7 +18,6 @@ pub fn labelled(name: &'static str, lines: impl IntoIterator<Item = String>) -> 
     names.zip(lines).collect()
 }
 
-/// Lists files in a folder.
 pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     let names = files.iter().filter_map(|file| file.file_name());
     let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();

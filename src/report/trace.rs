@@ -4,10 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::Reported;
-use super::numbers::{brief, power_of_ten, seconds, short, veins_of};
-use super::table::{Lines, csv_without_header, header, labelled};
-use super::words::{branch_end, stable_or_index};
+use super::kit::*;
 use crate::scenario::Units;
 use crate::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, Law, PointKind, Trace, TraceBranch,
@@ -100,7 +97,6 @@ pub fn slope_unit(units: &Units) -> String {
     }
 }
 
-/// Where the errors are measured.
 pub fn error_location(trace: &Trace) -> &'static str {
     match trace.held {
         true => "middles of the veins",

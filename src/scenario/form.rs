@@ -56,7 +56,8 @@ impl Scenario {
             "dynamics" => return self.of_dynamics(key, sections),
             _ => {}
         }
-        let triples: [([Key; 3], fn(&Rod) -> &[Profile; 3]); 3] = [
+        type Triple = fn(&Rod) -> &[Profile; 3];
+        let triples: [([Key; 3], Triple); 3] = [
             (Key::COUPLE, |rod| &rod.couple_stiffness),
             (Key::FORCE, |rod| &rod.force_stiffness),
             (Key::REST, |rod| &rod.rest_curvature),
@@ -88,7 +89,6 @@ impl Scenario {
         })
     }
 
-    /// The value of a key of `[tip]`.
     fn of_tip(&self, key: Key) -> Option<Value> {
         let held = self.held_tip.as_ref()?;
         let clamps = held.clamps.as_deref();
@@ -101,7 +101,6 @@ impl Scenario {
         })
     }
 
-    /// The value of a key of `[dynamics]`.
     fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
@@ -155,7 +154,6 @@ impl Scenario {
 }
 
 impl Sections<'_> {
-    /// The value of a key of `[section]`.
     fn written(&self, key: Key) -> Option<Value> {
         let outline = self.sections.first()?.outline;
         let of = |of: fn(&Section) -> &Profile| {

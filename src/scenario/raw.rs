@@ -144,7 +144,6 @@ impl<'a> Raw<'a> {
         raw
     }
 
-    /// Adds the defaults of missing entries.
     fn fill_in_defaults(&mut self) {
         for key in Key::all() {
             let entry = &mut self.entries[key as usize];

@@ -306,7 +306,6 @@ impl<'e> Node<'e> {
         }
     }
 
-    /// Its span in the text.
     pub(super) fn span(self) -> std::ops::Range<usize> {
         match self {
             Node::Parsed(value) => value.span(),

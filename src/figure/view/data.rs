@@ -28,7 +28,6 @@ pub struct View {
     pub units: [Option<String>; 2],
     /// Gravity per length of vein.
     pub gravity: [f64; 3],
-    /// The longest vein.
     pub longest: f64,
     pub joined: bool,
     /// The number of veins, and the numbers from 1, lengths and colours of those that are

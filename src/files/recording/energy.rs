@@ -60,7 +60,7 @@ mod tests {
         moments[4].energy.potential = -1e300 / 3.0;
         moments[5].energy.work = f64::INFINITY;
         moments[6].tip.y = 0.1 + 0.2;
-        let mut bytes = header(&COLUMNS);
+        let mut bytes = header(COLUMNS);
         for moment in &moments {
             write(moment, &mut bytes).unwrap();
         }
