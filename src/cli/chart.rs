@@ -2,17 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueHint};
-
-use crate::files;
-use crate::relax;
+use super::kit::*;
+use super::relax::possible_value;
 use crate::report::words::contender;
 use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
-
-use super::progress::fraction_of;
-use super::relax::possible_value;
-use super::request::{Delivered, Job, Request, VerbTraits, words};
-use super::{Refusal, Status};
+use crate::{files, relax};
 
 /// Measure every method over its own accuracy, and chart time against true error.
 ///

@@ -1,11 +1,7 @@
 //! `leafdyn check`: compares the shapes found by two independent methods.
 
-use clap::Args;
-
+use super::kit::*;
 use crate::study::{self, Check as Checked, CheckOptions, Verdict};
-
-use super::request::{Delivered, Job, Request, VerbTraits};
-use super::{Refusal, Status};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
 ///

@@ -2,15 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueHint};
-
+use super::kit::*;
 use crate::limit::Limit;
 use crate::scenario::text;
 use crate::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
-
-use super::progress::fraction_of;
-use super::request::{Delivered, Job, Request, VerbTraits};
-use super::{Refusal, Status};
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
 ///

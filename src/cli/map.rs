@@ -6,17 +6,12 @@ use std::str::FromStr;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use clap::{Args, ValueHint};
-
+use super::kit::*;
 use crate::files::{self, Journal, Kind};
 use crate::report::{self, FileError};
 use crate::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };
-
-use super::progress::{fraction_of, time_left};
-use super::request::{Delivered, Job, Request, VerbTraits};
-use super::{Refusal, Status};
 
 /// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
 ///

@@ -26,6 +26,16 @@ use crate::files::{self, Checkpointer};
 use crate::report::{FileError, Refused, json, numbers::brief};
 use crate::scenario::printable;
 
+/// What verbs are made of.
+mod kit {
+    pub(super) use super::progress::{
+        ProgressLine, duration, fraction_between, fraction_of, time_left,
+    };
+    pub(super) use super::request::{Delivered, Job, Request, VerbTraits, words};
+    pub(super) use super::{Refusal, Status};
+    pub(super) use clap::{Args, ValueHint};
+}
+
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
 #[command(name = "leafdyn", version, about, arg_required_else_help = true)]

@@ -1,15 +1,11 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
-use clap::Args;
 use clap::builder::PossibleValue;
 
+use super::kit::*;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
 use crate::report::numbers::brief;
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
-
-use super::progress::{ProgressLine, fraction_of};
-use super::request::{Delivered, Job, Request, VerbTraits, words};
-use super::{Refusal, Status};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;

@@ -2,16 +2,13 @@
 
 use std::time::Instant;
 
-use clap::Args;
-
+use super::kit::*;
+use super::{checkpoint_on_interrupt, note, show_checkpoint};
 use crate::files::Recording;
 use crate::memory;
-use crate::report::{FileError, numbers::brief};
+use crate::report::FileError;
+use crate::report::numbers::brief;
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
-
-use super::progress::{self, ProgressLine, fraction_between};
-use super::request::{Delivered, Job, Request, VerbTraits, words};
-use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
 /// Longer simulations, in seconds, are announced with their expected duration.
 const ANNOUNCED: f64 = 60.0;
@@ -72,7 +69,7 @@ impl Simulate {
             && seconds > ANNOUNCED
         {
             let (name, steps) = (&job.scenario.name, brief(steps));
-            let time = progress::duration(seconds);
+            let time = duration(seconds);
             note(&format!("{name}: {steps} steps to make, some {time}"));
         }
         let bytes = recording.expected_bytes(&simulation);

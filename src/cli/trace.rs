@@ -1,17 +1,11 @@
 //! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
-use clap::Args;
-
+use super::kit::*;
+use crate::report::numbers::brief;
 use crate::study::{
     self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest,
     TraceShow, Vary,
 };
-
-use crate::report::numbers::brief;
-
-use super::progress::fraction_between;
-use super::request::{Delivered, Job, Request, VerbTraits};
-use super::{Refusal, Status};
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.
 ///

@@ -128,7 +128,7 @@ fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
         let (color, marker) = style(who);
         let default = if who.is_default() { " (default)" } else { "" };
         let name = format!("{}{default}", contender(who));
-        let mut series = Series::new(name, color, marker);
+        let mut series = Series::new(name, color, marker, false);
         for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
@@ -170,9 +170,7 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
         let place = all.iter().position(|series| series.name == peer.name);
         let place = place.unwrap_or_else(|| {
             let color = peer_color(&peer.name, all.len());
-            let series = Series::new(peer.name.clone(), color, Marker::Ring);
-            let dashed = true;
-            all.push(Series { dashed, ..series });
+            all.push(Series::new(peer.name.clone(), color, Marker::Ring, true));
             all.len() - 1
         });
         match peer.point().map(|(x, y)| (x, y.max(SMALLEST))) {

@@ -40,12 +40,12 @@ pub struct Series {
 }
 
 impl Series {
-    /// Without points so far, joined by a solid line.
-    pub fn new(name: String, color: Color, marker: Marker) -> Self {
+    /// Without points so far.
+    pub fn new(name: String, color: Color, marker: Marker, dashed: bool) -> Self {
         Series {
             name,
             color,
-            dashed: false,
+            dashed,
             marker,
             points: Vec::new(),
             failures: Vec::new(),

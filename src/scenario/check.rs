@@ -5,13 +5,11 @@ use std::f64::consts::PI;
 
 use super::dynamics::{OUTPUTS, round_inertia};
 use super::entries::MOST_RODS;
-use super::error::ScenarioError;
+use super::error::Result;
 use super::key::Key;
 use super::material::Sections;
 use super::raw::{Item, Raw};
 use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
-
-type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;

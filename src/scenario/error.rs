@@ -6,6 +6,8 @@ use std::fmt;
 
 use super::key::Key;
 
+pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
+
 /// Why a scenario was refused. Its text is the whole message: the place, the key, the
 /// value found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -3,13 +3,11 @@
 use std::sync::Arc;
 
 use super::Profile;
-use super::error::ScenarioError;
+use super::error::Result;
 use super::key::Key;
 use super::raw::{Item, Raw};
 use super::section::{Outline, Property, Radii, Section};
 use super::value::MAGNITUDES;
-
-type Result<T> = std::result::Result<T, ScenarioError>;
 
 const TABLE: [Key; 7] = [
     Key::SectionShape,

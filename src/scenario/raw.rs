@@ -2,6 +2,7 @@
 //! interpretation.
 
 use std::fmt::Display;
+use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
@@ -62,43 +63,26 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The line around `span`, if the text is that of a file.
-    fn snippet(&self, span: std::ops::Range<usize>) -> String {
-        match self.origin {
+    /// An error that is not about the value of a key, with the line around `span` if the text
+    /// is that of a file.
+    fn refuse(&self, span: Range<usize>, problem: String) -> ScenarioError {
+        let place = self.place(span.start);
+        let snippet = match self.origin {
             Origin::File(_) => snippet(self.text, span),
             _ => String::new(),
-        }
-    }
-
-    /// An error that is not about the value of a key.
-    fn refuse(&self, at: usize, problem: String) -> ScenarioError {
+        };
         ScenarioError {
-            place: self.place(at),
+            place,
             key: None,
-            problem,
+            problem: problem + &snippet,
         }
     }
 
     fn parse<T>(&self, parsed: Result<T, toml::de::Error>) -> Result<T, ScenarioError> {
         parsed.map_err(|error| {
-            let span = error.span().unwrap_or(0..0);
-            let (start, message) = (span.start, error.message());
-            let snippet = self.snippet(span);
-            self.refuse(start, format!("not valid TOML: {message}{snippet}"))
+            let problem = format!("not valid TOML: {}", error.message());
+            self.refuse(error.span().unwrap_or(0..0), problem)
         })
-    }
-
-    fn unknown_key(
-        &self,
-        path: &str,
-        span: std::ops::Range<usize>,
-        allowed: Vec<&str>,
-    ) -> ScenarioError {
-        let meant = nearest(path).map_or(String::new(), |key| format!(" (did you mean {key}?)"));
-        let (key, allowed) = (shorten(path), allowed.join(", "));
-        let (start, snippet) = (span.start, self.snippet(span));
-        let problem = format!("unknown key {key}{meant}: allowed here: {allowed}{snippet}");
-        self.refuse(start, problem)
     }
 }
 
@@ -177,7 +161,12 @@ impl<'a> Raw<'a> {
                     ("", key) => key.to_string(),
                     (table, key) => format!("{table}.{key}"),
                 };
-                return Err(source.unknown_key(&path, key.span(), Key::allowed_in(name)));
+                let meant = nearest(&path).map(|key| format!(" (did you mean {key}?)"));
+                let (meant, allowed) =
+                    (meant.unwrap_or_default(), Key::allowed_in(name).join(", "));
+                let path = shorten(&path);
+                let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
+                return Err(source.refuse(key.span(), problem));
             };
             let span = value.span();
             let DeValue::Table(table) = value.into_inner() else {
@@ -186,7 +175,11 @@ impl<'a> Raw<'a> {
                 let problem = format!(
                     "{inner} = {found}: must be a table: write [{inner}] on a line of its own, below it {allowed}"
                 );
-                return Err(source.refuse(key.span().start, problem));
+                return Err(ScenarioError {
+                    place: source.place(key.span().start),
+                    key: None,
+                    problem,
+                });
             };
             self.tables.push(inner);
             self.read_table(table, inner, source)?;

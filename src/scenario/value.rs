@@ -4,12 +4,10 @@
 use toml::de::DeValue;
 use toml::{Spanned, Value};
 
-use super::error::{ScenarioError, shorten};
+use super::error::{Result, shorten};
 use super::key::{Form, Range};
 use super::raw::Item;
 use super::{Profile, Schedule};
-
-type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
 /// stiffnesses must not overflow.
