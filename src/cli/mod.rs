@@ -60,7 +60,6 @@ enum Verb {
 }
 
 impl Cli {
-    /// Runs the verb.
     fn run(self) -> Result<Status, Refusal> {
         let done = match self.verb {
             Verb::Relax(relax) => relax.run(),

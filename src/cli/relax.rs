@@ -71,7 +71,6 @@ pub fn possible_value(word: &'static str, method: Method) -> PossibleValue {
     }
 }
 
-/// Shows the progress of a search for the margin.
 fn update_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
     match progress {
         MarginProgress::Relaxing(progress) => line.update_solver(progress, tolerance),

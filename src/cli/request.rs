@@ -323,7 +323,6 @@ impl Request {
     }
 }
 
-/// Reads a scenario from standard input.
 fn standard_input() -> Result<String, Refusal> {
     let mut bytes = Vec::new();
     io::stdin()

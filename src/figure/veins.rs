@@ -171,7 +171,6 @@ pub fn tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
     ends.filter_map(|curve| curve.last()).copied().collect()
 }
 
-/// The length of a polyline.
 pub fn length(curve: &[DVec3]) -> f64 {
     curve.windows(2).map(|w| w[0].distance(w[1])).sum()
 }

@@ -54,7 +54,6 @@ pub fn stable_or_index(index: usize) -> String {
     }
 }
 
-/// The kind of shooting.
 pub fn shooting(intervals: usize) -> String {
     match intervals {
         1 => "single shooting".into(),

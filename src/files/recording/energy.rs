@@ -19,7 +19,6 @@ pub const COLUMNS: &str =
 /// Cells of a row: the time, the steps, the energies and the tip.
 type Row = (f64, usize, [f64; 6], [f64; 3]);
 
-/// Appends a row.
 pub fn write(moment: &Moment, out: &mut Vec<u8>) -> io::Result<()> {
     let tip = moment.tip.to_array();
     append_csv([(moment.time, moment.steps, moment.energy, tip)], out)

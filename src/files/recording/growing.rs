@@ -10,7 +10,6 @@ use crate::checksum::Checksum;
 use crate::files::atomic::{self, Draft};
 use crate::report::FileError;
 
-/// A file that grows.
 pub struct GrowingFile {
     /// The finished file.
     file: PathBuf,

@@ -78,7 +78,6 @@ impl Form {
         }
     }
 
-    /// Appends an output.
     pub fn write(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
         let nodes = 0..frame.positions.len();
         match self {
