@@ -180,11 +180,9 @@ impl Table {
     }
 
     fn of(&self, what: impl Fn(&Values) -> Vec<f64>) -> Richardson {
-        let mut table = Richardson::default();
-        for (segments, values) in &self.rows {
-            table.push(*segments, what(values));
-        }
-        table
+        let rows = self.rows.iter();
+        rows.map(|(segments, values)| (*segments, what(values)))
+            .collect()
     }
 
     /// The points, moved along the branch to the fraction of the last grid.
@@ -242,13 +240,12 @@ impl Table {
 
     /// The extrapolated point, with its state on the finest grid.
     pub fn refined(&self, state: State, grid: Grid) -> Refined {
-        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
-        let own = columns(&self.points());
+        let own = self.points().columns();
         let fractions = self.of(|values| vec![values.fraction]);
         let best = if self.regular {
             own
         } else {
-            columns(&fractions)
+            fractions.columns()
         };
         let fraction = fractions.column(best)[0];
         let mut points = self.of(|values| values.points.clone()).column(own).to_vec();

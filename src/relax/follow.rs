@@ -64,16 +64,14 @@ impl AtRest {
     }
 
     fn on(levels: Vec<Level>, work: Work) -> AtRest {
-        let first = levels.first().map_or(1, |level| level.leaf.segments());
-        let mut table = Richardson::default();
-        for level in &levels {
-            let segments = level.leaf.segments();
-            table.push(segments, positions(level, (segments / first).max(1)));
-        }
-        let columns = table.best().map_or(0, |best| best.columns);
         let segments: Vec<usize> = levels.iter().map(|level| level.leaf.segments()).collect();
+        let on = |level: &Level| {
+            let own = level.leaf.segments();
+            (own, positions(level, (own / segments[0]).max(1)))
+        };
+        let table: Richardson = levels.iter().map(on).collect();
         AtRest {
-            weights: extrapolation(&segments, columns),
+            weights: extrapolation(&segments, table.columns()),
             levels,
             work,
         }

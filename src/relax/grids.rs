@@ -73,7 +73,7 @@ impl Run<'_, '_> {
             return false;
         }
         let levels: Vec<&Level> = self.levels.iter().collect();
-        let columns = self.table.best().map_or(0, |best| best.columns);
+        let columns = self.table.columns();
         let fields = fields(&levels, columns, (self.error(), self.tolerance), true, None);
         self.added_for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
         self.added_for_nodes
@@ -118,8 +118,7 @@ impl Run<'_, '_> {
     /// The levels from which the next one is predicted: those of the extrapolation, but at
     /// least the finest two where there are two.
     fn levels_for_prediction(&self) -> Vec<&Level> {
-        let columns = self.table.best().map_or(0, |best| best.columns);
-        let count = (columns + 1).max(2).min(self.levels.len());
+        let count = (self.table.columns() + 1).max(2).min(self.levels.len());
         self.levels[self.levels.len() - count..].iter().collect()
     }
 

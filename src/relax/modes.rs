@@ -276,17 +276,15 @@ impl Series {
             // A coarse grid may have fewer modes.
             let values = self.grids.iter().filter_map(|grid| grid.get(k));
             let last = values.clone().count().saturating_sub(GRIDS);
-            let mut table = Richardson::default();
-            for (grid, value) in values.skip(last).enumerate() {
-                table.push(1 << grid, vec![value / self.unit(k)]);
-            }
-            let best = table.best();
-            let value = table.column(best.map_or(0, |best| best.columns))[0];
+            let values = values.skip(last).enumerate();
+            let table: Richardson = values
+                .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
+                .collect();
             let error = |best: Best| {
                 best.error
                     .max(LEAST_CHANGE * table.change_before(best.columns))
             };
-            (value, best.map(error))
+            (table.extrapolated()[0], table.best().map(error))
         };
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(judge)

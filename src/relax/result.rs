@@ -23,8 +23,7 @@ pub fn equilibrium(
 ) -> Equilibrium {
     let finest = run.levels.last().expect("the grid it failed on, at least");
     let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
-    let best = run.table.best();
-    let columns = best.map_or(0, |best| best.columns);
+    let columns = run.table.columns();
     let series: Vec<&Level> = run.levels.iter().collect();
     let error = run.error();
     let Fields {
@@ -96,21 +95,14 @@ pub fn equilibrium(
 fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     let leaf = &levels[0].leaf.leaf;
     let held = leaf.held.as_ref()?;
-    let mut table = Richardson::default();
-    for level in levels {
+    let on = |level: &&Level| {
         let (force, moments) = level.leaf.reaction(&level.state);
         let all = [force].into_iter().chain(moments);
-        table.push(
-            level.leaf.segments(),
-            all.flat_map(|it| it.to_array()).collect(),
-        );
-    }
-    let values = table.column(columns);
-    let mut vectors = values
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .map(|&it| DVec3::from_array(it));
+        let values = all.flat_map(|it| it.to_array()).collect();
+        (level.leaf.segments(), values)
+    };
+    let table: Richardson = levels.iter().map(on).collect();
+    let mut vectors = table.column(columns).chunks(3).map(DVec3::from_slice);
     let force = vectors.next()? * leaf.scale.force();
     let moments = vectors.map(|moment| moment * leaf.scale.moment()).collect();
     Some(Reaction {
@@ -125,10 +117,8 @@ fn potential(run: &Run, columns: usize) -> f64 {
     if let Some(estimate) = &run.estimate {
         return estimate.energy;
     }
-    let mut energies = Richardson::default();
-    for level in &run.levels {
-        energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
-    }
+    let on = |level: &Level| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
+    let energies: Richardson = run.levels.iter().map(on).collect();
     energies.column(columns)[0]
 }
 

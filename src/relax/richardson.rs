@@ -43,6 +43,17 @@ pub struct Richardson {
     noise: f64,
 }
 
+impl FromIterator<(usize, Vec<f64>)> for Richardson {
+    /// From the segments of each grid, coarse to fine, and the values there.
+    fn from_iter<I: IntoIterator<Item = (usize, Vec<f64>)>>(grids: I) -> Self {
+        let mut table = Richardson::default();
+        for (segments, values) in grids {
+            table.push(segments, values);
+        }
+        table
+    }
+}
+
 impl Richardson {
     /// Adds the values of the next finer grid, which has `segments` segments.
     pub fn push(&mut self, segments: usize, values: Vec<f64>) {
@@ -120,6 +131,16 @@ impl Richardson {
             columns,
             error: safety * correction(last),
         })
+    }
+
+    /// Terms of the series that the best column has removed; none before there are two grids.
+    pub fn columns(&self) -> usize {
+        self.best().map_or(0, |best| best.columns)
+    }
+
+    /// The values of the best column.
+    pub fn extrapolated(&self) -> &[f64] {
+        self.column(self.columns())
     }
 
     /// The change by column `m`, from 1, on the finest grid.

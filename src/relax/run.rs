@@ -308,13 +308,12 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Tabulates the positions on all grids, and discards earlier estimates.
     pub fn tabulate(&mut self) {
-        let mut table = Richardson::default();
-        for level in &self.levels {
+        let on = |level: &Level| {
             let segments = level.leaf.segments();
             let stride = segments / self.levels[0].leaf.segments();
-            table.push(segments, positions(level, stride));
-        }
-        self.table = table;
+            (segments, positions(level, stride))
+        };
+        self.table = self.levels.iter().map(on).collect();
         self.estimate = None;
         if self.levels.len() < 2 {
             self.linear = None;

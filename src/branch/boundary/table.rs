@@ -160,12 +160,10 @@ impl Table {
         point: &SingularPoint,
         special: Option<Special>,
     ) -> Verified {
-        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
-        let tips = self.tips.column(columns(&self.tips));
+        let tips = self.tips.extrapolated();
         let errors = self.errors();
         let number = |i: usize| {
-            let own = &self.numbers[i];
-            (self.given_value(i)).unwrap_or_else(|| own.column(columns(own))[0])
+            (self.given_value(i)).unwrap_or_else(|| self.numbers[i].extrapolated()[0])
         };
         let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral));
         let forward = match point.kind {

@@ -71,9 +71,7 @@ pub(crate) fn sensitivities(
     let rates: Vec<LeafRate> = (known.iter())
         .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
         .collect();
-    let mut found: Vec<[Series; 5]> = (rates.iter())
-        .map(|_| [(); 5].map(|()| Series::new()))
-        .collect();
+    let mut found: Vec<[Series; 5]> = rates.iter().map(|_| Default::default()).collect();
     let mut eigenvalues: Vec<f64> = Vec::new();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
@@ -92,13 +90,18 @@ pub(crate) fn sensitivities(
         }
         let segments = level.leaf.segments();
         for (series, changes) in found.iter_mut().zip(changes) {
-            let numbers = |values: Vec<f64>| values.into_iter().map(|value| DVec3::X * value);
-            let [tips, energy, eigenvalues, reaction, positions] = series;
-            tips.push(segments, changes.tips);
-            energy.push(segments, vec![DVec3::X * changes.energy]);
-            eigenvalues.push_if_complete(segments, numbers(changes.eigenvalues).collect());
-            reaction.push_if_complete(segments, changes.reaction);
-            positions.push_if_complete(segments, changes.positions);
+            let eigenvalues = changes.eigenvalues.into_iter();
+            let eigenvalues = eigenvalues.map(|value| DVec3::X * value).collect();
+            let all = [
+                changes.tips,
+                vec![DVec3::X * changes.energy],
+                eigenvalues,
+                changes.reaction,
+                changes.positions,
+            ];
+            for (series, values) in series.iter_mut().zip(all) {
+                series.push(segments, values);
+            }
         }
     }
     let context = Context {

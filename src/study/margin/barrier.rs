@@ -194,8 +194,7 @@ fn in_units(stable: &Stable, pass: &Pass, neighbour: &State, weight: f64) -> Opt
     }
     let [saddle, neighbour, _] = three;
     let scale = stable.family.scale();
-    let best = table.best();
-    let values = table.column(best.map_or(0, |best| best.columns));
+    let (best, values) = (table.best(), table.extrapolated());
     let [energy, above] = [values[0], values[3]].map(|it| it * pass.height * scale.moment());
     let own = stable.rest.energy?;
     Some(Barrier {
