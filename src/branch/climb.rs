@@ -12,9 +12,8 @@
 //! of the leaf is not reduced meanwhile, which near a fold would lead elsewhere.
 
 use super::Point;
-use super::deflation::Solved;
 use super::equations::{Equations, Linear, Stuck, factorized};
-use super::field::{add, largest, times};
+use super::field::{add, largest, plus, times};
 use crate::leaf::{Field, State};
 
 /// Largest number of steps of a climb, and the longest step (radians, lengths).
@@ -47,10 +46,32 @@ const SOFT: usize = 3;
 
 /// The valley floor in a direction.
 struct Valley {
-    /// Solutions with the bordered matrix.
-    solved: Solved,
-    shift: f64,
+    /// X, and the force and the curvature of the energy along it.
+    along: Field,
+    force: f64,
     curvature: f64,
+    /// Newton's step across it.
+    across: Field,
+    shift: f64,
+}
+
+impl Valley {
+    /// Newton's step, along the floor as well as across it.
+    fn newton(&self) -> Field {
+        plus(&self.across, self.force / self.curvature, &self.along)
+    }
+
+    /// Distance to the maximum of the energy along the floor, where its slope is minus the force,
+    /// for a cubic, which the energy is near a fold; `before`: the curvature `by` so much before.
+    /// Infinite if there is none.
+    fn distance_to_maximum(&self, (before, by): (f64, f64)) -> f64 {
+        let change = (self.curvature - before) / by;
+        let square = self.curvature * self.curvature + 2.0 * change * self.force;
+        match change < 0.0 && square >= 0.0 {
+            true => -(self.curvature + square.sqrt()) / change,
+            false => f64::INFINITY,
+        }
+    }
 }
 
 impl Equations<'_> {
@@ -77,29 +98,23 @@ impl Equations<'_> {
                 direction = self.lowest_mode(&direction)?;
                 valley = self.valley(&direction, &linear)?;
             }
-            let (curvature, solved) = (valley.curvature, valley.solved);
-            let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
-            let across = &solved.forces.increments;
-            let mut increments = across.clone();
             // With exactly one negative eigenvalue the full step is Newton's.
-            let newton = curvature < 0.0 && valley.shift == linear.shift;
-            if newton {
-                add(&mut increments, force / curvature, along);
-            }
-            let (size, settled) = (largest(&increments), largest(across) < LONGEST);
+            let newton = valley.curvature < 0.0 && valley.shift == linear.shift;
+            let increments = match newton {
+                true => valley.newton(),
+                false => valley.across.clone(),
+            };
+            let size = largest(&increments);
             let mut step = times(&increments, (LONGEST / size).min(1.0));
-            if !newton && settled {
-                let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(along));
+            if !newton && largest(&valley.across) < LONGEST {
+                let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(&valley.along));
                 let length = match before {
                     None => shortest,
-                    Some((last, by)) => {
-                        let change = (curvature - last) / by;
-                        distance_to_maximum(force, curvature, change).clamp(shortest, longest)
-                    }
+                    Some(before) => valley.distance_to_maximum(before).clamp(shortest, longest),
                 };
-                before = Some((curvature, length));
-                add(&mut step, length, along);
-                direction = self.unit(along);
+                before = Some((valley.curvature, length));
+                add(&mut step, length, &valley.along);
+                direction = self.unit(&valley.along);
             }
             state = self.moved(&state, fraction, &step, 1.0).ok()?;
             if newton && size < NEAR {
@@ -174,19 +189,17 @@ impl Equations<'_> {
     ) -> Option<(State, bool)> {
         let linear = self.linearise(state, fraction).ok()?;
         let valley = self.valley(direction, &linear)?;
-        let (curvature, solved) = (valley.curvature, valley.solved);
-        let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
-        let across = &solved.forces.increments;
-        let newton = curvature > 0.0 && valley.shift == linear.shift;
-        let mut increments = across.clone();
-        if newton {
-            add(&mut increments, force / curvature, along);
-        } else if largest(across) < LONGEST {
-            let part = length.copysign(force) / largest(along);
-            add(&mut increments, part, along);
+        let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
+        let increments = if newton {
+            valley.newton()
+        } else if largest(&valley.across) < LONGEST {
+            let part = length.copysign(valley.force) / largest(&valley.along);
             *length = (GROWTH * *length).min(LONGEST);
-        }
-        *direction = self.unit(along);
+            plus(&valley.across, part, &valley.along)
+        } else {
+            valley.across
+        };
+        *direction = self.unit(&valley.along);
         let size = largest(&increments);
         let step = times(&increments, (LONGEST / size).min(1.0));
         let next = self.moved(state, fraction, &step, 1.0).ok()?;
@@ -198,16 +211,17 @@ impl Equations<'_> {
         let border = [self.momentum(direction)];
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
-            let solved = self
-                .solve_bordered(&border, &linear.forces, &[], shift)
-                .ok()?;
+            let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
+            let mut solved = solved.ok()?;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {
-                let along = &solved.modes[0];
-                let mass = self.mass * self.product(along, along);
+                let along = solved.modes.swap_remove(0);
+                let mass = self.mass * self.product(&along, &along);
                 return Some(Valley {
+                    along,
+                    force: solved.forces.multipliers[0],
                     curvature: -solved.h[(0, 0)] - shift * mass,
-                    solved,
+                    across: solved.forces.increments,
                     shift,
                 });
             }
@@ -246,16 +260,5 @@ impl Equations<'_> {
     /// Scales a direction to mass one.
     fn unit(&self, direction: &Field) -> Field {
         times(direction, 1.0 / self.product(direction, direction).sqrt())
-    }
-}
-
-/// Distance to the maximum of the energy along the floor, where its slope is -`force`, its
-/// curvature positive with derivative `change`: for a cubic, which the
-/// energy is near a fold. Infinite if there is none.
-fn distance_to_maximum(force: f64, curvature: f64, change: f64) -> f64 {
-    let square = curvature * curvature + 2.0 * change * force;
-    match change < 0.0 && square >= 0.0 {
-        true => -(curvature + square.sqrt()) / change,
-        false => f64::INFINITY,
     }
 }

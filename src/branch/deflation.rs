@@ -74,11 +74,8 @@ impl Equations<'_> {
                     modes: solved.modes,
                 });
             }
-            let (increments, changes) = solved.step(&[(&dual, &[own], 0.0)], linear.noise)?;
-            let size = largest(&increments).max(changes[0].abs());
-            if !is_finite(&increments) || size > LARGEST {
-                return Err(Stuck::NotConverged);
-            }
+            let functions = [(&dual, &[own][..], 0.0)];
+            let (increments, changes, size) = solved.step(&functions, linear.noise)?;
             fraction += changes[0];
             state = self.moved(&state, fraction, &increments, 1.0)?;
             let rests = at_rest(size, previous);
@@ -191,14 +188,14 @@ pub(super) struct Solved {
 
 impl Solved {
     /// Newton increments and changes of the parameters by which as many additional functions
-    /// become zero. Each function is given by its derivatives with respect to the increments and
+    /// become zero, and their size; fails if that is too large. Each function is given by its derivatives with respect to the increments and
     /// to the parameters, and its value: for the plane normal to a direction, the momentum of that
     /// direction, its parameter components, and zero.
     pub fn step(
         &self,
         functions: &[(&Field, &[f64], f64)],
         noise: f64,
-    ) -> Result<(Field, Vec<f64>), Stuck> {
+    ) -> Result<(Field, Vec<f64>, f64), Stuck> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
         let mut matrix = self.h.clone().resize(p + numbers, p + numbers, 0.0);
         let mut right = DVector::zeros(p + numbers);
@@ -231,8 +228,12 @@ impl Solved {
         for (mode, part) in self.modes.iter().zip(solution.iter()) {
             add(&mut increments, *part, mode);
         }
-        let changes = solution.iter().skip(p).copied().collect();
-        Ok((increments, changes))
+        let changes: Vec<f64> = solution.iter().skip(p).copied().collect();
+        let size = changes.iter().fold(largest(&increments), |m, v| m.max(v.abs()));
+        match is_finite(&increments) && size <= LARGEST {
+            true => Ok((increments, changes, size)),
+            false => Err(Stuck::NotConverged),
+        }
     }
 }
 

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::lru_cache::LruCache;
-use super::patterns::Patterns;
+use super::cache::{LruCache, Patterns};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
@@ -13,10 +12,13 @@ use crate::scenario::Scenario;
 /// condensed out: near singular points a larger stiffness loses digits.
 const STIFFEST: f64 = 1e5;
 
+/// Makes the scenario at a value of a parameter.
+type Make<'a> = &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync);
+
 /// A leaf for every value of a parameter.
 #[derive(Clone)]
 pub struct Family<'a> {
-    make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
+    make: Make<'a>,
     /// Values of the parameter at the fractions 0 and 1.
     from: f64,
     to: f64,
@@ -36,17 +38,13 @@ pub struct OutOfRange(pub String);
 impl<'a> Family<'a> {
     /// The leaves given by `make`, for values of the parameter in this range (divided
     /// logarithmically if `log`), in the units of the first.
-    pub fn new(
-        make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
-        (from, to): (f64, f64),
-        log: bool,
-    ) -> Result<Self, OutOfRange> {
+    pub fn new(make: Make<'a>, (from, to): (f64, f64), log: bool) -> Result<Self, OutOfRange> {
         let scale = make(from).map_err(OutOfRange)?.scale();
         Family::in_units(make, (from, to), log, scale)
     }
 
     fn in_units(
-        make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
+        make: Make<'a>,
         (from, to): (f64, f64),
         log: bool,
         scale: Scale,
@@ -67,10 +65,7 @@ impl<'a> Family<'a> {
     }
 
     /// Leaves of the same kind, in the same units, along another path with the parameter 0 to 1.
-    pub fn along_path<'b>(
-        &self,
-        make: &'b (dyn Fn(f64) -> Result<Scenario, String> + Sync),
-    ) -> Result<Family<'b>, OutOfRange> {
+    pub fn along_path<'b>(&self, make: Make<'b>) -> Result<Family<'b>, OutOfRange> {
         let family = Family::in_units(make, (0.0, 1.0), false, self.scale())?;
         Ok(Family {
             patterns: self.patterns.clone(),

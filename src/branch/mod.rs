@@ -26,6 +26,7 @@
 
 mod begin;
 pub mod boundary;
+mod cache;
 mod climb;
 mod critical;
 mod deflation;
@@ -33,8 +34,6 @@ mod equations;
 mod family;
 mod field;
 mod follow;
-mod lru_cache;
-mod patterns;
 mod refine;
 mod refine_critical;
 mod refined;
@@ -47,7 +46,7 @@ pub use begin::{begin, switch};
 pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
-pub(crate) use field::{between, prolong as prolong_field};
+pub(crate) use field::{between, prolong as prolong_field, times};
 pub use follow::{Followed, Grids};
 pub(crate) use refine::{on_finer, refine_at};
 pub(crate) use refine_critical::NEARLY_RIGID;

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-use super::judge::common;
+use super::judge::{common, differences};
 use crate::limit::Limit;
 use crate::numbers::power_of_ten;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
@@ -205,8 +205,6 @@ fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
     let within = (SAME * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at common stations.
     let both = common(&a.shape.stations, &b.shape.stations);
-    a.shape.rods.iter().zip(&b.shape.rods).all(|(a, b)| {
-        both.iter()
-            .all(|&(i, j)| a.nodes[i].position.distance(b.nodes[j].position) < within)
-    })
+    let mut apart = differences(&both, &a.shape.rods, &b.shape.rods).flatten();
+    apart.all(|apart| apart.position < within)
 }

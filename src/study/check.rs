@@ -6,7 +6,7 @@ pub use shot::Shot;
 
 use serde::Serialize;
 
-use super::judge::{common, fine_grid, index_at, timed, with_nodes_of};
+use super::judge::{common, differences, fine_grid, index_at, timed, with_nodes_of};
 use crate::bvp::{self, Solution, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
@@ -196,13 +196,8 @@ impl Check {
             return Vec::new();
         };
         let both = common(&self.stations, &solution.stations);
-        let rods = self.relaxed.shape.rods.iter().zip(&solution.rods);
-        rods.map(|(a, b)| {
-            let both = both.iter();
-            both.map(|&(i, j)| Difference::of(&a.nodes[i], &b.nodes[j]))
-                .collect()
-        })
-        .collect()
+        let rods = differences(&both, &self.relaxed.shape.rods, &solution.rods);
+        rods.map(Iterator::collect).collect()
     }
 
     /// Distance of positions up to which the shapes count as the same, in

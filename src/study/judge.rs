@@ -114,10 +114,7 @@ impl Answer {
         if common.iter().all(|&(i, _)| self.stations[i] == 0.0) {
             return None;
         }
-        let pairs = self.rods.iter().zip(&other.rods).flat_map(|(a, b)| {
-            let common = common.iter();
-            common.map(|&(i, j)| Difference::of(&a.nodes[i], &b.nodes[j]))
-        });
+        let pairs = differences(&common, &self.rods, &other.rods).flatten();
         let largest = pairs.fold(Difference::default(), Difference::max);
         Some(largest.position)
     }
@@ -208,6 +205,18 @@ pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
         }
     }
     common
+}
+
+/// Differences of each rod at these pairs of stations.
+pub fn differences<'a>(
+    common: &'a [(usize, usize)],
+    a: &'a [RodShape],
+    b: &'a [RodShape],
+) -> impl Iterator<Item = impl Iterator<Item = Difference>> {
+    a.iter().zip(b).map(move |(a, b)| {
+        let common = common.iter();
+        common.map(|&(i, j)| Difference::of(&a.nodes[i], &b.nodes[j]))
+    })
 }
 
 /// The nodes of a grid and those of `others` that are not among them.

@@ -4,7 +4,7 @@ use super::manifold::{Direction, Manifold, Solution};
 use super::plane::Plane;
 use super::search::NotFound;
 use super::singular_point::SingularPoint;
-use crate::branch::field::prolong as prolong_field;
+use crate::branch::field::{every_second, prolong as prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::{prolong, restrict};
 
@@ -68,11 +68,4 @@ pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Gri
     let n = state.segments();
     let refined = n.is_multiple_of(2) && n / 2 >= COARSEST && coarse.refined() == *grid;
     refined.then(|| (coarse, restrict(state)))
-}
-
-/// A field at every second node.
-pub fn every_second(field: &Field) -> Field {
-    let rods = field.iter();
-    rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect())
-        .collect()
 }

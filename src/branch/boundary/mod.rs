@@ -30,7 +30,6 @@
 mod cells;
 mod follow;
 mod grids;
-mod halt;
 mod manifold;
 mod neighbours;
 mod plane;
@@ -42,8 +41,7 @@ mod table;
 mod walk;
 
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
-pub use follow::{Boundary, follow};
-pub use halt::Halt;
+pub use follow::{Boundary, Halt, follow};
 #[cfg(test)]
 pub use manifold::Direction;
 pub use manifold::Solution;

@@ -3,12 +3,13 @@
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use super::grids::{every_second, state_on_coarser};
+use super::grids::state_on_coarser;
 use super::manifold::{Direction, Manifold, Solution};
 use super::plane::Plane;
 use super::search::NotFound;
 use super::table::Verified;
 use crate::branch::critical::Kind;
+use crate::branch::field::every_second;
 use crate::leaf::{Grid, Leaf, State};
 use crate::limit::Limit;
 use crate::relax::fall::settle_from;

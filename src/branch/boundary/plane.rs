@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::branch::family::{Family, OutOfRange, discretised};
-use crate::branch::lru_cache::LruCache;
+use crate::branch::cache::LruCache;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
 

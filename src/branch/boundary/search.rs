@@ -1,8 +1,8 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
 use super::manifold::{Direction, Manifold, Sample, Solution};
-use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
-use crate::branch::field::{add, combined, dot, is_finite, largest, times};
+use crate::branch::equations::{ITERATIONS, Stuck};
+use crate::branch::field::{add, combined, dot, times};
 use crate::leaf::Field;
 use crate::newton::{Contraction, converged};
 
@@ -126,13 +126,7 @@ impl Search {
                 (&along, self.along.params.as_slice(), 0.0),
                 (&slope, numbers.as_slice(), value),
             ];
-            let (increments, changes) = sample.solved.step(&functions, noise)?;
-            let size = largest(&increments)
-                .max(changes[0].abs())
-                .max(changes[1].abs());
-            if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
-                break;
-            }
+            let (increments, changes, size) = sample.solved.step(&functions, noise)?;
             let params = [0, 1].map(|i| sample.solution.params[i] + changes[i]);
             let state = manifold.advanced(&sample.solution.state, params, &increments, 1.0)?;
             solution = Solution { state, params };

@@ -4,7 +4,7 @@
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Stopped};
-use crate::relax::{self, Outcome, Work, index_near, shape_of, start};
+use crate::relax::{self, Outcome, RelaxError, Work, index_near, shape_of, start};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, SAME_LEAF, fine_grid, grid_error};
 use crate::undulation::Undulation;
@@ -29,11 +29,10 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         return refused("explicit motion needs method.step".into());
     };
     let leaf = Leaf::new(scenario);
-    let segments = match relax::check_segments(&leaf, knobs.segments, SEGMENTS) {
-        Ok(segments) => segments,
+    let grid = match grid(&leaf, knobs) {
+        Ok(grid) => grid,
         Err(error) => return refused(error.to_string()),
     };
-    let grid = Grid::new(segments, leaf.kinks());
     let physics = Physics::new(&leaf);
     if !physics.clamped() {
         return refused("a free leaf has no place to rest in".into());
@@ -82,7 +81,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;
-    let error = grid_error(scenario, segments, tolerance, limit);
+    let error = grid_error(scenario, grid.segments(), tolerance, limit);
     let estimate = error.unwrap_or(SAME_LEAF * length) + tolerance * length;
     Ok(Answer {
         outcome: Outcome::Converged,
@@ -98,12 +97,18 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
     })
 }
 
+/// The grid, of as many segments as are set or needed.
+fn grid(leaf: &Leaf, knobs: Knobs) -> Result<Grid, RelaxError> {
+    let segments = relax::check_segments(leaf, knobs.segments, SEGMENTS)?;
+    Ok(Grid::new(segments, leaf.kinks()))
+}
+
 /// The longest step known to be stable.
 pub fn stable_step(varied: &Varied) -> Option<f64> {
     let leaf = Leaf::new(&varied.scenario);
-    let segments = relax::check_segments(&leaf, varied.knobs.segments, SEGMENTS).ok()?;
+    let grid = grid(&leaf, varied.knobs).ok()?;
     let physics = Physics::new(&leaf);
-    let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, leaf.kinks()));
+    let discrete = DiscreteLeaf::new(&leaf, grid);
     let state = start(&discrete);
     let time = physics.time;
     let motion = Explicit::new(discrete, physics, &state, Some(1.0)).ok()?;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Stable, StartPoint};
-use crate::branch::{Equations, Point, between, on_finer, prolong_field};
+use crate::branch::{Equations, Point, between, on_finer, prolong_field, times};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::fall::settle_from;
 use crate::relax::prolong::prolong;
@@ -111,13 +111,7 @@ fn along_modes(stable: &Stable) -> Option<Vec<StartPoint>> {
     let start = |mode: &Field, sign: f64| StartPoint {
         grid: stable.grid.clone(),
         state: point.state.clone(),
-        direction: (mode.iter())
-            .map(|rod| {
-                rod.iter()
-                    .map(|node| node.map(|part| sign * part))
-                    .collect()
-            })
-            .collect(),
+        direction: times(mode, sign),
     };
     let both = |mode: &Field| [1.0, -1.0].map(|sign| start(mode, sign));
     Some(modes.iter().flat_map(both).collect())

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Stable, StartPoint};
 use crate::branch::{
     Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
-    refine_at, switch,
+    refine_at, switch, times,
 };
 use crate::relax::fall::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
@@ -199,15 +199,10 @@ fn starts(grids: &mut Grids, critical: &Critical) -> Vec<StartPoint> {
     if critical.kind == Kind::Fold {
         signs = vec![along(&critical.modes[0]).signum()];
     }
-    let direction = |sign: f64| {
-        let of = |node: &[f64; 6]| node.map(|part| sign * part);
-        let rods = critical.modes[0].iter();
-        rods.map(|rod| rod.iter().map(of).collect()).collect()
-    };
     let start = |sign| StartPoint {
         grid: equations.grid().clone(),
         state: critical.state.clone(),
-        direction: direction(sign),
+        direction: times(&critical.modes[0], sign),
     };
     signs.into_iter().map(start).collect()
 }

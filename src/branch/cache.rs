@@ -1,6 +1,9 @@
-//! A small cache of values that are expensive to compute.
+//! A small cache of values that are expensive to compute, and that of sparsity patterns.
 
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::leaf::{SparsePattern, System};
 
 /// At most `MOST` values by key, the most recently used first.
 pub struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
@@ -28,6 +31,28 @@ impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
     pub fn map(&self, other: impl Fn(&V) -> V) -> Self {
         let values = self.0.iter();
         LruCache(values.map(|(key, value)| (*key, other(value))).collect())
+    }
+}
+
+/// Number of cached patterns: five grids, bordered and unbordered.
+const CACHED: usize = 10;
+
+/// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
+/// equally many segments, and ordering it takes as long as factorising a matrix.
+#[derive(Default)]
+pub struct Patterns(Mutex<LruCache<Shape, Arc<SparsePattern>, CACHED>>);
+
+/// What determines the pattern of a system: its segments, whether its rods are coupled, and
+/// the number of border rows.
+type Shape = (usize, bool, usize);
+
+impl Patterns {
+    /// The pattern of a system with `border` border rows; `None` if memory is short.
+    pub fn of(&self, system: &System, border: usize) -> Option<Arc<SparsePattern>> {
+        let shape = (system.segments(), system.coupled(), border);
+        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = || SparsePattern::bordered(system, border).map(Arc::new);
+        cache.at(shape, made).ok().cloned()
     }
 }
 
