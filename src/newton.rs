@@ -8,7 +8,6 @@ pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_leng
 
 use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
-use crate::rotation;
 use serde::Serialize;
 use std::ops::Add;
 
@@ -286,20 +285,6 @@ impl Newton<'_> {
     }
 }
 
-/// Writes the increments of all nodes but the bases from one state to another.
-fn increments(from: &State, to: &State, field: &mut Field) {
-    let n = from.segments();
-    field.resize_with(from.rods(), || vec![[0.0; 6]; n]);
-    for (j, rod) in field.iter_mut().enumerate() {
-        for (i, increment) in rod.iter_mut().enumerate() {
-            let k = from.base(j) + i + 1;
-            let turn = rotation::log(to.q[k] * from.q[k].conjugate());
-            let shift = to.x[k] - from.x[k];
-            *increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-        }
-    }
-}
-
 impl Linear<'_> {
     /// Solves the assembled equations; returns the relative accuracy of the
     /// solution, or `None` if there is none.
@@ -333,7 +318,7 @@ impl Linear<'_> {
             Equations::Proximal {
                 solver, at, rate, ..
             } => {
-                increments(state, at, &mut self.back);
+                state.increments_to(at, &mut self.back);
                 let springs = Some((self.back.as_slice(), *rate));
                 let shift = self.neutral + *rate;
                 let positive = solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work);

@@ -229,7 +229,9 @@ impl Solved {
             add(&mut increments, *part, mode);
         }
         let changes: Vec<f64> = solution.iter().skip(p).copied().collect();
-        let size = changes.iter().fold(largest(&increments), |m, v| m.max(v.abs()));
+        let size = changes
+            .iter()
+            .fold(largest(&increments), |m, v| m.max(v.abs()));
         match is_finite(&increments) && size <= LARGEST {
             true => Ok((increments, changes, size)),
             false => Err(Stuck::NotConverged),

@@ -201,7 +201,7 @@ impl<'a> Leaves<'a> {
 
 /// Puts the bases of all rods where the leaf clamps them, and held tips where it holds them.
 pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
-    leaf.hold_tips(state);
+    leaf.leaf.hold_tips(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
         state.q[base] = leaf.leaf.base(j);

@@ -1,8 +1,7 @@
 //! Linear algebra on fields of nodal increments and forces.
 
 use crate::leaf::{Field, Increment, State};
-use crate::relax::prolong::lagrange;
-use crate::rotation;
+use crate::relax::predict::Polynomial;
 
 /// The work of forces on increments.
 pub fn dot(forces: &Field, increments: &Field) -> f64 {
@@ -51,12 +50,9 @@ pub fn largest(a: &Field) -> f64 {
 
 /// The increments that lead from one state to another on the same grid.
 pub fn between(a: &State, b: &State) -> Field {
-    let node = |k: usize| {
-        let (turn, shift) = (rotation::log(b.q[k] * a.q[k].conjugate()), b.x[k] - a.x[k]);
-        [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
-    };
-    let rod = |j: usize| (1..=a.segments()).map(move |i| a.base(j) + i);
-    (0..a.rods()).map(|j| rod(j).map(node).collect()).collect()
+    let mut field = Field::new();
+    a.increments_to(b, &mut field);
+    field
 }
 
 pub fn is_finite(a: &Field) -> bool {
@@ -87,26 +83,21 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
         0 => [0.0; 6],
         _ => rod[i - 1],
     };
-    // Four neighbouring nodes; at the ends, the nearest four.
-    let count = 4.min(n + 1);
-    (1..=2 * n)
-        .map(|k| {
-            if k % 2 == 0 {
-                return at(k / 2);
+    let node = |k: usize| {
+        if k.is_multiple_of(2) {
+            return at(k / 2);
+        }
+        // Four neighbouring nodes; at the ends, the nearest four.
+        let mut sum = [0.0; 6];
+        for (i, weight) in Polynomial::<4>::new(0, n + 1, k as f64 / 2.0).terms() {
+            let value = at(i);
+            for c in 0..6 {
+                sum[c] += weight * value[c];
             }
-            let first = (k / 2).saturating_sub(1).min(n + 1 - count);
-            let t = k as f64 / 2.0 - first as f64;
-            let mut sum = [0.0; 6];
-            for i in 0..count {
-                let weight = lagrange(count, i, t);
-                let value = at(first + i);
-                for c in 0..6 {
-                    sum[c] += weight * value[c];
-                }
-            }
-            sum
-        })
-        .collect()
+        }
+        sum
+    };
+    (1..=2 * n).map(node).collect()
 }
 
 #[cfg(test)]

@@ -200,11 +200,6 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Puts the tips where they are held, if they are.
-    pub fn hold_tips(&self, state: &mut State) {
-        self.leaf.hold_tips(state);
-    }
-
     /// The force on the holder of a held tip, and the moments of the rods on a clamp.
     pub fn reaction(&self, state: &State) -> (DVec3, Vec<DVec3>) {
         let n = self.segments();
@@ -303,8 +298,7 @@ impl DiscreteLeaf {
 
     /// Potential energy of the dead loads in a state.
     pub fn potential(&self, state: &State) -> f64 {
-        let nodes = (0..self.rods()).flat_map(|j| (0..=self.segments()).map(move |i| (j, i)));
-        nodes
+        self.each(0..self.segments() + 1)
             .map(|(j, i)| self.load(state, j, i).1 - self.coupling_energy(state, j, i))
             .sum()
     }

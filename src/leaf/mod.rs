@@ -21,7 +21,7 @@ pub use dimensionless::{Leaf, Loads};
 pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
-pub use rate::{Forces, LeafRate, Response};
+pub use rate::{Forces, LeafRate, Response, at_constant_force};
 pub use reduce::{half_of, whole_fields, whole_of};
 pub use sparse::{Bordered, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};

@@ -37,6 +37,14 @@ pub fn shift(increment: &Increment) -> DVec3 {
     DVec3::new(increment[3], increment[4], increment[5])
 }
 
+/// Adds a rotation and a displacement to an increment, or a moment and a force.
+pub fn add(increment: &mut Increment, turn: DVec3, shift: DVec3) {
+    for c in 0..3 {
+        increment[c] += turn[c];
+        increment[3 + c] += shift[c];
+    }
+}
+
 impl State {
     /// From nodal positions and rotations, without forces.
     pub fn new(segments: usize, x: Vec<DVec3>, q: Vec<DQuat>) -> Self {
@@ -87,6 +95,19 @@ impl State {
     pub fn force_change(&self, other: &State) -> f64 {
         let changes = self.n.iter().zip(&other.n).map(|(a, b)| a.distance(*b));
         changes.fold(0.0, f64::max)
+    }
+
+    /// Writes the increments of all nodes but the bases that lead to another state on the same grid.
+    pub fn increments_to(&self, other: &State, field: &mut Field) {
+        field.resize_with(self.rods(), || vec![[0.0; 6]; self.segments]);
+        for (j, rod) in field.iter_mut().enumerate() {
+            for (i, increment) in rod.iter_mut().enumerate() {
+                let k = self.base(j) + i + 1;
+                let turn = rotation::log(other.q[k] * self.q[k].conjugate());
+                let shift = other.x[k] - self.x[k];
+                *increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+            }
+        }
     }
 
     /// Rotates and displaces node `k` by `step` times the increment.

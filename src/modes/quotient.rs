@@ -1,6 +1,6 @@
 //! Rayleigh quotients of shapes.
 
-use crate::leaf::{DiscreteLeaf, Increment, State, shift, turn};
+use crate::leaf::{DiscreteLeaf, Increment, State, at_constant_force, shift, turn};
 use crate::rod::{Section, Segment};
 use glam::DVec3;
 
@@ -76,11 +76,7 @@ pub fn with_forces(
 
 /// The contribution of second derivatives with respect to rotations, at constant force.
 fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
-    let bare = Section {
-        condensing: DVec3::ZERO,
-        ..*section
-    };
-    let k = segment.hessian(&bare);
+    let k = at_constant_force(segment, section);
     a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b)
 }
 

@@ -178,13 +178,6 @@ fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
 /// A state displaced by a linear response, in the units of another leaf.
 fn moved(level: &Level, leaf: &Leaf, response: &Response) -> State {
     let mut state = level.state.clone();
-    for (j, rod) in response.nodes.iter().enumerate() {
-        let base = state.base(j);
-        for (i, increment) in rod.iter().enumerate() {
-            state.advance(base + i + 1, increment, 1.0);
-        }
-    }
-    let forces = state.n.iter_mut().zip(&response.carried);
-    forces.for_each(|(force, change)| *force += *change);
+    response.advance(&mut state, 1.0);
     rescaled(level, state, leaf)
 }

@@ -55,7 +55,7 @@ impl Run<'_, '_> {
             }
             end.at_rest = self.settle_held(leaf, &mut system, &mut end);
         }
-        leaf.hold_tips(&mut end.state);
+        leaf.leaf.hold_tips(&mut end.state);
         end
     }
 

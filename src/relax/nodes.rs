@@ -102,11 +102,17 @@ impl<'l> RodNodes<'l> {
 /// Quaternions of rod `j` at all nodes, continuous in sign.
 fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
     let base = level.state.base(j);
-    let mut rotations: Vec<DQuat> = Vec::with_capacity(level.leaf.segments() + 1);
-    for &q in &level.state.q[base..=base + level.leaf.segments()] {
-        rotations.push(with_sign_of(q, rotations.last().copied().unwrap_or(q)));
-    }
-    rotations
+    continuous(&level.state.q[base..=base + level.leaf.segments()])
+}
+
+/// The same rotations by quaternions that are continuous in sign.
+pub fn continuous(rotations: &[DQuat]) -> Vec<DQuat> {
+    let mut before = rotations[0];
+    let same = |q: &DQuat| {
+        before = with_sign_of(*q, before);
+        before
+    };
+    rotations.iter().map(same).collect()
 }
 
 /// The components of a node's fields, with force and moment along its directors.

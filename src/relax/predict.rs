@@ -84,7 +84,7 @@ impl Panel {
     }
 
     /// Interpolation from its nodes on one grid to those on another.
-    fn nodes(&self, from: &State, to: &State) -> Vec<Polynomial> {
+    fn nodes(&self, from: &State, to: &State) -> Vec<Polynomial<POINTS>> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |k: usize| (k * have) as f64 / want as f64;
         let through = |k: usize| Polynomial::new(self.first(from), have + 1, place(k));
@@ -92,7 +92,7 @@ impl Panel {
     }
 
     /// The same for midpoints of segments.
-    fn middles(&self, from: &State, to: &State) -> Vec<Polynomial> {
+    fn middles(&self, from: &State, to: &State) -> Vec<Polynomial<POINTS>> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |i: usize| (i as f64 + 0.5) * have as f64 / want as f64 - 0.5;
         let through = |i: usize| Polynomial::new(self.first(from), have, place(i));
@@ -161,20 +161,20 @@ impl Panel {
 }
 
 /// The weights of a value of the polynomial through adjacent points.
-struct Polynomial {
+pub struct Polynomial<const MOST: usize> {
     first: usize,
     count: usize,
-    weights: [f64; POINTS],
+    weights: [f64; MOST],
 }
 
-impl Polynomial {
+impl<const MOST: usize> Polynomial<MOST> {
     /// At `place` among `points` equally spaced points, of which `first` is the
-    /// first: through the nearest of them.
-    fn new(first: usize, points: usize, place: f64) -> Self {
-        let count = POINTS.min(points);
+    /// first: through at most `MOST` of the nearest of them.
+    pub fn new(first: usize, points: usize, place: f64) -> Self {
+        let count = MOST.min(points);
         let centred = (place - 0.5 * (count - 1) as f64).round().max(0.0);
         let skipped = (centred as usize).min(points - count);
-        let mut weights = [0.0; POINTS];
+        let mut weights = [0.0; MOST];
         for (a, weight) in weights[..count].iter_mut().enumerate() {
             *weight = lagrange(count, a, place - skipped as f64);
         }
@@ -186,7 +186,7 @@ impl Polynomial {
     }
 
     /// Points and their weights.
-    fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
         (self.first..).zip(self.weights[..self.count].iter().copied())
     }
 

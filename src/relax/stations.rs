@@ -2,6 +2,7 @@
 
 use crate::leaf::Leaf;
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
+use crate::relax::nodes::continuous;
 use crate::relax::place::{Differences, Place, Slopes};
 use crate::scenario::{Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape, equally_spaced};
@@ -132,13 +133,8 @@ impl NodalFields {
     fn new(rod: &RodShape) -> Self {
         let each = |of: &dyn Fn(&NodeState) -> DVec3| rod.nodes.iter().map(of).collect::<Vec<_>>();
         let tangent = |node: &NodeState| node.rotation * node.v * rod.length;
-        let mut rotations: Vec<DQuat> = Vec::new();
-        for node in &rod.nodes {
-            // Continuous in sign.
-            let before = rotations.last().copied().unwrap_or(node.rotation);
-            let same = before.dot(node.rotation) >= 0.0;
-            rotations.push(if same { node.rotation } else { -node.rotation });
-        }
+        let rotations: Vec<DQuat> = rod.nodes.iter().map(|node| node.rotation).collect();
+        let rotations = continuous(&rotations);
         let turn = |(q, node): (&DQuat, &NodeState)| {
             let u = node.u * (0.5 * rod.length);
             (*q * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array()

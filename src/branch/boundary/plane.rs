@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::branch::family::{Family, OutOfRange, discretised};
 use crate::branch::cache::LruCache;
+use crate::branch::family::{Family, OutOfRange, discretised};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
 

@@ -162,9 +162,8 @@ impl Table {
     ) -> Verified {
         let tips = self.tips.extrapolated();
         let errors = self.errors();
-        let number = |i: usize| {
-            (self.given_value(i)).unwrap_or_else(|| self.numbers[i].extrapolated()[0])
-        };
+        let number =
+            |i: usize| (self.given_value(i)).unwrap_or_else(|| self.numbers[i].extrapolated()[0]);
         let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral));
         let forward = match point.kind {
             Kind::Branching => {

@@ -2,7 +2,7 @@
 
 use crate::leaf::chain::group_and_lane;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::State;
+use crate::leaf::state::{State, add};
 use crate::leaf::system::System;
 use crate::rod::{Blocks, Segment};
 use glam::DVec3;
@@ -57,14 +57,8 @@ impl DiscreteLeaf {
                 let at_begin =
                     second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
                 let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
-                let mut add = |node: usize, moment: DVec3, force: DVec3| {
-                    for c in 0..3 {
-                        rhs[node - 1][c] += moment[c];
-                        rhs[node - 1][3 + c] += force[c];
-                    }
-                };
-                add(i, -at_begin - moment, pull - force);
-                add(i + 1, -at_end, -pull);
+                add(&mut rhs[i - 1], -at_begin - moment, pull - force);
+                add(&mut rhs[i], -at_end, -pull);
             }
         }
         system.set_rhs(&rhs);

@@ -45,12 +45,6 @@ impl<'a> Rods<'a> {
     }
 
     #[inline(always)]
-    fn x<S: Simd>(&self, simd: S, i: usize, part: usize) -> Vectors<S> {
-        let [a, b, c, d] = self.x;
-        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
-    }
-
-    #[inline(always)]
     fn q<S: Simd>(&self, simd: S, i: usize, part: usize) -> Quaternions<S> {
         let [a, b, c, d] = self.q;
         let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
@@ -60,21 +54,9 @@ impl<'a> Rods<'a> {
     }
 
     #[inline(always)]
-    fn n<S: Simd>(&self, simd: S, i: usize, part: usize) -> Vectors<S> {
-        let [a, b, c, d] = self.n;
-        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
-    }
-
-    #[inline(always)]
     fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> Sections<S> {
         let [a, b, c, d] = self.sections;
         Sections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
-    }
-
-    #[inline(always)]
-    fn beside<S: Simd>(&self, simd: S, side: usize, i: usize, part: usize) -> Vectors<S> {
-        let [a, b, c, d] = self.beside[side];
-        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
     }
 
     /// Segment `i` of every rod, and its sections.
@@ -86,12 +68,23 @@ impl<'a> Rods<'a> {
         part: usize,
     ) -> (E, Sections<S>) {
         let nodes = Nodes {
-            x: [self.x(simd, i, part), self.x(simd, i + 1, part)],
+            x: [
+                gather(simd, self.x, i, part),
+                gather(simd, self.x, i + 1, part),
+            ],
             q: [self.q(simd, i, part), self.q(simd, i + 1, part)],
         };
         let sections = self.sections(simd, i, part);
-        (E::new(&sections, &nodes, self.n(simd, i, part)), sections)
+        let n = gather(simd, self.n, i, part);
+        (E::new(&sections, &nodes, n), sections)
     }
+}
+
+/// Number `i` of the vectors of each lane.
+#[inline(always)]
+fn gather<S: Simd>(simd: S, of: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
+    let [a, b, c, d] = of;
+    Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
 }
 
 /// Right-hand side and energy, and the matrix if requested.
@@ -166,10 +159,11 @@ fn assemble<S: Simd, E: Element<S, B>, const B: usize, const MATRIX: bool>(
         }
         let tip = i + 1 == n;
         let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
+        let [before, behind] = rods.beside;
         let x = [
-            rods.beside(simd, 0, i + 1, part),
-            rods.x(simd, i + 1, part),
-            rods.beside(simd, 1, i + 1, part),
+            gather(simd, before, i + 1, part),
+            gather(simd, rods.x, i + 1, part),
+            gather(simd, behind, i + 1, part),
         ];
         let (load, potential) = loads.at(x, weights, tip);
         energy = energy + potential;
@@ -287,8 +281,8 @@ impl Advance<'_> {
             let (element, sections): (E, _) = rods.element(simd, i, part);
             let turns = [turn, turn_after];
             let change = element.force_increment(&sections, shift_after - shift, turns);
-            let n = change.times(step, rods.n(simd, i, part));
-            let x = shift_after.times(step, rods.x(simd, i + 1, part));
+            let n = change.times(step, gather(simd, rods.n, i, part));
+            let x = shift_after.times(step, gather(simd, rods.x, i + 1, part));
             let turned = exp_each(turn_after.scale(step));
             let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
             let mut numbers = [Four::default(); 10];

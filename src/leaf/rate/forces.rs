@@ -1,6 +1,6 @@
 //! The forces by which a parameter change unbalances a leaf, and the linear response to them.
 
-use crate::leaf::state::{Field, Increment};
+use crate::leaf::state::{Field, Increment, State};
 use glam::DVec3;
 
 /// The effect of a parameter change in a fixed state. Unaffected rods have no entries.
@@ -86,6 +86,18 @@ impl Response {
             nodes: vec![vec![[0.0; 6]; segments]; rods],
             carried: vec![DVec3::ZERO; rods * segments],
         }
+    }
+
+    /// Moves a state, but not its bases, by `step` times the response.
+    pub fn advance(&self, state: &mut State, step: f64) {
+        for (j, rod) in self.nodes.iter().enumerate() {
+            let base = state.base(j);
+            for (i, increment) in rod.iter().enumerate() {
+                state.advance(base + i + 1, increment, step);
+            }
+        }
+        let forces = state.n.iter_mut().zip(&self.carried);
+        forces.for_each(|(force, change)| *force += step * *change);
     }
 
     /// Adds `times` another response.

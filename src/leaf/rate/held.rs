@@ -1,10 +1,10 @@
 //! Held tips: the effect of moving their holder, and the change of the force on it.
 
-use super::{Forces, LeafRate, Response, add};
+use super::{Forces, LeafRate, Response, at_constant_force, change};
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::State;
-use crate::rod::{Section, Segment};
+use crate::leaf::state::{State, add};
+use crate::rod::Segment;
 use crate::scenario::{Clamp, Scenario};
 use glam::{DQuat, DVec3};
 
@@ -20,11 +20,7 @@ impl HeldRate {
     pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
         let held = leaf.held.as_ref()?;
         let first = terms[0].1.held_tip.as_ref()?;
-        let of = |value: &dyn Fn(&Scenario) -> f64| -> f64 {
-            let first = value(&terms[0].1);
-            let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
-            terms.iter().map(change).sum()
-        };
+        let of = |value: &dyn Fn(&Scenario) -> f64| change(terms, value);
         let axis =
             |axis: usize| of(&|s| s.held_tip.as_ref().map_or(0.0, |held| held.position[axis]));
         let shift = DVec3::from_array([0, 1, 2].map(axis)) / leaf.scale.length;
@@ -66,11 +62,7 @@ impl DiscreteLeaf {
             let turned = rate.turns.get(j).copied().unwrap_or(DVec3::ZERO);
             let section = self.section(j, n - 1);
             let segment = &segments[j * n + n - 1];
-            let uncondensed = Section {
-                condensing: DVec3::ZERO,
-                ..*section
-            };
-            let k = segment.hessian(&uncondensed);
+            let k = at_constant_force(segment, section);
             let nodes = forces.on_nodes(j, n);
             if n > 1 {
                 let moment = k.ab * turned + k.xa.transpose() * moved;

@@ -9,8 +9,8 @@ pub use self::forces::{Forces, Response};
 use self::held::HeldRate;
 use super::dimensionless::Leaf;
 use super::discrete::DiscreteLeaf;
-use super::state::{Field, State};
-use crate::rod::{Section, SectionRate, Segment};
+use super::state::{Field, State, add};
+use crate::rod::{Blocks, Section, SectionRate, Segment};
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
 
@@ -80,12 +80,7 @@ impl<'s> LeafRate<'s> {
     /// Of a leaf, from neighbouring scenarios with their weights.
     pub fn new(leaf: &Leaf, terms: &'s [(f64, Scenario)]) -> Self {
         let scale = leaf.scale;
-        let sum = |value: &dyn Fn(&Scenario) -> f64| -> f64 {
-            // Relative to the first: without changes the sum is exactly zero.
-            let first = value(&terms[0].1);
-            let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
-            terms.iter().map(change).sum()
-        };
+        let sum = |value: &dyn Fn(&Scenario) -> f64| change(terms, value);
         let vector = |value: fn(&Scenario) -> [f64; 3], unit: f64| {
             DVec3::from_array([0, 1, 2].map(|axis| sum(&|s| value(s)[axis]))) / unit
         };
@@ -260,11 +255,7 @@ impl DiscreteLeaf {
         let n = self.segments();
         let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
         let segment = &segments[j * n];
-        let uncondensed = Section {
-            condensing: DVec3::ZERO,
-            ..*section
-        };
-        let k = segment.hessian(&uncondensed);
+        let k = at_constant_force(segment, section);
         add(
             &mut forces.on_nodes(j, n)[0],
             -(k.ab.transpose() * turn),
@@ -350,9 +341,18 @@ impl DiscreteLeaf {
     }
 }
 
-fn add(increment: &mut [f64; 6], moment: DVec3, force: DVec3) {
-    for c in 0..3 {
-        increment[c] += moment[c];
-        increment[3 + c] += force[c];
-    }
+/// The derivative of a number of the scenario: relative to the first, so that without changes it
+/// is exactly zero.
+fn change(terms: &[(f64, Scenario)], value: &dyn Fn(&Scenario) -> f64) -> f64 {
+    let first = value(&terms[0].1);
+    let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
+    terms.iter().map(change).sum()
+}
+
+/// Second derivatives of a segment at constant force.
+pub fn at_constant_force(segment: &Segment, section: &Section) -> Blocks {
+    segment.hessian(&Section {
+        condensing: DVec3::ZERO,
+        ..*section
+    })
 }

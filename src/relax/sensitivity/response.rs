@@ -155,18 +155,13 @@ fn response(
 
 /// The state, moved along a response.
 pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f64) -> State {
-    let (leaf, mut state) = (&level.leaf, level.state.clone());
-    for (j, rod) in response.nodes.iter().enumerate() {
+    let mut state = level.state.clone();
+    for j in 0..state.rods() {
         let base = state.base(j);
         let turned = rotation::exp(step * rate.base_turn(j) * DVec3::Z);
         state.q[base] = (turned * state.q[base]).normalize();
-        for (i, increment) in rod.iter().enumerate() {
-            state.advance(base + i + 1, increment, step);
-        }
     }
-    let forces = state.n.iter_mut().zip(&response.carried);
-    forces.for_each(|(force, change)| *force += step * change);
-    debug_assert_eq!(state.segments(), leaf.segments());
+    response.advance(&mut state, step);
     state
 }
 

@@ -1,8 +1,6 @@
 //! A model with the accuracy of a search: on the coarsest grids whose error is insignificant
 //! relative to the data.
 
-use rayon::prelude::*;
-
 use super::FitError;
 use super::case::{CaseAt, Component};
 use super::least_squares::Weighting;
@@ -50,10 +48,8 @@ impl<'a> Model<'a> {
             }
             CaseAt::new(&self.cases[case], known.at.clone()).map_err(lost)
         };
-        let cases = (0..self.cases.len()).into_par_iter().map(coarse);
-        let cases = cases.collect::<Result<_, _>>()?;
-        let theta = accurate.theta.clone();
-        Ok((model, Point { theta, cases }))
+        let point = self.point(&accurate.theta, coarse)?;
+        Ok((model, point))
     }
 
     /// The leaves relaxed from their usual starts, beyond the values at which one of

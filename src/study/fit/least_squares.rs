@@ -65,13 +65,30 @@ impl Weighting {
         DVector::from_vec(residual.collect())
     }
 
+    /// Their derivatives; zero if they are not known.
     pub fn jacobian(&self, point: &Point) -> DMatrix<f64> {
-        let sd: Vec<f64> = point
-            .components()
-            .map(|c| c.sd.unwrap_or(self.assumed))
-            .collect();
-        let rows: Vec<&Vec<f64>> = point.gradients().collect();
-        DMatrix::from_fn(rows.len(), point.theta.len(), |i, k| rows[i][k] / sd[i])
+        let components = point.components();
+        let sd: Vec<f64> = components.map(|c| c.sd.unwrap_or(self.assumed)).collect();
+        let rows = point.cases.iter().flat_map(|case| {
+            let components = 0..case.components.len();
+            components.map(|i| case.gradients.get(i))
+        });
+        let rows: Vec<Option<&Vec<f64>>> = rows.collect();
+        let gradient = |i: usize, k: usize| rows[i].map_or(0.0, |row| row[k]);
+        DMatrix::from_fn(sd.len(), point.theta.len(), |i, k| gradient(i, k) / sd[i])
+    }
+
+    /// Square roots of the weights of residuals, and derivatives times these.
+    pub fn weighted(
+        &self,
+        point: &Point,
+        residuals: &DVector<f64>,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let (roots, mut jacobian) = (self.roots(residuals), self.jacobian(point));
+        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
+            row *= *root;
+        }
+        (roots, jacobian)
     }
 
     /// Square roots of the weights of residuals: less than one beyond Huber's
@@ -229,11 +246,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
 
     /// The linearised residuals in the coordinates that may move.
     fn linear(&self, point: &Point, residuals: &DVector<f64>) -> Linear {
-        let roots = self.weighting.roots(residuals);
-        let mut jacobian = self.weighting.jacobian(point);
-        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
-            row *= *root;
-        }
+        let (roots, mut jacobian) = self.weighting.weighted(point, residuals);
         let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
         let active = self.active(point, &gradient);
         for k in (0..active.len()).filter(|&k| !active[k]) {

@@ -152,7 +152,16 @@ impl<'a> Model<'a> {
             let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], at));
             found.map_err(|lost| self.no_equilibrium(case, &lost))
         };
-        let cases = (0..self.cases.len()).into_par_iter().map(find);
+        self.point(theta, find)
+    }
+
+    /// The point at which `of` finds the leaf of each case.
+    pub(super) fn point<E: Send>(
+        &self,
+        theta: &[f64],
+        of: impl Fn(usize) -> Result<CaseAt, E> + Sync + Send,
+    ) -> Result<Point, E> {
+        let cases = (0..self.cases.len()).into_par_iter().map(of);
         Ok(Point {
             theta: theta.to_vec(),
             cases: cases.collect::<Result<_, _>>()?,
@@ -189,11 +198,7 @@ impl<'a> Model<'a> {
             let at = from.at.follow(scenario, &answer, how)?;
             CaseAt::new(&self.cases[case], at)
         };
-        let cases = (0..self.cases.len()).into_par_iter().map(follow);
-        Ok(Point {
-            theta: theta.to_vec(),
-            cases: cases.collect::<Result<_, _>>()?,
-        })
+        self.point(theta, follow)
     }
 
     /// Unit of the data: the length of the leaf, or the largest of them.

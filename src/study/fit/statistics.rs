@@ -42,14 +42,7 @@ pub(super) struct Statistics<'m, 'a> {
 impl<'m, 'a> Statistics<'m, 'a> {
     pub fn new(model: &'m Model<'a>, weighting: Weighting, known: bool, point: &'m Point) -> Self {
         let residuals = weighting.residuals(point);
-        let roots = weighting.roots(&residuals);
-        let mut jacobian = match point.gradients().next() {
-            Some(_) => weighting.jacobian(point),
-            None => DMatrix::zeros(residuals.len(), point.theta.len()),
-        };
-        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
-            row *= *root;
-        }
+        let (roots, jacobian) = weighting.weighted(point, &residuals);
         let (values, directions) = singular(&jacobian);
         let largest = values.last().copied().unwrap_or(0.0);
         let insensitive = values
