@@ -12,6 +12,14 @@ use crate::scenario::Scenario;
 /// condensed out: near singular points a larger stiffness loses digits.
 const STIFFEST: f64 = 1e5;
 
+/// The value at a fraction of a range, or of that of its logarithm.
+pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
+    match log {
+        true => from * (to / from).powf(fraction),
+        false => from + (to - from) * fraction,
+    }
+}
+
 /// Makes the scenario at a value of a parameter.
 type Make<'a> = &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync);
 
@@ -102,8 +110,7 @@ impl<'a> Family<'a> {
     pub fn value(&self, fraction: f64) -> f64 {
         match fraction {
             1.0 => self.to,
-            _ if self.log => self.from * (self.to / self.from).powf(fraction),
-            _ => self.from + (self.to - self.from) * fraction,
+            _ => between([self.from, self.to], self.log, fraction),
         }
     }
 

@@ -45,7 +45,7 @@ mod walk;
 pub use begin::{begin, switch};
 pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
-pub use family::Family;
+pub use family::{Family, between as value_between};
 pub(crate) use field::{between, prolong as prolong_field, times};
 pub use follow::{Followed, Grids};
 pub(crate) use refine::{on_finer, refine_at};

@@ -46,7 +46,7 @@ impl Margin {
 }
 
 /// A direction along a lab axis, or against it. As text: `-z`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Direction {
     /// 0, 1, 2 for x, y, z.
     pub axis: usize,
@@ -88,7 +88,7 @@ impl Serialize for Direction {
 }
 
 /// The effect of a dead force at the tip that grows from zero in one direction.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Push {
     /// The direction.
     #[serde(rename = "axis")]
@@ -118,7 +118,7 @@ pub struct Push {
 }
 
 /// How stability is lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// The equilibrium meets an unstable one, and both end.
@@ -128,6 +128,7 @@ pub enum Loss {
     /// Stability is not lost up to the largest push that was tried.
     NoneUpTo,
     /// Unknown beyond some push.
+    #[default]
     Unknown,
 }
 

@@ -32,6 +32,9 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use serde::{Serialize, Serializer};
+
+use crate::branch::value_between;
 use crate::scenario::{Form, Key, Part, Scenario, ScenarioError, Value};
 
 /// Default number of values.
@@ -245,6 +248,12 @@ impl FromStr for Keys {
     }
 }
 
+impl Serialize for Keys {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// As written: `stiffness.axial+stiffness.shear_2`.
 impl fmt::Display for Keys {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -327,11 +336,7 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
     if i == 0 || i == last {
         return if i == 0 { from } else { to };
     }
-    let part = i as f64 / last as f64;
-    let value = match log {
-        true => from * (to / from).powf(part),
-        false => from + (to - from) * part,
-    };
+    let value = value_between([from, to], log, i as f64 / last as f64);
     let rounded = format!("{value:.*e}", DIGITS - 1);
     rounded.parse().unwrap_or(value)
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::branch::cache::LruCache;
-use crate::branch::family::{Family, OutOfRange, discretised};
+use crate::branch::family::{Family, OutOfRange, between, discretised};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
 
@@ -37,8 +37,7 @@ impl Plane<'_> {
         let second = match second {
             0.0 => from,
             1.0 => to,
-            part if self.log => from * (to / from).powf(part),
-            part => from + (to - from) * part,
+            part => between(self.range, self.log, part),
         };
         [self.family.value(first), second]
     }

@@ -1,12 +1,17 @@
 //! Reduction by symmetry: half of a mirror-symmetric leaf, and a planar leaf. The equations of
 //! both are assembled in `assembly`.
+//!
+//! A leaf without loads or rest curvatures out of its plane z = 0 has an equilibrium in the
+//! plane, for which a node has three unknowns: its rotation about z and its displacements along
+//! x and y. Whether it is stable against leaving the plane is decided with the full matrix.
+//! Coupling along z, torsion, and bending about d2 have no effect within the plane.
 
 mod mirror;
-mod planar;
 
 pub use mirror::{half_of, whole_fields, whole_of};
 
 use super::dimensionless::Leaf;
+use crate::scenario::Scenario;
 
 impl Leaf {
     /// The leaf reduced by its symmetries, if it has any: half of it if it is
@@ -17,9 +22,20 @@ impl Leaf {
         }
         let mut reduced = self.clone();
         reduced.mirrored = mirror::is_mirrored(self.scenario());
-        reduced.planar = planar::is_planar(self.scenario());
+        reduced.planar = is_planar(self.scenario());
         (reduced.mirrored || reduced.planar).then_some(reduced)
     }
+}
+
+/// Whether no load, rest curvature or coupling acts out of the plane.
+pub fn is_planar(scenario: &Scenario) -> bool {
+    let in_plane = |load: &[f64; 3]| load[2] == 0.0;
+    in_plane(&scenario.gravity)
+        && in_plane(&scenario.tip_force)
+        && scenario.tip_moment == [0.0; 3]
+        && (scenario.rods.iter())
+            .flat_map(|rod| &rod.rest_curvature[..2])
+            .all(|curvature| curvature.max_abs() == 0.0)
 }
 
 #[cfg(test)]

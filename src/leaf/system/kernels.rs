@@ -38,6 +38,22 @@ impl Coupled<'_> {
         let pull = behind.times(Lanes::of(simd, &coupling[1][c], part), pull);
         Lanes::splat(simd, -self.weights[i]) * pull
     }
+
+    /// Component `c` of (B + E) p at node `i` of its group.
+    #[inline(always)]
+    fn product<S: Simd>(
+        self,
+        simd: S,
+        of: &Group,
+        (i, c): (usize, usize),
+        part: usize,
+    ) -> Lanes<S> {
+        let b_p = Lanes::of(simd, &of.b_p[i][c], part);
+        match c.checked_sub(3) {
+            Some(c) => b_p + self.pull(simd, (i, c), &of.coupling, part),
+            None => b_p,
+        }
+    }
 }
 
 /// p . (B + E) p.
@@ -52,13 +68,9 @@ impl Kernel for Product<'_> {
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let mut sum = Lanes::splat(simd, 0.0);
         let p = &self.coupled.p[self.coupled.group];
-        for (i, (b_p, p)) in self.group.b_p.iter().zip(p).enumerate() {
+        for (i, p) in p.iter().enumerate() {
             for c in 0..6 {
-                let mut k_p = Lanes::of(simd, &b_p[c], part);
-                if c >= 3 {
-                    let coupling = &self.group.coupling;
-                    k_p = k_p + self.coupled.pull(simd, (i, c - 3), coupling, part);
-                }
+                let k_p = self.coupled.product(simd, self.group, (i, c), part);
                 sum = k_p.times(Lanes::of(simd, &p[c], part), sum);
             }
         }
@@ -80,11 +92,7 @@ impl Kernel for Advance<'_> {
         let p = &self.coupled.p[self.coupled.group];
         for i in 0..p.len() {
             for c in 0..6 {
-                let mut k_p = Lanes::of(simd, &self.group.b_p[i][c], part);
-                if c >= 3 {
-                    let coupling = &self.group.coupling;
-                    k_p = k_p + self.coupled.pull(simd, (i, c - 3), coupling, part);
-                }
+                let k_p = self.coupled.product(simd, self.group, (i, c), part);
                 let solution = &mut self.group.solution[i][c];
                 let residual = &mut self.group.residual[i][c];
                 let p = Lanes::of(simd, &p[i][c], part);

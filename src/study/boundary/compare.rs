@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::known::IMAGES;
+use super::known::{IMAGES, image};
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
 use crate::shape::weights;
@@ -146,12 +146,6 @@ impl Edge {
             .map(|pair| distance(&pair[0], &pair[1]));
         off < NEAR + 0.5 * steps.fold(0.0, f64::max)
     }
-}
-
-/// The mirror image of tips, by the signs of y and z.
-fn image(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
-    let signs = DVec3::new(1.0, y, z);
-    tips.iter().map(|tip| signs * tip).collect()
 }
 
 /// The largest distance between corresponding tips.

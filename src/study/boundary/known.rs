@@ -73,7 +73,8 @@ impl Start<'_> {
         let params = self.seed.params(self.refined.fraction);
         let length = direction[0].hypot(direction[1]);
         let singular = Singular {
-            coordinates: coordinates(params, &self.refined.tips),
+            params,
+            tips: &self.refined.tips,
             error: self.refined.fraction_error * length + self.refined.error,
             kind: critical.kind,
             modes: critical.modes.len(),
@@ -87,7 +88,8 @@ impl Start<'_> {
 pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
     let is_known = |point: &Verified| {
         let singular = Singular {
-            coordinates: coordinates(point.params, &point.tips),
+            params: point.params,
+            tips: &point.tips,
             error: error(point),
             kind: point.kind,
             modes: curve.neutral,
@@ -114,8 +116,9 @@ pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
 }
 
 /// A singular point, by its parameters and tips.
-struct Singular {
-    coordinates: Vec<f64>,
+struct Singular<'a> {
+    params: [f64; 2],
+    tips: &'a [DVec3],
     error: f64,
     kind: Kind,
     modes: usize,
@@ -127,7 +130,7 @@ struct Singular {
 /// together: signs of y and z.
 pub const IMAGES: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
 
-impl Singular {
+impl Singular<'_> {
     /// Whether it lies on a curve or on one of its mirror images: no farther from a polynomial
     /// through its points than that is from one of lower degree, with the same indices on both
     /// sides. If more modes become neutral than those of the curve, others cross it there.
@@ -145,7 +148,7 @@ impl Singular {
             }
         }
         IMAGES.iter().any(|signs| {
-            let target = image(&self.coordinates, *signs);
+            let target = coordinates(self.params, &image(self.tips, *signs));
             if let [only] = &points[..] {
                 return distance(&points_of_curve[0], &target) < SAME + self.error + error(only);
             }
@@ -160,13 +163,10 @@ impl Singular {
     }
 }
 
-/// The mirror image of a point, by the signs of y and z of its tips.
-fn image(coordinates: &[f64], [y, z]: [f64; 2]) -> Vec<f64> {
-    let (numbers, tips) = coordinates.split_at(2);
-    let tips = tips
-        .chunks(3)
-        .flat_map(|tip| [tip[0], y * tip[1], z * tip[2]]);
-    numbers.iter().copied().chain(tips).collect()
+/// The mirror image of tips, by the signs of y and z.
+pub fn image(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
+    let signs = DVec3::new(1.0, y, z);
+    tips.iter().map(|tip| signs * tip).collect()
 }
 
 /// Sum of the error bounds of a point.

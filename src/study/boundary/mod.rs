@@ -3,7 +3,6 @@
 mod compare;
 mod known;
 mod map;
-mod neighbours;
 mod result;
 mod run;
 

@@ -15,7 +15,7 @@ pub struct Boundary {
     /// Name of the scenario.
     pub scenario: String,
     /// The parameters.
-    #[serde(rename = "vary", serialize_with = "serialize_keys")]
+    #[serde(rename = "vary")]
     pub keys: [Keys; 2],
     /// Their values at the ends of their ranges.
     pub ranges: [[f64; 2]; 2],
@@ -189,10 +189,6 @@ pub(super) fn word(kind: Kind, special: Option<Special>) -> &'static str {
         (None, Kind::Fold) => "fold",
         (None, Kind::Branching) => "branch-point",
     }
-}
-
-fn serialize_keys<S: Serializer>(keys: &[Keys; 2], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(keys.iter().map(Keys::to_string))
 }
 
 fn serialize_kind<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {

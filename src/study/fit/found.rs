@@ -24,20 +24,11 @@ const NEGLIGIBLE: f64 = 0.1;
 const MISSED: f64 = 0.5;
 const BEYOND: f64 = 3.0;
 
-/// Number of times the leaves of all experiments were relaxed.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Evaluations {
-    /// With the accuracy of a search.
-    pub coarse: usize,
-    /// With the required accuracy.
-    pub accurate: usize,
-}
-
 pub(super) fn fit(
     stats: &Statistics,
     end: &End,
     parameters: Vec<FitParameter>,
-    evaluations: Evaluations,
+    work: FitWork,
     wanted: &[Experiment],
 ) -> Fit {
     let base = stats.model.base;
@@ -92,9 +83,8 @@ pub(super) fn fit(
         residuals: compared(stats),
         candidates,
         work: FitWork {
-            evaluations: evaluations.coarse + evaluations.accurate,
-            accurate: evaluations.accurate,
             last: Model::work(stats.point),
+            ..work
         },
         wall_seconds: 0.0,
         fitted: base.toml(&values).unwrap_or_default(),

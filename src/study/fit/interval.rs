@@ -128,21 +128,11 @@ fn above(stats: &Statistics, point: &Point) -> f64 {
 fn straight(stats: &Statistics, along: &DVector<f64>, half: f64) -> bool {
     let expected = stats.quantile.powi(2);
     [-half, half].into_iter().all(|step| {
-        let theta = moved(stats, stats.point, along, step);
+        let theta = stats.model.moved(&stats.point.theta, step, along);
         let there = stats.model.follow(stats.point, &theta);
         let above = there.map(|point| above(stats, &point));
         above.is_ok_and(|above| (above / expected - 1.0).abs() < QUADRATIC)
     })
-}
-
-fn moved(stats: &Statistics, from: &Point, along: &DVector<f64>, step: f64) -> Vec<f64> {
-    let coordinates = stats.model.coordinates.iter().enumerate();
-    coordinates
-        .map(|(k, free)| {
-            let moved = from.theta[k] + step * along[k];
-            moved.clamp(free.bounds[0], free.bounds[1])
-        })
-        .collect()
 }
 
 /// The end of an interval: where the excess of the profile (the least sum of squares over all
@@ -175,7 +165,7 @@ fn profile(
             return Ok(Side::Open);
         }
         let from = nearest.as_ref().unwrap_or(stats.point);
-        let start = moved(stats, from, along, sign * (reach - inside.0));
+        let start = (stats.model).moved(&from.theta, sign * (reach - inside.0), along);
         let start = stats.model.follow(from, &start);
         let least = start.ok().map(|start| {
             let mut iteration = Iteration::new(stats.model, stats.weighting, progress);

@@ -293,11 +293,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
 
     fn clamped(&self, theta: &[f64], change: &DVector<f64>) -> Vec<f64> {
         let shorten = (LONGEST_STEP / change.amax()).min(1.0);
-        (self.model.coordinates.iter().zip(theta).zip(change.iter()))
-            .map(|((free, theta), change)| {
-                (theta + shorten * change).clamp(free.bounds[0], free.bounds[1])
-            })
-            .collect()
+        self.model.moved(theta, shorten, change)
     }
 }
 

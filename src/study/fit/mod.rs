@@ -20,7 +20,6 @@ mod least_squares;
 mod model;
 mod neighbourhood;
 mod quantity;
-mod responses;
 mod result;
 mod statistics;
 mod vein;
@@ -38,7 +37,6 @@ use std::time::Instant;
 use super::{Base, VaryError};
 use crate::limit::Limit;
 use crate::relax::{Lost, Options, RelaxError, check_tolerance};
-use found::Evaluations;
 use free::Coordinate;
 use least_squares::{ASSUMED, End, Iteration, Weighting};
 use model::{Model, Point};
@@ -158,7 +156,7 @@ impl<'m, 'a> Search<'m, 'a> {
     fn run(&self, first: &Point, progress: &mut dyn FnMut(&FitStep)) -> Result<Fit, FitError> {
         let (model, weighting) = (self.model, self.weighting);
         let (mut coarse, mut point) = model.coarse(first, weighting)?;
-        let mut evaluations = Evaluations::default();
+        let mut work = FitWork::default();
         let mut attempts = 0;
         let mut jumps = 0;
         let mut found = loop {
@@ -169,14 +167,15 @@ impl<'m, 'a> Search<'m, 'a> {
             };
             let mut search = Iteration::new(&coarse, weighting, &mut searching);
             let (near, searched, more) = search.run(point);
-            evaluations.coarse += more;
+            work.evaluations += more;
             attempts += 1;
             let there = model.follow(&near, &near.theta);
             let there = there.or_else(|_| model.find(&near.theta))?;
             let mut last = Iteration::new(model, weighting, &mut searching);
             last.lean = true;
             let (mut least, end, more) = last.run(there);
-            evaluations.accurate += 1 + more;
+            work.evaluations += 1 + more;
+            work.accurate += 1 + more;
             let beyond = last
                 .jump
                 .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
@@ -210,7 +209,7 @@ impl<'m, 'a> Search<'m, 'a> {
                 }
                 Err(_) => (End::MostSteps, interval::without_intervals(&stats)),
             };
-            break found::fit(&stats, &end, parameters, evaluations, self.candidates);
+            break found::fit(&stats, &end, parameters, work, self.candidates);
         };
         if jumps > 0 {
             found.remarks.push(JUMPED.into());

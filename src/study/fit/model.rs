@@ -3,6 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::FitError;
@@ -214,6 +215,16 @@ impl<'a> Model<'a> {
                 size.max(f64::MIN_POSITIVE)
             }
         }
+    }
+
+    /// Values of the coordinates after `step` times a change, within their bounds.
+    pub fn moved(&self, from: &[f64], step: f64, change: &DVector<f64>) -> Vec<f64> {
+        let coordinates = self.coordinates.iter().zip(from).zip(change.iter());
+        let moved = coordinates.map(|((free, from), change)| {
+            let [low, high] = free.bounds;
+            (from + step * change).clamp(low, high)
+        });
+        moved.collect()
     }
 
     pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {

@@ -78,15 +78,12 @@ impl<'j, 'm, 'a> Neighbourhood<'j, 'm, 'a> {
 
     /// The values after a change from the minimum, clamped to the bounds.
     pub fn moved(&self, change: &DVector<f64>) -> Vec<f64> {
-        let stats = self.stats;
-        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
-        let moved = coordinates.zip(change.iter()).zip(&self.fixed);
+        let theta = &self.stats.point.theta;
+        let mut moved = self.stats.model.moved(theta, 1.0, change);
+        for k in (0..theta.len()).filter(|&k| self.fixed[k]) {
+            moved[k] = theta[k];
+        }
         moved
-            .map(|(((free, theta), change), fixed)| match fixed {
-                true => *theta,
-                false => (theta + change).clamp(free.bounds[0], free.bounds[1]),
-            })
-            .collect()
     }
 
     /// The residuals for other values, and their point, followed from a point with

@@ -14,6 +14,7 @@ use super::Map;
 use super::cell::relaxed;
 use super::request::MapRequest;
 use super::row::{MapMethod, MapRow};
+use crate::branch::value_between;
 use crate::limit::Limit;
 use crate::relax::Method;
 use crate::scenario::longest;
@@ -140,10 +141,7 @@ fn distances(a: &MapRow, b: &MapRow) -> [f64; 2] {
 fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
     let axis = &request.axes[pair.axis];
     let ends = pair.cells.map(|cell| request.values(cell)[pair.axis].1);
-    let value = |part: f64| match axis.log {
-        true => ends[0] * (ends[1] / ends[0]).powf(part),
-        false => ends[0] + part * (ends[1] - ends[0]),
-    };
+    let value = |part: f64| value_between(ends, axis.log, part);
     let at = |part: f64| answer(request, pair, value(part));
     let length = longest(&request.base.scenario().rods);
     let [mut low, mut high] = [(0.0, at(0.0)?), (1.0, at(1.0)?)];

@@ -37,16 +37,7 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
     };
     let unknown = Push {
         direction,
-        kind: Loss::Unknown,
-        force: None,
-        error: None,
-        per_weight: None,
-        more_than: None,
-        then: None,
-        neighbour: None,
-        tips: Vec::new(),
-        mirrored: false,
-        remark: None,
+        ..Push::default()
     };
     let failed = |why: String| Push {
         more_than: Some(0.0),

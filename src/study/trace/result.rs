@@ -17,7 +17,7 @@ pub struct Trace {
     /// Name of the scenario.
     pub scenario: String,
     /// The number that varied.
-    #[serde(rename = "vary", serialize_with = "serialize_keys")]
+    #[serde(rename = "vary")]
     pub keys: Keys,
     /// Its values at the ends of the range.
     pub range: [f64; 2],
@@ -247,10 +247,6 @@ impl Serialize for TraceBranch {
         object.serialize_field("critical", &critical)?;
         object.end()
     }
-}
-
-fn serialize_keys<S: Serializer>(keys: &Keys, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(keys)
 }
 
 fn serialize_index<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
