@@ -35,11 +35,11 @@ const ROUNDING: f64 = 10.0;
 /// The equations of a family of leaves on a grid, with workspace.
 pub struct Equations<'a> {
     /// The leaves.
-    pub leaves: Leaves<'a>,
+    pub leaves: Leaves<&'a Family<'a>>,
     /// The same with softened matrices, if these determine what is critical.
     /// Newton's method needs the true ones: near singular points of the softened it
     /// would not converge.
-    pub softened: Option<Leaves<'a>>,
+    pub softened: Option<Leaves<&'a Family<'a>>>,
     /// The mass of the leaf without its base.
     pub(super) mass: f64,
     pub(super) system: System,
@@ -84,7 +84,7 @@ impl<'a> Equations<'a> {
         Equations::of(Leaves::new(family, grid))
     }
 
-    fn of(mut leaves: Leaves<'a>) -> Result<Self, OutOfRange> {
+    fn of(mut leaves: Leaves<&'a Family<'a>>) -> Result<Self, OutOfRange> {
         // Veins may be coupled at one end of the range only.
         let coupled = leaves.at(0.0)?.coupled();
         let system = System::new(leaves.at(if coupled { 0.0 } else { 1.0 })?);
@@ -325,7 +325,7 @@ impl<'a> Equations<'a> {
 
 /// Returns the forces and their rates; the matrix is left in the system.
 fn linearise(
-    leaves: &mut Leaves,
+    leaves: &mut Leaves<&Family>,
     system: &mut System,
     state: &mut State,
     fraction: f64,

@@ -140,7 +140,7 @@ impl<'a> Family<'a> {
 }
 
 /// A leaf on a grid, if requested softened: see [`Leaves::softened`].
-pub(super) fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
+fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     for section in &mut discrete.sections {
         section.condensing = match softening {
@@ -151,20 +151,35 @@ pub(super) fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> D
     discrete
 }
 
-/// Leaves of a family on one grid. The last few are cached: iterations
-/// return to them, and making a scenario costs more than assembling a small leaf.
-pub struct Leaves<'a> {
-    pub family: &'a Family<'a>,
-    pub grid: Grid,
-    softening: Option<f64>,
-    cache: LruCache<f64, DiscreteLeaf, CACHED>,
+/// Leaves that differ in parameters, which are given as fractions of their ranges.
+pub trait Source: Copy {
+    type At: Copy + PartialEq;
+
+    fn leaf_at(self, at: Self::At) -> Result<Leaf, OutOfRange>;
 }
 
-/// Number of cached leaves: those of a difference over the parameter, and one more.
-const CACHED: usize = 4;
+impl Source for &Family<'_> {
+    type At = f64;
 
-impl<'a> Leaves<'a> {
-    pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
+    fn leaf_at(self, fraction: f64) -> Result<Leaf, OutOfRange> {
+        self.leaf(fraction)
+    }
+}
+
+/// Leaves of a family, or of a plane, on one grid. The last few are cached: iterations
+/// return to them, and making a scenario costs more than assembling a small leaf.
+pub struct Leaves<F: Source> {
+    pub family: F,
+    pub grid: Grid,
+    softening: Option<f64>,
+    cache: LruCache<F::At, DiscreteLeaf, CACHED>,
+}
+
+/// Number of cached leaves: those of differences over two parameters, and one more.
+const CACHED: usize = 6;
+
+impl<F: Source> Leaves<F> {
+    pub fn new(family: F, grid: Grid) -> Self {
         Leaves {
             family,
             grid,
@@ -178,7 +193,7 @@ impl<'a> Leaves<'a> {
     /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
     /// the point at which they become neutral is analytic in the softening, and can be
     /// extrapolated to zero softening.
-    pub fn softened(family: &'a Family<'a>, grid: Grid, softening: f64) -> Self {
+    pub fn softened(family: F, grid: Grid, softening: f64) -> Self {
         Leaves {
             softening: Some(softening),
             ..Leaves::new(family, grid)
@@ -197,12 +212,11 @@ impl<'a> Leaves<'a> {
         }
     }
 
-    /// The leaf at a fraction of the range.
-    pub fn at(&mut self, fraction: f64) -> Result<&DiscreteLeaf, OutOfRange> {
-        let Leaves { family, grid, .. } = self;
-        self.cache.at(fraction, || {
-            Ok(discretised(&family.leaf(fraction)?, grid, self.softening))
-        })
+    /// The leaf at these parameters.
+    pub fn at(&mut self, at: F::At) -> Result<&DiscreteLeaf, OutOfRange> {
+        let (family, grid, softening) = (self.family, &self.grid, self.softening);
+        let make = || Ok(discretised(&family.leaf_at(at)?, grid, softening));
+        self.cache.at(at, make)
     }
 }
 

@@ -1,9 +1,9 @@
 //! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
 
-use super::plane::{Plane, PlaneLeaves};
+use super::plane::Plane;
 use crate::branch::deflation::{STIFF, Solved};
 use crate::branch::equations::{Equations, ITERATIONS, Stuck, assembled, at_rest};
-use crate::branch::family::OutOfRange;
+use crate::branch::family::{Leaves, OutOfRange};
 use crate::branch::field::{add, between, dot, plus, times};
 use crate::branch::states::{advanced, forces_on, rate};
 use crate::leaf::{DiscreteLeaf, Field, Grid, State, System};
@@ -61,9 +61,9 @@ pub struct Sample {
 pub struct Manifold<'a> {
     pub plane: Plane<'a>,
     pub equations: Equations<'a>,
-    leaves: PlaneLeaves<'a>,
+    leaves: Leaves<Plane<'a>>,
     /// The softened ones whose matrices determine what is singular, if any.
-    softened: Option<PlaneLeaves<'a>>,
+    softened: Option<Leaves<Plane<'a>>>,
 }
 
 impl<'a> Manifold<'a> {
@@ -74,7 +74,7 @@ impl<'a> Manifold<'a> {
     }
 
     fn of(plane: Plane<'a>, mut equations: Equations<'a>) -> Result<Self, OutOfRange> {
-        let mut leaves = PlaneLeaves::new(plane, equations.grid().clone(), None);
+        let mut leaves = Leaves::new(plane, equations.grid().clone());
         // Veins may be coupled at one end of the second range only.
         for end in [0.0, 1.0] {
             let leaf = leaves.at([0.0, end])?;
@@ -96,9 +96,9 @@ impl<'a> Manifold<'a> {
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:
-    /// see [`Leaves::softened`](crate::branch::family::Leaves::softened).
+    /// see [`Leaves::softened`].
     pub fn soften(&mut self, softening: f64) {
-        let leaves = PlaneLeaves::new(self.plane, self.grid().clone(), Some(softening));
+        let leaves = Leaves::softened(self.plane, self.grid().clone(), softening);
         self.softened = Some(leaves);
     }
 

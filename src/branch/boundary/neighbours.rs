@@ -1,7 +1,6 @@
 //! Leaves on either side of a stability boundary.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
 use super::grids::state_on_coarser;
 use super::manifold::{Direction, Manifold, Solution};
@@ -9,8 +8,9 @@ use super::plane::Plane;
 use super::search::NotFound;
 use super::table::Verified;
 use crate::branch::critical::Kind;
+use crate::branch::family::Source;
 use crate::branch::field::every_second;
-use crate::leaf::{Grid, Leaf, State};
+use crate::leaf::{Grid, State};
 use crate::limit::Limit;
 use crate::relax::fall::settle_from;
 
@@ -118,8 +118,7 @@ fn beyond(point: &Verified, stable: &Solution, along: [f64; 2]) -> Option<Soluti
 
 /// The equilibrium to which a leaf relaxes.
 fn at_rest(plane: Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
-    let scenario = Arc::new(plane.scenario(from.params).ok()?);
-    let leaf = Leaf::in_units(scenario, plane.family.scale());
+    let leaf = plane.leaf_at(from.params).ok()?;
     let state = settle_from(&leaf, grid, from.state.clone(), &Limit::default())?;
     Some(Neighbour {
         solution: Solution {

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::branch::cache::LruCache;
-use crate::branch::family::{Family, OutOfRange, between, discretised};
-use crate::leaf::{DiscreteLeaf, Grid, Leaf};
+use crate::branch::family::{Family, OutOfRange, Source, between};
+use crate::leaf::Leaf;
 use crate::scenario::Scenario;
 
 /// Fractions within this of an end are at the end.
@@ -57,34 +56,11 @@ impl Plane<'_> {
     }
 }
 
-/// Leaves of a plane on one grid, as [`crate::branch::family::Leaves`] of a family: the last few
-/// are cached, and they may be softened.
-pub struct PlaneLeaves<'a> {
-    plane: Plane<'a>,
-    grid: Grid,
-    softening: Option<f64>,
-    cache: LruCache<[f64; 2], DiscreteLeaf, CACHED>,
-}
+impl Source for Plane<'_> {
+    type At = [f64; 2];
 
-/// Number of cached leaves: those of differences over both parameters, and one more.
-const CACHED: usize = 6;
-
-impl<'a> PlaneLeaves<'a> {
-    pub fn new(plane: Plane<'a>, grid: Grid, softening: Option<f64>) -> Self {
-        PlaneLeaves {
-            plane,
-            grid,
-            softening,
-            cache: LruCache::default(),
-        }
-    }
-
-    /// The leaf at fractions of both ranges.
-    pub fn at(&mut self, params: [f64; 2]) -> Result<&DiscreteLeaf, OutOfRange> {
-        self.cache.at(params, || {
-            let scenario = Arc::new(self.plane.scenario(params)?);
-            let leaf = Leaf::in_units(scenario, self.plane.family.scale());
-            Ok(discretised(&leaf, &self.grid, self.softening))
-        })
+    fn leaf_at(self, params: [f64; 2]) -> Result<Leaf, OutOfRange> {
+        let scenario = Arc::new(self.scenario(params)?);
+        Ok(Leaf::in_units(scenario, self.family.scale()))
     }
 }
