@@ -3,7 +3,7 @@
 use super::state::State;
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario};
+use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, ascending};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -102,9 +102,7 @@ impl Leaf {
             ..
         } = &scenario.dynamics;
         let profiles = profiles.chain(density).chain(rotary_inertia);
-        let mut kinks: Vec<f64> = profiles.flat_map(Profile::kinks).copied().collect();
-        kinks.sort_by(f64::total_cmp);
-        kinks.dedup();
+        let kinks = ascending(profiles.flat_map(Profile::kinks).copied());
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;

@@ -78,6 +78,11 @@ impl State {
         self.x[self.base(j) + self.segments]
     }
 
+    /// Positions of the tips of all rods.
+    pub fn tips(&self) -> impl Iterator<Item = DVec3> {
+        (0..self.rods()).map(|j| self.tip(j))
+    }
+
     /// The largest displacement between this state and another at the nodes common to both
     /// grids, of which one is a repeated halving of the other (or the same).
     pub fn shift_to(&self, other: &State) -> f64 {

@@ -210,14 +210,7 @@ fn minus(a: &Node, b: &Node) -> Node {
 
 fn unpack(leaf: &Leaf, j: usize, sigma: f64, values: &Node) -> NodeState {
     let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
-    let mut node = NodeState {
-        position: vector(0),
-        rotation: DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize(),
-        v: DVec3::X,
-        u: DVec3::ZERO,
-        n: vector(7),
-        m: vector(10),
-    };
-    shape::strains(leaf, j, sigma, &mut node);
-    shape::in_units(node, leaf.scale)
+    let rotation = DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize();
+    let resultants = [vector(7), vector(10)];
+    shape::node(leaf, (j, sigma), (vector(0), rotation), resultants)
 }

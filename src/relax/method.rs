@@ -83,12 +83,6 @@ impl Method {
         }
     }
 
-    /// The method of this name, with default options. Names of earlier releases are accepted
-    /// too.
-    pub fn named(word: &str) -> Option<Method> {
-        word.parse().ok()
-    }
-
     /// Segments per rod of a fixed grid, if the method has one.
     pub fn segments(self) -> Option<usize> {
         match self {

@@ -1,45 +1,45 @@
 //! Strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, Leaf, State};
-use crate::scenario::Scale;
 use crate::shape::{NodeState, RodShape};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
-/// The state of node `i` of rod `j`, dimensionless: strains follow from the stress
-/// resultants by eqs (5) and (6).
-pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState {
-    let [n, m] = resultants(leaf, state, j, i);
-    let k = state.base(j) + i;
-    let mut node = NodeState {
-        position: state.x[k],
-        rotation: state.q[k],
-        v: DVec3::X,
-        u: DVec3::ZERO,
-        n,
-        m,
-    };
-    strains(&leaf.leaf, j, leaf.grid.sigma()[i], &mut node);
-    node
-}
-
-/// A dimensionless node in the units of a scenario.
-pub fn in_units(node: NodeState, scale: Scale) -> NodeState {
+/// The state of rod `j` at `sigma`, from its dimensionless position and rotation and its stress
+/// resultants along the directors, in the units of the scenario: strains follow from these by
+/// eqs (5) and (6).
+pub fn node(
+    leaf: &Leaf,
+    (j, sigma): (usize, f64),
+    (position, rotation): (DVec3, DQuat),
+    [n, m]: [DVec3; 2],
+) -> NodeState {
+    let (section, scale) = (leaf.section(j, sigma, 1.0), leaf.scale);
+    let u = section.rest_curvature + m / section.couple_stiffness;
     NodeState {
-        position: node.position * scale.length,
-        u: node.u / scale.length,
-        n: node.n * scale.force(),
-        m: node.m * scale.moment(),
-        ..node
+        position: position * scale.length,
+        rotation,
+        v: section.rest_strain + section.compliance * n,
+        u: u / scale.length,
+        n: n * scale.force(),
+        m: m * scale.moment(),
     }
 }
 
 /// All rods of a state in the units of the scenario.
 pub fn rods(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
-    let scale = leaf.leaf.scale;
     let rod = |j: usize| {
-        let nodes = (0..=leaf.segments()).map(|i| in_units(node(leaf, state, j, i), scale));
+        let nodes = leaf.grid.sigma().iter().enumerate().map(|(i, sigma)| {
+            let k = state.base(j) + i;
+            let resultants = resultants(leaf, state, j, i);
+            node(
+                &leaf.leaf,
+                (j, *sigma),
+                (state.x[k], state.q[k]),
+                resultants,
+            )
+        });
         RodShape {
-            length: leaf.leaf.length(j) * scale.length,
+            length: leaf.leaf.length(j) * leaf.leaf.scale.length,
             nodes: nodes.collect(),
         }
     };
@@ -71,11 +71,4 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
         (force, segment(i - 1).2)
     };
     [force, moment].map(|vector| to_directors * vector)
-}
-
-/// Sets v and u of a node from its n and m by the constitutive law.
-pub fn strains(leaf: &Leaf, j: usize, sigma: f64, node: &mut NodeState) {
-    let section = leaf.section(j, sigma, 1.0);
-    node.v = section.rest_strain + section.compliance * node.n;
-    node.u = section.rest_curvature + node.m / section.couple_stiffness;
 }

@@ -85,9 +85,7 @@ impl Equilibrium {
                         sum(weights, &known.positions, &known.tangents)
                     });
                 }
-                let mut node = known.at(place, at_rest);
-                strains(&scenario.rods[j], place.at, &mut node);
-                node
+                known.at(place, at_rest, &scenario.rods[j])
             });
             let nodes = nodes.collect();
             between = between.max(differences.error());
@@ -151,9 +149,9 @@ impl NodalFields {
         }
     }
 
-    /// The state at a point, without its strains. Away from equilibrium the equations do not
-    /// give the slopes.
-    fn at(&self, place: &Place, at_rest: bool) -> NodeState {
+    /// The state at a point, its strains by the constitutive law of the rod. Away from equilibrium
+    /// the equations do not give the slopes.
+    fn at(&self, place: &Place, at_rest: bool, rod: &Rod) -> NodeState {
         let lagrange: Slopes = (place.lagrange().into_iter())
             .map(|(i, weight)| (i, weight, 0.0))
             .collect();
@@ -169,13 +167,16 @@ impl NodalFields {
         }
         let rotation = DQuat::from_array(q).normalize();
         let to_directors = rotation.conjugate();
+        let n = to_directors * sum(&lagrange, &self.forces, &self.forces);
+        let m = to_directors * sum(hermite, &self.moments, &self.torques);
+        let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(place.at)));
         NodeState {
             position: sum(hermite, &self.positions, &self.tangents),
             rotation,
-            v: DVec3::X,
-            u: DVec3::ZERO,
-            n: to_directors * sum(&lagrange, &self.forces, &self.forces),
-            m: to_directors * sum(hermite, &self.moments, &self.torques),
+            v: rod.rest_stretch.at(place.at) * DVec3::X + n / triple(&rod.force_stiffness),
+            u: triple(&rod.rest_curvature) + m / triple(&rod.couple_stiffness),
+            n,
+            m,
         }
     }
 }
@@ -185,13 +186,6 @@ fn sum(weights: &Slopes, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
     terms
         .map(|&(i, value, slope)| value * values[i] + slope * slopes[i])
         .sum()
-}
-
-/// Sets the strains by the constitutive law.
-fn strains(rod: &Rod, at: f64, node: &mut NodeState) {
-    let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(at)));
-    node.v = rod.rest_stretch.at(at) * DVec3::X + node.n / triple(&rod.force_stiffness);
-    node.u = triple(&rod.rest_curvature) + node.m / triple(&rod.couple_stiffness);
 }
 
 #[cfg(test)]

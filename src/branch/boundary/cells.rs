@@ -135,6 +135,7 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
     let branch = walk(equations, first, &how, &mut |_, _| {});
     path.factorizations += equations.factorizations - before;
     path.grid = Some(equations.grid().clone());
+    let tips = |point: &Point| point.state.tips().collect();
     path.tips = branch.points.iter().map(tips).collect();
     path.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
     path.turned = matches!(branch.end, Some(End::Enough | End::Returned));
@@ -142,11 +143,6 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
         Some(End::Reached) if branch.missed.is_empty() => branch.points.last().cloned(),
         _ => None,
     }
-}
-
-fn tips(point: &Point) -> Vec<DVec3> {
-    let state = &point.state;
-    (0..state.rods()).map(|j| state.tip(j)).collect()
 }
 
 /// A critical point on the path between two points of the plane, extrapolated over grids.

@@ -63,9 +63,17 @@ fn transferred(
 /// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
 /// not its refinement.
 pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
-    let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
-    let coarse = Grid::through(&stations, plane.family.first().kinks());
-    let n = state.segments();
-    let refined = n.is_multiple_of(2) && n / 2 >= COARSEST && coarse.refined() == *grid;
-    refined.then(|| (coarse, restrict(state)))
+    let half = state.segments() / 2;
+    if half < COARSEST || 2 * half != state.segments() {
+        return None;
+    }
+    let coarse = coarsened(grid, half, plane.family.first().kinks());
+    (coarse.refined() == *grid).then(|| (coarse, restrict(state)))
+}
+
+/// The grid of so many segments that this one refines.
+pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
+    let stations = grid.sigma().iter().copied();
+    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
+    Grid::through(&stations, kinks)
 }

@@ -42,6 +42,7 @@ mod walk;
 
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
 pub use follow::{Boundary, Halt, follow};
+pub use grids::coarsened;
 #[cfg(test)]
 pub use manifold::Direction;
 pub use manifold::Solution;

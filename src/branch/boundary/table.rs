@@ -127,7 +127,7 @@ impl Table {
             self.rounded[i] = self.rounded[i].max(rounding[i]);
             self.softened[i] = self.softened[i].max(numbers.errors[i]);
         }
-        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
+        let tips = state.tips().flat_map(|tip| tip.to_array());
         self.tips.push(state.segments(), tips.collect());
         for (table, number) in self.numbers.iter_mut().zip(numbers.values) {
             table.push(state.segments(), vec![number]);

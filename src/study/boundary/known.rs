@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::branch::boundary::{Boundary, Halt, Seed, Verified};
+use crate::branch::boundary::{Boundary, Halt, Seed, Verified, coarsened};
 use crate::branch::{Critical, Kind, Point, Refined};
 use crate::leaf::Grid;
 use crate::shape::weights;
@@ -172,13 +172,6 @@ pub fn image(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
 /// Sum of the error bounds of a point.
 fn error(point: &Verified) -> f64 {
     point.errors[0] + point.errors[1] + point.error
-}
-
-/// The grid of so many segments that this one refines.
-pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
-    let stations = grid.sigma().iter().copied();
-    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
-    Grid::through(&stations, kinks)
 }
 
 fn sorted([a, b]: [usize; 2]) -> [usize; 2] {

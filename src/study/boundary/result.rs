@@ -133,11 +133,6 @@ impl BoundaryMap {
     pub fn known(&self) -> usize {
         self.index.iter().flatten().flatten().count()
     }
-
-    /// Number of cells.
-    pub fn cells(&self) -> usize {
-        self.first.len() * self.second.len()
-    }
 }
 
 impl Halt {

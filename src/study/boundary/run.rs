@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::known::{Start, coarsened, remove_known, traced};
+use super::known::{Start, remove_known, traced};
 use super::map::Cells;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
     self as curves, Accuracy, AtRest, Halt, Neighbour, Plane, Seed, Solution, Verified,
-    WalkOptions, beside, refine_on_path,
+    WalkOptions, beside, coarsened, refine_on_path,
 };
 use crate::scenario::Scenario;
 use crate::study::trace::{Trace, TraceError, TraceRequest};
@@ -301,7 +301,7 @@ fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary)
 
 fn beside_in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
     let (family, state) = (plane.family, &leaf.solution.state);
-    let tips: Vec<DVec3> = (0..state.rods()).map(|j| state.tip(j)).collect();
+    let tips: Vec<DVec3> = state.tips().collect();
     LeafBeside {
         values: plane.values(leaf.solution.params),
         index: leaf.index,
