@@ -31,21 +31,16 @@ pub struct LoadedMode {
 /// As [`lowest`], with the shapes and forces of the leaf without softening:
 /// derivatives of an eigenvalue, unlike the eigenvalue itself, depend on errors of these
 /// in first order. The effect of softening is removed by means of the modes of a softer leaf.
-pub fn loaded(
-    leaf: &DiscreteLeaf,
-    physics: &Physics,
-    state: &State,
-    count: usize,
-    time: &Limit,
-) -> Option<Vec<LoadedMode>> {
+pub fn loaded(leaf: &DiscreteLeaf, state: &State, count: usize) -> Option<Vec<LoadedMode>> {
+    let (physics, time) = (Physics::new(&leaf.leaf), Limit::default());
     let of = |soft: &DiscreteLeaf, near: &[Eigenpair]| {
         let wanted = Wanted {
             count,
             accuracy: DERIVED,
             near,
-            time,
+            time: &time,
         };
-        of_softened(soft, physics, state, wanted)
+        of_softened(soft, &physics, state, wanted)
     };
     let with_forces = |soft: &DiscreteLeaf, pairs: Vec<Eigenpair>| -> Vec<LoadedMode> {
         let loaded = |pair: Eigenpair| LoadedMode {
@@ -108,7 +103,8 @@ impl LoadedMode {
 /// The eigenvalue from the shape and the forces of a mode, possibly those of a neighbouring
 /// leaf and state: their errors have only a second-order effect. In the
 /// scenario's unit of time.
-pub fn eigenvalue(leaf: &DiscreteLeaf, physics: &Physics, state: &State, mode: &LoadedMode) -> f64 {
+pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &LoadedMode) -> f64 {
+    let physics = Physics::new(&leaf.leaf);
     let quotient = quotient::with_forces(leaf, state, &mode.shape, &mode.forces);
-    quotient / masses::mass(leaf, physics, state, &mode.shape) * physics.time.powi(-2)
+    quotient / masses::mass(leaf, &physics, state, &mode.shape) * physics.time.powi(-2)
 }

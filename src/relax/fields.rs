@@ -3,11 +3,11 @@
 use crate::leaf::{Grid, Leaf, RodFields};
 use crate::relax::defect::Estimate;
 use crate::relax::level::Level;
-use crate::relax::nodes::{Node, RodNodes, components, with_sign_of};
+use crate::relax::nodes::{Node, RodNodes, components, unpacked, with_sign_of};
 use crate::relax::place::{ErrorMeasures, Place, Values};
 use crate::relax::shape;
-use crate::shape::{NodeState, RodShape};
-use glam::{DQuat, DVec3};
+use crate::shape::RodShape;
+use glam::DVec3;
 
 /// In an end interval, the error of the polynomial is this part of the leave-one-out error at
 /// a known node, if the difference is smooth: the ratio of the products of distances, 14.8 to
@@ -113,7 +113,10 @@ impl Fields {
             RodShape {
                 length: leaf.length(j) * leaf.scale.length,
                 nodes: stations
-                    .map(|(values, sigma)| unpack(leaf, j, *sigma, values))
+                    .map(|(values, sigma)| {
+                        let (x, q, resultants) = unpacked(values);
+                        shape::node(leaf, (j, *sigma), (x, q), resultants)
+                    })
                     .collect(),
             }
         });
@@ -206,11 +209,4 @@ fn correct(
 
 fn minus(a: &Node, b: &Node) -> Node {
     std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn unpack(leaf: &Leaf, j: usize, sigma: f64, values: &Node) -> NodeState {
-    let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
-    let rotation = DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize();
-    let resultants = [vector(7), vector(10)];
-    shape::node(leaf, (j, sigma), (vector(0), rotation), resultants)
 }

@@ -21,14 +21,9 @@ pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodField
     }
     let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
     let node = |values: &Node| {
-        let vector = |k: usize| DVec3::from_slice(&values[k..]);
-        let q = DQuat::from_slice(&values[3..]).normalize();
-        RodFields {
-            x: vector(0),
-            q,
-            n: q * vector(7),
-            m: q * vector(10),
-        }
+        let (x, q, resultants) = unpacked(values);
+        let [n, m] = resultants.map(|vector| q * vector);
+        RodFields { x, q, n, m }
     };
     let rod = |j: usize| {
         let nodes = RodNodes::new(&used, finest, j).extrapolated(parts);
@@ -120,6 +115,13 @@ pub fn components(x: DVec3, q: DQuat, n: DVec3, m: DVec3) -> Node {
     [
         x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
     ]
+}
+
+/// The same as position, rotation, force and moment.
+pub fn unpacked(node: &Node) -> (DVec3, DQuat, [DVec3; 2]) {
+    let vector = |k: usize| DVec3::from_slice(&node[k..]);
+    let q = DQuat::from_slice(&node[3..]).normalize();
+    (vector(0), q, [vector(7), vector(10)])
 }
 
 /// Of q and -q the one nearer to `other`.

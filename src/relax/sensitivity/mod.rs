@@ -10,7 +10,6 @@ pub(crate) use self::nearby::Nearby;
 pub(crate) use self::response::Linearized;
 use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
-use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::equilibrium::{Reaction, Sensitivity};
@@ -191,7 +190,7 @@ impl Grid<'_> {
         // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
         let physics = Physics::new(&leaf.leaf);
         let modes = match self.modes > 0 && moment == DVec3::ZERO {
-            true => modes::loaded(leaf, &physics, state, self.modes, &Limit::default()),
+            true => modes::loaded(leaf, state, self.modes),
             false => None,
         };
         let modes = modes.unwrap_or_default();

@@ -3,7 +3,6 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
 use crate::modes::{self, LoadedMode};
-use crate::motion::Physics;
 use crate::relax::level::Level;
 use crate::relax::sensitivity::response::moved;
 use crate::scenario::Scenario;
@@ -51,10 +50,7 @@ impl Nearby {
     /// The derivative of the eigenvalue of a mode: that of its Rayleigh quotient between
     /// neighbouring equilibria, as changes of its shape enter in second order only.
     pub fn eigenvalue_rate(&self, mode: &LoadedMode) -> f64 {
-        let term = |near: &Near| {
-            let physics = Physics::new(&near.leaf.leaf);
-            near.weight * modes::eigenvalue(&near.leaf, &physics, &near.state, mode)
-        };
+        let term = |near: &Near| near.weight * modes::eigenvalue(&near.leaf, &near.state, mode);
         self.0.iter().map(term).sum()
     }
 

@@ -9,7 +9,6 @@ use super::experiments::{Case, Observed};
 use super::quantity::{Kind, Quantity};
 use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
-use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
@@ -95,14 +94,7 @@ impl CaseAt {
         for level in at.levels.iter().filter(|_| count > 0) {
             let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
             if modes.is_empty() || unknowns < FEW_UNKNOWNS {
-                let physics = Physics::new(&level.leaf.leaf);
-                let pairs = modes::loaded(
-                    &level.leaf,
-                    &physics,
-                    &level.state,
-                    count,
-                    &Limit::default(),
-                );
+                let pairs = modes::loaded(&level.leaf, &level.state, count);
                 let lost = || Lost::NotAtRest("its frequencies cannot be found".into());
                 let pairs = pairs
                     .filter(|pairs| pairs.len() == count)
