@@ -27,7 +27,9 @@ const ENERGY_SLACK: f64 = 1e-9;
 
 /// Velocities, and the time step; an infinite time step is Newton's method.
 pub(super) struct Motion {
-    time_step: TimeStep,
+    dt: f64,
+    /// Growth factor of the time step after an accepted step.
+    growth: f64,
     pub(super) velocity: Vec<Vec<Increment>>,
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
@@ -44,10 +46,8 @@ impl Motion {
     pub(super) fn new(leaf: &DiscreteLeaf) -> Self {
         let velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
         Motion {
-            time_step: TimeStep {
-                dt: f64::INFINITY,
-                growth: MAX_GROWTH,
-            },
+            dt: f64::INFINITY,
+            growth: MAX_GROWTH,
             next_velocity: velocity.clone(),
             velocity,
             newton: f64::INFINITY,
@@ -57,13 +57,13 @@ impl Motion {
     }
 
     pub(super) fn is_newton(&self) -> bool {
-        self.time_step.dt.is_infinite()
+        self.dt.is_infinite()
     }
 
     /// Factors (1/dt + c)/dt on the mass in the matrix of the next step, and 1/dt on the momenta;
     /// `None` if it is Newton's.
     pub(super) fn inertia(&self) -> Option<[f64; 2]> {
-        let dt = self.time_step.dt;
+        let dt = self.dt;
         (!self.is_newton()).then_some([(1.0 / dt + DAMPING) / dt, 1.0 / dt])
     }
 
@@ -84,12 +84,17 @@ impl Motion {
             self.newton_part /= 2.0;
             return true;
         }
-        self.time_step.shorten()
+        self.shorten_in_time()
     }
 
-    /// Takes a shorter time step; false if there is none.
+    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
     pub(super) fn shorten_in_time(&mut self) -> bool {
-        self.time_step.shorten()
+        self.dt = match self.dt.is_finite() {
+            true => self.dt / 4.0,
+            false => FIRST_STEP,
+        };
+        self.growth = 1.0;
+        self.dt >= SHORTEST_STEP
     }
 
     /// Whether the total energy does not grow in a step, of which the fraction `part` is
@@ -103,7 +108,7 @@ impl Motion {
         let [mut energy, mut next_energy] = potential;
         if !self.is_newton() {
             energy += system.kinetic_energy(&self.velocity);
-            system.velocity(part, self.time_step.dt, &mut self.next_velocity);
+            system.velocity(part, self.dt, &mut self.next_velocity);
             next_energy += system.kinetic_energy(&self.next_velocity);
         }
         let slack = ENERGY_SLACK * (1.0 + energy.abs());
@@ -117,9 +122,14 @@ impl Motion {
         std::mem::swap(&mut self.velocity, &mut self.next_velocity);
         self.resting |= at_saddle;
         if at_saddle {
-            self.time_step.dt = f64::INFINITY;
+            self.dt = f64::INFINITY;
         } else if part == 1.0 {
-            self.time_step.lengthen();
+            // The factor doubles up to the largest.
+            self.dt *= self.growth;
+            self.growth = (2.0 * self.growth).min(MAX_GROWTH);
+            if self.dt > LONGEST_STEP {
+                self.dt = f64::INFINITY;
+            }
         }
     }
 
@@ -127,32 +137,5 @@ impl Motion {
     pub(super) fn accept_newton(&mut self) {
         self.resting = false;
         self.newton_part = (2.0 * self.newton_part).min(1.0);
-    }
-}
-
-/// The time step, and its growth factor after an accepted step.
-struct TimeStep {
-    dt: f64,
-    growth: f64,
-}
-
-impl TimeStep {
-    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
-    fn shorten(&mut self) -> bool {
-        self.dt = match self.dt.is_finite() {
-            true => self.dt / 4.0,
-            false => FIRST_STEP,
-        };
-        self.growth = 1.0;
-        self.dt >= SHORTEST_STEP
-    }
-
-    /// Lengthens the time step after an accepted step; the factor doubles up to [`MAX_GROWTH`].
-    fn lengthen(&mut self) {
-        self.dt *= self.growth;
-        self.growth = (2.0 * self.growth).min(MAX_GROWTH);
-        if self.dt > LONGEST_STEP {
-            self.dt = f64::INFINITY;
-        }
     }
 }
