@@ -114,6 +114,9 @@ mod modes;
 mod motion;
 mod newton;
 mod numbers;
+#[cfg(test)]
+#[path = "../tests/common/pairs.rs"]
+mod pairs;
 pub mod relax;
 #[cfg(feature = "cli")]
 mod report;

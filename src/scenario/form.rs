@@ -268,6 +268,7 @@ fn restore_infinity(value: &mut toml::Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pairs::pairs;
 
     /// Uses every feature of the format.
     const FULL: &str = r#"
@@ -297,28 +298,23 @@ mod tests {
         let held = include_str!("../../scenarios/classic/twisted_strip.toml");
         let (head, tail) = FULL.split_at(FULL.find("stiffness").unwrap());
         let tail = &tail[tail.find("rest").unwrap()..];
-        let section = "section = { shape = 'circle', diameter = { at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }, young = [1e3, 2e3, 3e3], mass_density = 2 }";
+        let taper =
+            "{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }";
+        let section = format!(
+            "section = {{ shape = 'circle', diameter = {taper}, young = [1e3, 2e3, 3e3], mass_density = 2 }}"
+        );
         let mass = tail.find("density").unwrap()..tail.find("internal").unwrap();
         let tail = [&tail[..mass.start], &tail[mass.end..]].concat();
         let tapering = format!("{head}{section}\n{tail}");
-        let even = tapering.replace(
-            "{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }",
-            "0.3",
-        );
+        let even = tapering.replace(taper, "0.3");
         for text in [FULL, paper, swing, buckled, held, &tapering, &even] {
             let scenario = Scenario::from_toml(text).unwrap();
             let json = serde_json::to_string(&scenario).unwrap();
             let again = Scenario::from_toml(&json);
             assert_eq!(again.unwrap(), scenario, "{json}");
-            assert_eq!(
-                json.contains("section"),
-                text.contains("section ="),
-                "{json}"
-            );
-            assert!(
-                !(json.contains("section") && json.contains("torsion")),
-                "{json}"
-            );
+            let section = json.contains("section");
+            assert_eq!(section, text.contains("section ="), "{json}");
+            assert!(!(section && json.contains("torsion")), "{json}");
             let summary = format!("{{\"outcome\": \"converged\", \"input\": {json}}}");
             assert_eq!(Scenario::from_toml(&summary).unwrap(), scenario);
         }
@@ -328,39 +324,17 @@ mod tests {
     #[test]
     fn a_section_is_written_as_it_was_given() {
         let head = "name = 'strip'\nleaf = { rods = 1, length = 0.3, fan = [0.0] }\n";
-        for (sides, mass, density, inertia) in [
-            (
-                "shape = 'rectangle', width = 0.04, thickness = 4e-4",
-                true,
-                false,
-                true,
-            ),
-            (
-                "shape = 'ellipse', width = 0.04, thickness = 0.04",
-                true,
-                false,
-                false,
-            ),
-            (
-                "shape = 'circle', diameter = { at = [0, 1], value = [0.02, 0.01] }",
-                true,
-                false,
-                true,
-            ),
-            ("shape = 'circle', diameter = 0.02", false, true, false),
-        ] {
-            let material = if mass {
-                "mass_density = 800"
-            } else {
-                "poisson = 0.4"
-            };
-            let dynamics = if inertia {
-                "[dynamics]\nrotary_inertia = 1e-8"
-            } else {
-                ""
-            };
-            let text =
-                format!("{head}section = {{ {sides}, young = 2e9, {material} }}\n{dynamics}");
+        let inertia_given = "[dynamics]\nrotary_inertia = 1e-8";
+        let table = "
+            shape = 'rectangle', width = 0.04, thickness = 4e-4, mass_density = 800 => rotary_inertia
+            shape = 'ellipse', width = 0.04, thickness = 0.04, mass_density = 800 =>
+            shape = 'circle', diameter = { at = [0, 1], value = [0.02, 0.01] }, mass_density = 800 => rotary_inertia
+            shape = 'circle', diameter = 0.02, poisson = 0.4 => density
+        ";
+        for (sides, beside) in pairs(table) {
+            let [density, inertia] = ["density", "rotary_inertia"].map(|key| key == beside);
+            let dynamics = if inertia { inertia_given } else { "" };
+            let text = format!("{head}section = {{ {sides}, young = 2e9 }}\n{dynamics}");
             let scenario = Scenario::from_toml(&text).unwrap();
             let written = serde_json::to_value(&scenario).unwrap();
             let again = Scenario::from_toml(&written.to_string()).unwrap();
@@ -387,14 +361,12 @@ mod tests {
 
     #[test]
     fn errors_in_json_are_refused() {
-        for (text, part) in [
-            ("{", "not valid JSON"),
-            (r#"{"name": null}"#, "is no scenario"),
-            (
-                r#"{"name": "a", "leaf": {"rod": 1}}"#,
-                "did you mean leaf.rods?",
-            ),
-        ] {
+        let table = r#"
+            { => not valid JSON
+            {"name": null} => is no scenario
+            {"name": "a", "leaf": {"rod": 1}} => did you mean leaf.rods?
+        "#;
+        for (text, part) in pairs(table) {
             let error = Scenario::from_toml(text).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         }

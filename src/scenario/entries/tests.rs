@@ -1,4 +1,5 @@
 use super::*;
+use crate::pairs::pairs;
 use crate::scenario::Scenario;
 
 const TEXT: &str = r#"
@@ -22,139 +23,65 @@ fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
     Scenario::from_toml_with(TEXT, "three.toml", &overrides)
 }
 
-/// Compares overrides of parts with those of whole values.
+/// Compares overrides of parts, between `;`, with those of whole values.
 #[test]
 fn parts_and_scales_are_whole_values() {
-    for (parts, whole) in [
-        (
-            &["stiffness.torsion[1]=2.5"][..],
-            "stiffness.torsion=[1.0, 2.5, 1.0]",
-        ),
-        (&["coupling.y[0]=3"], "coupling.y=[3, 1]"),
-        (
-            &["coupling.z[1] = 0.25", "coupling.z[0]=1"],
-            "coupling.z=[1, 0.25]",
-        ),
-        (&["load.gravity[2]=-7"], "load.gravity=[0, 0.5, -7]"),
-        (
-            &["stiffness.bending_2.value[1]=2.0"],
-            "stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [1, 2.0, 0.25] }",
-        ),
-        (
-            &["stiffness.bending_2.at[1]=0.25"],
-            "stiffness.bending_2={ at = [0.0, 0.25, 1.0], value = [1, 0.5, 0.25] }",
-        ),
-        (
-            &["stiffness.bending_3.value[2][0]=9"],
-            "stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [9, 6]] }",
-        ),
-        (
-            &["stiffness.bending_3.value[2]=[7, 8]"],
-            "stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [7, 8]] }",
-        ),
-        (
-            &["dynamics.gravity.value[1][2]=-3"],
-            "dynamics.gravity={ at = [0, 1], value = [[0, 0, -1], [0, 0, -3]] }",
-        ),
-        (
-            &["scale:stiffness.bending_2=0.5"],
-            "stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [0.5, 0.25, 0.125] }",
-        ),
-        (
-            &["scale:stiffness.bending_3.value[0]=2"],
-            "stiffness.bending_3={ at = [0, 1], value = [[2, 4], [3, 4], [5, 6]] }",
-        ),
-        (
-            &["scale:stiffness.shear_2=2"],
-            "stiffness.shear_2=[inf, 200, 2e3]",
-        ),
-        (&["scale:stiffness.axial=2"], "stiffness.axial=inf"),
-        (&["scale:leaf.length=1.5"], "leaf.length=1.5"),
-        (&["scale:load.gravity=2"], "load.gravity=[0, 1, -2]"),
-        (&["scale:load.gravity[2]=3"], "load.gravity=[0, 0.5, -3]"),
-        (
-            &["scale:dynamics.rest=0.5"],
-            "dynamics.rest={ at = [0], factor = [1] }",
-        ),
-        (
-            &[
-                "leaf.rods=2",
-                "coupling.z=1",
-                "stiffness.bending_3=1",
-                "stiffness.shear_2[1]=7",
-            ],
-            "",
-        ),
-        (&["scale:rest.twist=3"], "rest.twist=0.0"),
-    ] {
-        match whole {
-            "" => assert!(
-                with(parts)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("has 3 entries")
-            ),
-            whole => assert_eq!(with(parts).unwrap(), with(&[whole]).unwrap(), "{parts:?}"),
-        }
+    let table = "
+        stiffness.torsion[1]=2.5 => stiffness.torsion=[1.0, 2.5, 1.0]
+        coupling.y[0]=3 => coupling.y=[3, 1]
+        coupling.z[1] = 0.25; coupling.z[0]=1 => coupling.z=[1, 0.25]
+        load.gravity[2]=-7 => load.gravity=[0, 0.5, -7]
+        stiffness.bending_2.value[1]=2.0 => stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [1, 2.0, 0.25] }
+        stiffness.bending_2.at[1]=0.25 => stiffness.bending_2={ at = [0.0, 0.25, 1.0], value = [1, 0.5, 0.25] }
+        stiffness.bending_3.value[2][0]=9 => stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [9, 6]] }
+        stiffness.bending_3.value[2]=[7, 8] => stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [7, 8]] }
+        dynamics.gravity.value[1][2]=-3 => dynamics.gravity={ at = [0, 1], value = [[0, 0, -1], [0, 0, -3]] }
+        scale:stiffness.bending_2=0.5 => stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [0.5, 0.25, 0.125] }
+        scale:stiffness.bending_3.value[0]=2 => stiffness.bending_3={ at = [0, 1], value = [[2, 4], [3, 4], [5, 6]] }
+        scale:stiffness.shear_2=2 => stiffness.shear_2=[inf, 200, 2e3]
+        scale:stiffness.axial=2 => stiffness.axial=inf
+        scale:leaf.length=1.5 => leaf.length=1.5
+        scale:load.gravity=2 => load.gravity=[0, 1, -2]
+        scale:load.gravity[2]=3 => load.gravity=[0, 0.5, -3]
+        scale:dynamics.rest=0.5 => dynamics.rest={ at = [0], factor = [1] }
+        scale:rest.twist=3 => rest.twist=0.0
+    ";
+    for (parts, whole) in pairs(table) {
+        let parts: Vec<&str> = parts.split("; ").collect();
+        assert_eq!(with(&parts).unwrap(), with(&[whole]).unwrap(), "{parts:?}");
     }
+    let fewer = "leaf.rods=2; coupling.z=1; stiffness.bending_3=1; stiffness.shear_2[1]=7";
+    let refused = with(&fewer.split("; ").collect::<Vec<_>>()).unwrap_err();
+    assert!(refused.to_string().contains("has 3 entries"), "{refused}");
 }
 
 #[test]
 fn slips_are_explained() {
-    for (given, part) in [
-        (
-            "stiffness.torsion[3]=1",
-            "--set stiffness.torsion[3]=1: stiffness.torsion[3]: there are 3 entries",
-        ),
-        ("stiffness.bending_2[0]=1", "is no list in the scenario"),
-        ("stiffness.torsion.value[0]=1", "has no value there"),
-        ("load.gravity[3]=1", "x, y, z have the indices 0, 1, 2"),
-        ("load.gravity[z]=1", "an index is a whole number from 0"),
-        ("load.gravity[1=1", "an index is a whole number from 0"),
-        ("load.gravity[1]x=1", "an index is a whole number from 0"),
-        ("load.gravity[1][1]=1", "is no list in the scenario"),
-        (
-            "load.gravity[1][1][1]=1",
-            "an index is a whole number from 0",
-        ),
-        ("leaf.rods[0]=1", "leave the index out"),
-        ("scale:leaf.rods=2", "no numbers that could be scaled"),
-        ("scale:leaf.fan=2", "\"paper\" is no number to be scaled"),
-        (
-            "scale:stiffness.torsion=x",
-            "the factor must be a finite number",
-        ),
-        (
-            "scale:stiffness.torsion=inf",
-            "the factor must be a finite number",
-        ),
-        (
-            "scale:dynamics.density=2",
-            "is not in the scenario: write it first",
-        ),
-        (
-            "scale:stiffness.torsion=-1",
-            "stiffness.torsion = -1.0: must be greater than 0",
-        ),
-        (
-            "stiffness.torsion[1]=-1",
-            "--set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0",
-        ),
-        (
-            "stiffness.bending2[1]=1",
-            "unknown key stiffness.bending2 (did you mean stiffness.bending_2?)",
-        ),
-        ("scale:torsion=1", "did you mean stiffness.torsion?"),
-        (
-            "stiffness.gold=1",
-            "unknown key stiffness.gold: [stiffness] has torsion, bending_2",
-        ),
-        (
-            "monsoon=1",
-            "unknown key monsoon: keys are name and those of units, leaf,",
-        ),
-        ("load.gravity[2]", "must be KEY=VALUE"),
-    ] {
+    let table = r#"
+        stiffness.torsion[3]=1 => --set stiffness.torsion[3]=1: stiffness.torsion[3]: there are 3 entries
+        stiffness.bending_2[0]=1 => is no list in the scenario
+        stiffness.torsion.value[0]=1 => has no value there
+        load.gravity[3]=1 => x, y, z have the indices 0, 1, 2
+        load.gravity[z]=1 => an index is a whole number from 0
+        load.gravity[1=1 => an index is a whole number from 0
+        load.gravity[1]x=1 => an index is a whole number from 0
+        load.gravity[1][1]=1 => is no list in the scenario
+        load.gravity[1][1][1]=1 => an index is a whole number from 0
+        leaf.rods[0]=1 => leave the index out
+        scale:leaf.rods=2 => no numbers that could be scaled
+        scale:leaf.fan=2 => "paper" is no number to be scaled
+        scale:stiffness.torsion=x => the factor must be a finite number
+        scale:stiffness.torsion=inf => the factor must be a finite number
+        scale:dynamics.density=2 => is not in the scenario: write it first
+        scale:stiffness.torsion=-1 => stiffness.torsion = -1.0: must be greater than 0
+        stiffness.torsion[1]=-1 => --set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0
+        stiffness.bending2[1]=1 => unknown key stiffness.bending2 (did you mean stiffness.bending_2?)
+        scale:torsion=1 => did you mean stiffness.torsion?
+        stiffness.gold=1 => unknown key stiffness.gold: [stiffness] has torsion, bending_2
+        monsoon=1 => unknown key monsoon: keys are name and those of units, leaf,
+        load.gravity[2] => must be KEY=VALUE
+    "#;
+    for (given, part) in pairs(table) {
         let message = with(&[given]).unwrap_err().to_string();
         assert!(message.contains(part), "{given}: {message}");
         assert!(message.len() < 300, "{message}");
@@ -179,12 +106,8 @@ fn entries_are_those_of_the_text() {
         let json = serde_json::to_string(&wanted).unwrap();
         assert_eq!(Entries::of_text(&json).unwrap().scenario(), Some(wanted));
     }
-    let given = [
-        "load.gravity=[0, 0, -3]",
-        "scale:stiffness.shear_2=2",
-        "name=other",
-    ]
-    .map(String::from);
+    let given = "load.gravity=[0, 0, -3]; scale:stiffness.shear_2=2; name=other";
+    let given: Vec<String> = given.split("; ").map(String::from).collect();
     let replaced = Entries::of_text(TEXT).unwrap().replaced(&given).unwrap();
     let wanted = Scenario::from_toml_with(TEXT, "three.toml", &given).unwrap();
     assert_eq!(replaced.scenario(), Some(wanted));
@@ -195,11 +118,8 @@ fn entries_are_those_of_the_text() {
         ("leaf.rods=3", false),
     ] {
         let replaced = Entries::of_text(TEXT).unwrap().replaced(&[refused.into()]);
-        assert_eq!(
-            replaced.and_then(|all| all.scenario()).is_none(),
-            by_text,
-            "{refused}"
-        );
+        let none = replaced.and_then(|all| all.scenario()).is_none();
+        assert_eq!(none, by_text, "{refused}");
         assert_eq!(with(&[refused]).is_err(), by_text);
     }
 }

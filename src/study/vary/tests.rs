@@ -1,4 +1,5 @@
 use super::*;
+use crate::pairs::pairs;
 
 fn vary(given: &str) -> Vary {
     let vary = given.parse();
@@ -55,10 +56,8 @@ fn keys_and_values_are_written_as_they_were_given() {
         assert_eq!(vary(&format!("{keys}=1..2")).keys.to_string(), keys);
     }
     let keys = vary("stiffness.torsion=0..1").keys;
-    assert_eq!(
-        [1e-5, -0.25, 1e10].map(|value| keys.text(value)),
-        ["1e-5", "-0.25", "10000000000.0"]
-    );
+    let texts = [1e-5, -0.25, 1e10].map(|value| keys.text(value));
+    assert_eq!(texts, ["1e-5", "-0.25", "10000000000.0"]);
 }
 
 #[test]
@@ -132,19 +131,14 @@ fn settings_of_methods_are_not_the_scenarios() {
 
 #[test]
 fn refusals_name_key_and_reason() {
-    for (given, part) in [
-        (
-            "method.step=-1",
-            "method.step = -1.0: must be greater than 0",
-        ),
-        ("method.step=fast", "method.step = fast: must be a number"),
-        ("method.segments=2.5", "whole number"),
-        (
-            "method.grid=5",
-            "methods have method.step and method.segments",
-        ),
-        ("leaf.rods=0", "leaf.rods"),
-    ] {
+    let table = "
+        method.step=-1 => method.step = -1.0: must be greater than 0
+        method.step=fast => method.step = fast: must be a number
+        method.segments=2.5 => whole number
+        method.grid=5 => methods have method.step and method.segments
+        leaf.rods=0 => leaf.rods
+    ";
+    for (given, part) in pairs(table) {
         let message = base(&[given]).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
     }
@@ -200,12 +194,7 @@ rest = { at = [0, 2], factor = [1, 2] }
 #[test]
 fn a_factor_of_nothing_is_refused() {
     let base = base(&["load.gravity=[0,0,0]", "stiffness.axial=inf"]).unwrap();
-    for keys in [
-        "load.gravity",
-        "rest.twist",
-        "coupling.x",
-        "stiffness.axial",
-    ] {
+    for keys in "load.gravity rest.twist coupling.x stiffness.axial".split(' ') {
         let keys = format!("scale:{keys}");
         let refused = at(&base, &[(&keys, 2.0)]).unwrap_err().to_string();
         assert!(refused.contains("which no factor changes"), "{refused}");
@@ -226,20 +215,10 @@ dynamics = { density = 1, rotary_inertia = [0.01] }
 /// scenarios, or both invalid, for every key.
 #[test]
 fn a_number_put_into_the_entries_is_that_of_the_text() {
-    let parts = [
-        "",
-        "[0]",
-        "[1]",
-        "[2]",
-        ".value[0]",
-        ".value[1]",
-        ".value[0][1]",
-        ".value[1][2]",
-        ".at[0]",
-        ".at[1]",
-        ".factor[1]",
-    ];
-    let values = [
+    // The first is the key itself.
+    let parts =
+        " [0] [1] [2] .value[0] .value[1] .value[0][1] .value[1][2] .at[0] .at[1] .factor[1]";
+    let finite = [
         0.0,
         -0.0,
         1.0,
@@ -251,40 +230,30 @@ fn a_number_put_into_the_entries_is_that_of_the_text() {
         1e-60,
         1e300,
         1e-7,
-        f64::INFINITY,
-        f64::NAN,
     ];
+    let values = [&finite[..], &[f64::INFINITY, f64::NAN]].concat();
     for key in Key::all() {
         let mut equal = 0;
         let texts = [TEXT, SECTION, SIDES, MOVING, HEAVY];
         let bases = texts.map(|text| Base::of_text(text.into(), "test.toml".into(), &[]).unwrap());
         let keys = ["", "scale:"].into_iter().flat_map(|scale| {
-            let paths = parts.map(|part| format!("{scale}{}{part}", key.path()));
-            paths
-                .into_iter()
-                .filter_map(|path| path.parse::<Keys>().ok())
+            let paths = parts.split(' ');
+            paths.map(move |part| format!("{scale}{}{part}", key.path()))
         });
+        let keys = keys.filter_map(|path| path.parse::<Keys>().ok());
         for (keys, base) in keys.flat_map(|keys| bases.iter().map(move |base| (keys.clone(), base)))
         {
-            for value in values {
+            for &value in &values {
                 let given = format!("{keys}={}", keys.text(value));
-                let text = Scenario::from_toml_with(
-                    base.text(),
-                    "test.toml",
-                    std::slice::from_ref(&given),
-                );
+                let one = std::slice::from_ref(&given);
+                let text = Scenario::from_toml_with(base.text(), "test.toml", one);
                 let direct = base.changed(&[(&keys, value)]);
                 equal += usize::from(direct.is_some());
                 assert_eq!(direct, text.ok(), "{given} in {}", base.scenario().name);
             }
         }
         let takes_none = matches!(key.form(), Form::Text | Form::Switch);
-        assert_eq!(
-            equal == 0,
-            takes_none,
-            "{}: {equal} equal scenarios",
-            key.path()
-        );
+        assert_eq!(equal == 0, takes_none, "{}: {equal}", key.path());
     }
 }
 
@@ -297,25 +266,14 @@ fn numbers_put_into_the_entries_add_up() {
         ("stiffness.bending_2[1]+stiffness.torsion[1]", 0.7),
         ("load.gravity[1]", 1e-9),
     ];
-    let given = [
-        "load.gravity[0]=3",
-        "stiffness.bending_2[1]=2.5",
-        "scale:stiffness.bending_2=2.0",
-        "stiffness.bending_2[1]=0.7",
-        "stiffness.torsion[1]=0.7",
-        "load.gravity[1]=1e-9",
-    ]
-    .map(String::from);
+    let given = "load.gravity[0]=3; stiffness.bending_2[1]=2.5; scale:stiffness.bending_2=2.0; \
+        stiffness.bending_2[1]=0.7; stiffness.torsion[1]=0.7; load.gravity[1]=1e-9";
+    let given: Vec<String> = given.split("; ").map(String::from).collect();
     let text = Scenario::from_toml_with(TEXT, "three.toml", &given).unwrap();
     assert_eq!(at(&base, &values).unwrap().scenario, text);
     let keys: Keys = "load.gravity[1]".parse().unwrap();
     let with = base.with(&keys, 5.0).unwrap();
     assert_eq!(with.number(&keys), Some(5.0));
-    assert_eq!(
-        at(&with, &[("load.gravity[2]", 1.0)])
-            .unwrap()
-            .scenario
-            .gravity,
-        [3.0, 5.0, 1.0]
-    );
+    let changed = at(&with, &[("load.gravity[2]", 1.0)]).unwrap();
+    assert_eq!(changed.scenario.gravity, [3.0, 5.0, 1.0]);
 }
