@@ -5,7 +5,7 @@ mod common;
 
 use common::valid::holds;
 use common::*;
-use leafdyn::scenario::{Dynamics, ScenarioError, Schedule};
+use leafdyn::scenario::{Dynamics, ScenarioError};
 use proptest::prelude::*;
 
 /// L = 2 and A = 2, so that rho = 8 gives T = 8; the longest rod is 2.
@@ -125,6 +125,18 @@ fn a_radius_gives_the_moment_of_inertia() {
     for (sigma, inertia) in expected {
         close(dynamics.rotary_inertia[0].at(sigma), inertia);
     }
+    // The product at the knots of both.
+    let dynamics = accepted(
+        "density = { at = [0, 0.5, 1], value = [4, 2, 2] }\nsection_radius = { at = [0, 0.25, 1], value = [2, 2, 1] }",
+    );
+    let both = linear(
+        &[0.0, 0.25, 0.5, 1.0],
+        &[4.0, 3.0, 0.5 * (5.0_f64 / 3.0).powi(2), 0.5],
+    );
+    assert_eq!(dynamics.rotary_inertia[0], both);
+    // With one radius it is exact.
+    let dynamics = accepted("density = { at = [0, 1], value = [4, 2] }\nsection_radius = 2");
+    assert_eq!(dynamics.rotary_inertia[0], linear(&[0.0, 1.0], &[4.0, 2.0]));
 }
 
 #[test]
@@ -289,16 +301,11 @@ fn limits_that_values_set_together() {
 
 fn positive_and_finite(dynamics: &Dynamics) -> bool {
     let profiles = dynamics.density.iter().chain(&dynamics.rotary_inertia);
-    let mut values: Vec<f64> = profiles
-        .flat_map(|it| [0.0, 0.3, 0.5, 1.0].map(|s| it.at(s)))
-        .collect();
-    values.extend([
-        dynamics.duration,
-        dynamics.output_interval,
-        dynamics.external_damping,
-    ]);
-    let fine = |value: &f64| *value > 0.0 && value.is_finite();
-    values.iter().all(fine) && dynamics.output_interval <= dynamics.duration
+    let values = profiles.flat_map(|it| [0.0, 0.3, 0.5, 1.0].map(|s| it.at(s)));
+    let times = [dynamics.duration, dynamics.output_interval];
+    let mut values = values.chain(times).chain([dynamics.external_damping]);
+    let fine = |value: f64| value > 0.0 && value.is_finite();
+    values.all(fine) && dynamics.output_interval <= dynamics.duration
 }
 
 proptest! {

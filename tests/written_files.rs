@@ -67,29 +67,22 @@ fn kinds_that_there_are_not_are_refused() {
         leaf.toml --stations 0 => --stations
         leaf.toml --stations many => --stations",
     );
-    all_refused(
-        "trace",
-        "leaf.toml --vary rest.twist=0..1 --stations 4 => --stations 4: the files of this verb have none",
-    );
+    let none = "leaf.toml --vary rest.twist=0..1 --stations 4 => --stations 4: the files of this verb have none";
+    all_refused("trace", none);
 }
 
 #[test]
 fn stations_are_as_many_as_asked_whatever_the_grids() {
     let place = Workplace::new();
     let stations = |more: &str| {
-        let json = place
-            .run(format!("relax leaf.toml --write none --json {more}"))
-            .json();
+        let json = place.run(format!("relax leaf.toml --write none --json {more}"));
+        let json = json.json();
         let stations = floats(&json["stations"]);
         assert_eq!(stations.len(), json["positions"][2].list().len());
         (stations, json)
     };
-    for more in [
-        "--tolerance 1e-3",
-        "--tolerance 1e-9",
-        "--segments 6",
-        "--method shooting",
-    ] {
+    let ways = "--tolerance 1e-3|--tolerance 1e-9|--segments 6|--method shooting";
+    for more in ways.split('|') {
         let (found, json) = stations(&format!("{more} --stations 10"));
         let wanted: Vec<f64> = (0..=10).map(|i| f64::from(i) / 10.0).collect();
         assert_eq!(found, wanted, "{more}");
@@ -124,23 +117,19 @@ fn stations_are_as_many_as_asked_whatever_the_grids() {
 #[test]
 fn every_summary_holds_the_version_and_the_scenario() {
     let place = Workplace::new();
-    let entries = [
-        "leaf.rods=3",
-        "coupling.y=[0.5,0.3333333333333333]",
-        "stiffness.shear_2=inf",
-    ];
-    let quick = entries.map(|entry| format!("--set {entry} ")).concat();
-    let scenario =
-        Scenario::read_with(&place.path("leaf.toml"), &entries.map(String::from)).unwrap();
-    let map = "map --methods semi-implicit --vary load.gravity[2]=-1..-1.1:2";
-    for (verb, file) in [
-        ("relax", "summary"),
-        ("relax --all", "equilibria"),
-        ("check", "check"),
-        ("simulate --set dynamics.duration=0.2", "motion"),
-        ("trace --vary load.gravity[2]=-1..-1.1", "trace"),
-        (map, "map"),
-    ] {
+    let entries = "leaf.rods=3 coupling.y=[0.5,0.3333333333333333] stiffness.shear_2=inf";
+    let entries: Vec<String> = entries.split(' ').map(String::from).collect();
+    let quick = format!("--set {}", entries.join(" --set "));
+    let scenario = Scenario::read_with(&place.path("leaf.toml"), &entries).unwrap();
+    let verbs = "
+        relax => summary
+        relax --all => equilibria
+        check => check
+        simulate --set dynamics.duration=0.2 => motion
+        trace --vary load.gravity[2]=-1..-1.1 => trace
+        map --methods semi-implicit --vary load.gravity[2]=-1..-1.1:2 => map
+    ";
+    for (verb, file) in pairs(verbs) {
         place.ok(format!("{verb} leaf.toml {quick} --write json"));
         let text = place.read(&format!("out/small/{file}.json"));
         let json: Value = serde_json::from_str(&text).unwrap();
@@ -152,9 +141,8 @@ fn every_summary_holds_the_version_and_the_scenario() {
     }
     // The program takes it, too, and finds the same leaf.
     let first = place.json("out/small/summary.json");
-    let again = place
-        .ok("relax out/small/summary.json --out again --json")
-        .json();
+    let again = place.ok("relax out/small/summary.json --out again --json");
+    let again = again.json();
     assert_eq!(again["positions"], first["positions"]);
     assert_eq!(again["input"], first["input"]);
     assert_eq!(again["source"], "../out/small/summary.json");
@@ -191,19 +179,22 @@ fn a_scenario_can_come_on_standard_input() {
     contains(&twice.err, &["standard input can be read only once"]);
 }
 
+/// What a leaf is fitted to.
+const TIPS: &str = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.12,0.01\n0.2,-0.1,0.01\n";
+
 #[test]
 fn a_folder_belongs_to_one_scenario() {
     let place = Workplace::new();
     fs::create_dir(place.path("other")).unwrap();
     place.write("other/leaf.toml", leaf("small", 3));
-    let tips = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.12,0.01\n0.2,-0.1,0.01\n";
-    place.write("tips.csv", tips);
-    for (first, file) in [
-        ("fit --data tips.csv --free stiffness.bending_2", "fit"),
-        ("check", "check"),
-        ("relax", "summary"),
-        ("relax --all", "equilibria"),
-    ] {
+    place.write("tips.csv", TIPS);
+    let verbs = "
+        fit --data tips.csv --free stiffness.bending_2 => fit
+        check => check
+        relax => summary
+        relax --all => equilibria
+    ";
+    for (first, file) in pairs(verbs) {
         place.ok(format!("{first} leaf.toml --write json"));
         for verb in ["relax", "simulate", "check"] {
             let another = format!("out/small/{file}.json is of another scenario");
@@ -237,58 +228,29 @@ fn a_folder_belongs_to_one_scenario() {
 #[test]
 fn inputs_are_not_replaced() {
     let place = Workplace::new();
-    let tips = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.12,0.01\n0.2,-0.1,0.01\n";
-    place.write("fit.csv", tips);
-    place.write("tips.csv", tips);
-    place.write(
-        "chart.csv",
-        "program,scenario,rods,setting,seconds,error,outcome\n",
-    );
+    place.write("fit.csv", TIPS);
+    place.write("tips.csv", TIPS);
+    let peers = "program,scenario,rods,setting,seconds,error,outcome\n";
+    place.write("chart.csv", peers);
     // First, as it removes tables of modes, which it does not have.
     place.ok("relax leaf.toml --write json --out o");
-    for file in [
-        "centerlines.csv",
-        "modes.csv",
-        "table.csv",
-        "fitted.toml",
-        "motion.csv",
-    ] {
+    for file in "centerlines.csv modes.csv table.csv fitted.toml motion.csv".split(' ') {
         place.write(&format!("o/{file}"), leaf("small", 2));
     }
-    let fit = "--free stiffness.bending_2 --data";
-    for (request, file) in [
-        (format!("fit leaf.toml {fit} fit.csv --out ."), "./fit.csv"),
-        (
-            format!("fit leaf.toml {fit} tips.csv {fit} o/../fit.csv --out o/.."),
-            "o/../fit.csv",
-        ),
-        (
-            format!("fit leaf.toml {fit} tips.csv --candidates fit.csv --out ."),
-            "./fit.csv",
-        ),
-        (
-            format!("fit o/fitted.toml {fit} tips.csv --out o"),
-            "o/fitted.toml",
-        ),
-        (
-            "chart leaf.toml --peers chart.csv --out .".into(),
-            "./chart.csv",
-        ),
-        (
-            "relax o/centerlines.csv --out o".into(),
-            "o/centerlines.csv",
-        ),
-        (
-            "relax o/modes.csv --write json --out ./o".into(),
-            "o/modes.csv",
-        ),
-        (
-            "relax o/summary.json --out o --json".into(),
-            "o/summary.json",
-        ),
-        ("relax o/table.csv leaf.toml --out o".into(), "o/table.csv"),
-        ("simulate o/motion.csv --out o".into(), "o/motion.csv"),
-    ] {
+    let table = "
+        fit leaf.toml FIT fit.csv --out . => ./fit.csv
+        fit leaf.toml FIT tips.csv FIT o/../fit.csv --out o/.. => o/../fit.csv
+        fit leaf.toml FIT tips.csv --candidates fit.csv --out . => ./fit.csv
+        fit o/fitted.toml FIT tips.csv --out o => o/fitted.toml
+        chart leaf.toml --peers chart.csv --out . => ./chart.csv
+        relax o/centerlines.csv --out o => o/centerlines.csv
+        relax o/modes.csv --write json --out ./o => o/modes.csv
+        relax o/summary.json --out o --json => o/summary.json
+        relax o/table.csv leaf.toml --out o => o/table.csv
+        simulate o/motion.csv --out o => o/motion.csv
+    ";
+    for (request, file) in pairs(table) {
+        let request = request.replace("FIT", "--free stiffness.bending_2 --data");
         let before = (place.names("o"), place.read("fit.csv"));
         let run = place.refuses(request, &format!("{file} is read by this request"));
         contains(&run.err, &["name another folder with --out DIR"]);
@@ -301,12 +263,11 @@ fn inputs_are_not_replaced() {
 #[test]
 fn verbs_share_a_folder_without_a_clash() {
     let place = Workplace::new();
-    let short = "--set dynamics.duration=0.2";
     let verbs = [
         "relax leaf.toml --modes 1",
         "relax leaf.toml --all",
         "check leaf.toml",
-        &format!("simulate leaf.toml {short}"),
+        "simulate leaf.toml --set dynamics.duration=0.2",
         "trace leaf.toml --vary load.gravity[2]=-1..-1.1",
         "map leaf.toml --methods semi-implicit --vary load.gravity[2]=-1..-1.1:2",
         "chart leaf.toml --seconds 0.1 --methods semi-implicit --rods 2",
@@ -326,21 +287,18 @@ fn verbs_share_a_folder_without_a_clash() {
 fn keys_and_their_order_are_fixed() {
     let place = Workplace::new();
     let table = "
+        relax => scenario method outcome rods segments tolerance residual error_estimate energy tip tip_force_sum stable negative_eigenvalues lowest_eigenvalues eigenvalue_errors undulation model shear_effect stretch_effect work wall_seconds stations positions
         check => scenario verdict rods tolerance difference within_estimates relaxation shooting stations differences
         trace --vary load.gravity[2]=-1..-1.1 => scenario vary range rods segments tolerance complete branches law factorizations wall_seconds
         relax --all => scenario starts failed equilibria remark wall_seconds
         simulate --set dynamics.duration=0.2 => scenario method outcome rods segments tolerance duration time time_step stable_step steps frames energy tip wall_seconds
     ";
     for (verb, keys) in pairs(table) {
-        let run = place
-            .run(format!("{verb} leaf.toml --write none --json"))
-            .ends(0);
+        let run = place.run(format!("{verb} leaf.toml --write none --json"));
+        let run = run.ends(0);
         let lines = run.out.lines().filter_map(|line| line.strip_prefix("  \""));
         let found: Vec<&str> = lines.flat_map(|line| line.split('"').next()).collect();
-        assert_eq!(
-            found.join(" "),
-            format!("version source {keys} input"),
-            "{verb}"
-        );
+        let keys = format!("version source {keys} input");
+        assert_eq!(found.join(" "), keys, "{verb}");
     }
 }

@@ -188,31 +188,10 @@ mod tests {
     #[test]
     fn the_mean_of_equal_densities_is_exact() {
         assert_eq!(mean_of(&vec![Profile::Constant(0.1); 7]), 0.1);
-        let taper = linear(&[0.0, 1.0], &[4.0, 2.0]);
+        let taper = Profile::Linear {
+            at: vec![0.0, 1.0],
+            value: vec![4.0, 2.0],
+        };
         assert_eq!(mean_of(&[taper, Profile::Constant(1.0)]), 2.0);
-    }
-
-    fn linear(at: &[f64], value: &[f64]) -> Profile {
-        Profile::Linear {
-            at: at.to_vec(),
-            value: value.to_vec(),
-        }
-    }
-
-    #[test]
-    fn the_inertia_of_a_round_section() {
-        let constant = round_inertia(&Profile::Constant(3.0), &Profile::Constant(0.2));
-        assert!(matches!(constant, Profile::Constant(i) if (i - 0.03).abs() < 1e-17));
-        // The product at the knots of both.
-        let density = linear(&[0.0, 0.5, 1.0], &[4.0, 2.0, 2.0]);
-        let radius = linear(&[0.0, 0.25, 1.0], &[2.0, 2.0, 1.0]);
-        let expected = linear(
-            &[0.0, 0.25, 0.5, 1.0],
-            &[4.0, 3.0, 0.5 * (5.0_f64 / 3.0).powi(2), 0.5],
-        );
-        assert_eq!(round_inertia(&density, &radius), expected);
-        // With one radius it is exact.
-        let density = linear(&[0.0, 1.0], &[4.0, 2.0]);
-        assert_eq!(round_inertia(&density, &Profile::Constant(2.0)), density);
     }
 }

@@ -50,47 +50,16 @@ mod tests {
     use super::*;
     use crate::report::sample;
 
-    /// Numbers keep every digit, or are null.
     #[test]
-    fn keys_and_their_order_are_fixed() {
-        let wanted = [
-            "scenario",
-            "method",
-            "outcome",
-            "rods",
-            "segments",
-            "tolerance",
-            "residual",
-            "error_estimate",
-            "energy",
-            "tip",
-            "tip_force_sum",
-            "stable",
-            "negative_eigenvalues",
-            "lowest_eigenvalues",
-            "eigenvalue_errors",
-            "undulation",
-            "model",
-            "shear_effect",
-            "stretch_effect",
-            "work",
-            "wall_seconds",
-            "stations",
-            "positions",
-        ];
+    fn numbers_keep_every_digit_or_are_null() {
         let mut leaf = sample::fan(5, 8);
         leaf.energy = Some(0.1 + 0.2);
         leaf.accuracy.residual = Some(f64::INFINITY);
         let mut bytes = Vec::new();
         write(&leaf, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
-        let lines = text.lines().filter_map(|line| line.strip_prefix("  \""));
-        let keys: Vec<&str> = lines.map(|line| line.split('"').next().unwrap()).collect();
-        assert_eq!(keys, wanted);
-        assert!(
-            text.contains("\n  \"energy\": 0.30000000000000004,\n"),
-            "{text}"
-        );
-        assert!(text.contains("\n  \"residual\": null,\n"), "{text}");
+        for line in ["\"energy\": 0.30000000000000004", "\"residual\": null"] {
+            assert!(text.contains(&format!("\n  {line},\n")), "{text}");
+        }
     }
 }
