@@ -39,9 +39,7 @@ mod tests {
     #[test]
     fn bounds_are_rounded_up() {
         let bounds = [3.01e-9, 9.99e-12, 2.0, 3e-9, f64::INFINITY, 0.0].map(power_of_ten);
-        assert_eq!(
-            bounds,
-            ["3.1×10⁻⁹", "1.0×10⁻¹¹", "2.0×10⁰", "3.0×10⁻⁹", "∞", "0"]
-        );
+        let wanted = ["3.1×10⁻⁹", "1.0×10⁻¹¹", "2.0×10⁰", "3.0×10⁻⁹", "∞", "0"];
+        assert_eq!(bounds, wanted);
     }
 }

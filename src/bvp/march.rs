@@ -209,9 +209,8 @@ mod tests {
     fn noise() -> impl FnMut() -> f64 {
         let mut state = 1_u64;
         move || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            state = state.wrapping_mul(6364136223846793005);
+            state = state.wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         }
     }
@@ -219,14 +218,10 @@ mod tests {
     /// Sensitivities over intervals: half of the directions grow, half decay.
     fn maps(intervals: usize, growth: f64) -> Vec<Mat<f64>> {
         let mut noise = noise();
-        (0..intervals)
-            .map(|k| {
-                let columns = if k == 0 { 18 } else { 36 };
-                Mat::from_fn(36, columns, |_, c| {
-                    0.3 * noise() * growth.powf((c as f64 - 17.5) / 17.5)
-                })
-            })
-            .collect()
+        let mut entry = |c: usize| 0.3 * noise() * growth.powf((c as f64 - 17.5) / 17.5);
+        let columns = |k: usize| if k == 0 { 18 } else { 36 };
+        let map = |k| Mat::from_fn(36, columns(k), |_, c| entry(c));
+        (0..intervals).map(map).collect()
     }
 
     /// Rows of the tip's conditions, according to the documentation of the module.
@@ -284,12 +279,9 @@ mod tests {
             let what = format!("joined {joined}, {intervals} intervals, {growth:e}");
             for (k, found) in found.iter().enumerate() {
                 let clamped = |i: usize| k == 0 && i % 12 < 6;
-                let mut next = |i| {
-                    if clamped(i) {
-                        0.0
-                    } else {
-                        wanted.next().unwrap()
-                    }
+                let mut next = |i| match clamped(i) {
+                    true => 0.0,
+                    false => wanted.next().unwrap(),
                 };
                 let wanted: Vec<f64> = (0..36).map(&mut next).collect();
                 let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -335,11 +327,8 @@ mod tests {
         let lost = &maps[2] * &last;
         maps[2] -= (1.0 / last.squared_norm_l2()) * &lost * last.transpose();
         let condensed = condensed(true, maps).unwrap();
-        assert!(
-            condensed.condition() < 1e-13,
-            "{:.1e}",
-            condensed.condition()
-        );
+        let condition = condensed.condition();
+        assert!(condition < 1e-13, "{condition:.1e}");
 
         let null = condensed.null();
         let factor = null[0][6] / begin[0];

@@ -223,14 +223,13 @@ mod tests {
     }
 
     fn differences(equations: &Equations, a: &[f64], b: &[f64]) -> Vec<f64> {
-        (0..equations.rods())
-            .flat_map(|j| {
-                let (a, b) = (RodState::read(a, j), RodState::read(b, j));
-                let turn = (a.q * b.q.conjugate()).to_scaled_axis();
-                [a.r - b.r, turn, a.n - b.n, a.m - b.m]
-            })
-            .flat_map(|v| v.to_array())
-            .collect()
+        let of_rod = |j: usize| {
+            let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+            let turn = (a.q * b.q.conjugate()).to_scaled_axis();
+            [a.r - b.r, turn, a.n - b.n, a.m - b.m]
+        };
+        let all = (0..equations.rods()).flat_map(of_rod);
+        all.flat_map(|v| v.to_array()).collect()
     }
 
     /// Responses of its group to unit perturbations of rod `j`.
@@ -266,10 +265,8 @@ mod tests {
                         true => linear.rows[i - TANGENT * linear.rods.start][k],
                         false => 0.0,
                     };
-                    assert!(
-                        (found - slope).abs() < 1e-8 * (1.0 + slope.abs()),
-                        "number {i} by {k} of rod {j}: {found}, {slope}"
-                    );
+                    let what = format!("number {i} by {k} of rod {j}: {found}, {slope}");
+                    assert!((found - slope).abs() < 1e-8 * (1.0 + slope.abs()), "{what}");
                 }
             }
         }

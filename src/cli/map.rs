@@ -232,13 +232,8 @@ mod tests {
     #[test]
     fn only_files_of_shards_are_recognized() {
         let folder = tempfile::tempdir().unwrap();
-        for name in [
-            "map-2-of-3.csv",
-            "map-4-of-3.csv",
-            "map.csv",
-            "map-x.csv",
-            "map-1-of-2.csv",
-        ] {
+        let names = "map-2-of-3.csv map-4-of-3.csv map.csv map-x.csv map-1-of-2.csv";
+        for name in names.split(' ') {
             fs::write(folder.path().join(name), "").unwrap();
         }
         let found: Vec<_> = (shards(folder.path()).iter())

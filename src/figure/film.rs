@@ -264,9 +264,8 @@ mod tests {
             let time = short(record.moments[k].time);
             let text = format!("{}, t = {time}", record.scenario);
             let painted = paint(&picture(&shapes[k], bounds, &setting, &text));
-            let pairs = pictures[k]
-                .chunks_exact(4)
-                .zip(painted.data().chunks_exact(4));
+            let shown = pictures[k].chunks_exact(4);
+            let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =
                 |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
             let off: Vec<u8> = pairs.map(difference).collect();

@@ -319,23 +319,21 @@ mod tests {
         let taken = labels.taken.clone();
         let mut page = Drawing::new(300.0, "");
         labels.draw(&mut page);
-        let texts: Vec<_> = (page.marks.iter())
-            .filter_map(|mark| match mark {
-                Mark::Label(label) => Some(label),
-                _ => None,
-            })
-            .collect();
+        let label = |mark| match mark {
+            Mark::Label(label) => Some(label),
+            _ => None,
+        };
+        let texts: Vec<_> = page.marks.into_iter().filter_map(label).collect();
         // Both curves begin at one point: labels there are shared.
         assert_eq!(texts[0].text, "1, 5");
         assert_eq!(texts.len(), 6);
         let font = Font::embedded();
-        let boxes: Vec<Cell> = (texts.iter())
-            .map(|label| {
-                let size = DVec2::new(font.width(&label.text, label.size), 0.7 * label.size);
-                let corner = label.at - DVec2::new(0.5 * size.x, size.y);
-                Cell { corner, size }
-            })
-            .collect();
+        let boxes = texts.iter().map(|label| {
+            let size = DVec2::new(font.width(&label.text, label.size), 0.7 * label.size);
+            let corner = label.at - DVec2::new(0.5 * size.x, size.y);
+            Cell { corner, size }
+        });
+        let boxes: Vec<Cell> = boxes.collect();
         for (k, one) in boxes.iter().enumerate() {
             let covers =
                 |place: &DVec2| place.cmpgt(one.corner).all() && place.cmplt(one.end()).all();

@@ -182,10 +182,8 @@ mod tests {
             let [left, right] = found.columns.map(|column| column.1 + 1e-9);
             let [top, bottom] = found.rows.map(|row| row.1 + 1e-9);
             let [x, y, z] = size.map(|extent| found.scale * extent);
-            assert!(
-                left >= x && right >= y && top >= y && bottom >= z,
-                "{size:?}"
-            );
+            let fits = left >= x && right >= y && top >= y && bottom >= z;
+            assert!(fits, "{size:?}");
             assert!((left + right - COLUMNS).abs() < 1e-8, "{size:?}");
             assert!(top + bottom <= HIGHEST_ROWS + 1e-8, "{size:?}");
         }

@@ -203,9 +203,8 @@ mod tests {
         page.line(from, to, Stroke::new(INK, 4.0));
         let mut bytes = Vec::new();
         write(&page, &mut bytes).unwrap();
-        let mut reader = ::png::Decoder::new(Cursor::new(&bytes))
-            .read_info()
-            .unwrap();
+        let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
+        let mut reader = reader.unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut pixels).unwrap();
         let whole = paint(&page);

@@ -124,23 +124,18 @@ mod tests {
 
     #[test]
     fn panels_meet_at_the_kinks_and_weights_add_to_one() {
-        let grid = Grid::new(11, &[0.2, 0.25, 0.9]);
+        let kinks = [0.2, 0.25, 0.9];
+        let grid = Grid::new(11, &kinks);
         for (grid, segments) in [(grid.refined(), 22), (grid.tripled(), 33), (grid, 11)] {
             assert_eq!(grid.segments(), segments);
-            assert!(
-                [0.2, 0.25, 0.9]
-                    .iter()
-                    .all(|kink| grid.sigma().contains(kink))
-            );
+            assert!(kinks.iter().all(|kink| grid.sigma().contains(kink)));
             let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
             assert!((sum - 1.0).abs() < 1e-15);
             assert_eq!(grid.refined().coarsened(), Some(grid));
         }
-        assert_eq!(Grid::new(11, &[0.2, 0.25, 0.9]).coarsened(), None);
-        for grid in [
-            Grid::new(32, &[0.3404]),
-            Grid::new(8, &[0.3404]).refined().refined(),
-        ] {
+        assert_eq!(Grid::new(11, &kinks).coarsened(), None);
+        let [fine, coarse] = [32, 8].map(|segments| Grid::new(segments, &[0.3404]));
+        for grid in [fine, coarse.refined().refined()] {
             let through = Grid::through(grid.sigma(), &[0.3404]);
             let pairs = through.sigma().iter().zip(grid.sigma());
             assert!(pairs.map(|(a, b)| (a - b).abs()).all(|off| off < 1e-15));

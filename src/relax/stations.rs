@@ -206,19 +206,13 @@ mod tests {
             "#,
         )
         .unwrap();
-        let sharp = scenario
-            .relaxation()
-            .tolerance(1e-10)
-            .every_node()
-            .run()
-            .unwrap();
+        let to = |tolerance| {
+            let relaxation = scenario.relaxation().tolerance(tolerance);
+            relaxation.every_node().run().unwrap()
+        };
+        let sharp = to(1e-10);
         for tolerance in [1e-3, 1e-6, 1e-8] {
-            let found = scenario
-                .relaxation()
-                .tolerance(tolerance)
-                .every_node()
-                .run()
-                .unwrap();
+            let found = to(tolerance);
             let there = found.clone().at_stations(&scenario, None);
             let finest = found.shape.curves[0].len();
             let count = there.shape.stations.len();
@@ -248,12 +242,8 @@ mod tests {
         let found = scenario.relaxation().every_node().run().unwrap();
         let there = found.clone().at_stations(&scenario, None);
         for (i, station) in found.shape.stations.iter().enumerate() {
-            let k = there
-                .shape
-                .stations
-                .iter()
-                .position(|s| s == station)
-                .unwrap();
+            let mut stations = there.shape.stations.iter();
+            let k = stations.position(|s| s == station).unwrap();
             for (one, other) in found.shape.rods.iter().zip(&there.shape.rods) {
                 assert_eq!(one.nodes[i], other.nodes[k]);
             }

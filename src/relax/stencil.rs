@@ -103,11 +103,9 @@ mod tests {
             let t = 0.37 * count as f64;
             let (weights, slopes) = lagrange(count, t);
             for degree in 0..count as i32 {
+                let term = |(a, weight): (usize, &f64)| weight * (a as f64).powi(degree);
                 let sum = |weights: &[f64; NODES]| -> f64 {
-                    let terms = weights[..count].iter().enumerate();
-                    terms
-                        .map(|(a, weight)| weight * (a as f64).powi(degree))
-                        .sum()
+                    weights[..count].iter().enumerate().map(term).sum()
                 };
                 let slope = match degree {
                     0 => 0.0,

@@ -262,16 +262,10 @@ mod tests {
             (2.0, 0.228_681_655_7),
             (10.0, 0.312_332_5),
         ] {
-            close(
-                Outline::Rectangle.torsion(sides, 1.0),
-                constant * sides,
-                3e-5,
-            );
-            close(
-                Outline::Rectangle.torsion(1.0, sides),
-                constant * sides,
-                3e-5,
-            );
+            for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
+                let found = Outline::Rectangle.torsion(width, thickness);
+                close(found, constant * sides, 3e-5);
+            }
         }
         let direct = |long: f64| {
             let odd = (0..20_000).map(|k| (2 * k + 1) as f64);
@@ -311,23 +305,13 @@ mod tests {
     #[test]
     fn a_flat_section_is_soft_up_and_down() {
         let flat = section(Outline::Rectangle, 0.4, 0.1, 0.3);
-        close(
-            flat.at(Property::Couple(1), 0.0),
-            2.0 * 0.4 * 1e-3 / 12.0,
-            1e-14,
-        );
-        close(
-            flat.at(Property::Couple(2), 0.0),
-            2.0 * 0.1 * 0.064 / 12.0,
-            1e-14,
-        );
+        let [up, sideways] = [1, 2].map(|k| flat.at(Property::Couple(k), 0.0));
+        close(up, 2.0 * 0.4 * 1e-3 / 12.0, 1e-14);
+        close(sideways, 2.0 * 0.1 * 0.064 / 12.0, 1e-14);
         let ellipse = section(Outline::Ellipse, 0.4, 0.1, 0.3);
         assert!(ellipse.at(Property::Force(1), 0.0) > ellipse.at(Property::Force(2), 0.0));
         let second = PI / 64.0 * 0.4 * 0.1 * (0.16 + 0.01);
-        close(
-            ellipse.at(Property::RotaryInertia, 0.0),
-            1.5 * second,
-            1e-14,
-        );
+        let inertia = ellipse.at(Property::RotaryInertia, 0.0);
+        close(inertia, 1.5 * second, 1e-14);
     }
 }

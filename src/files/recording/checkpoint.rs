@@ -302,12 +302,7 @@ mod tests {
             match Checkpoint::read(folder.path(), &identity()) {
                 Err(error) if error.to_string().contains(" is damaged: ") => (),
                 // The time is compared with that of the state, and white space is not used.
-                Ok(read) => assert_eq!(
-                    Checkpoint { time: 0.3, ..read },
-                    checkpoint,
-                    "{}",
-                    String::from_utf8_lossy(&changed)
-                ),
+                Ok(read) => assert_eq!(Checkpoint { time: 0.3, ..read }, checkpoint, "{at}"),
                 Err(other) => panic!("{other}"),
             }
         }

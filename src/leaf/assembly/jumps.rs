@@ -102,11 +102,7 @@ mod tests {
         for (i, found) in displacements(jump).into_iter().enumerate() {
             let expected = expected((i + 1) as f64 / SEGMENTS as f64);
             let off = (found - expected).length();
-            assert!(
-                off < 1e-12,
-                "{jump:?}, node {}: {found} for {expected}",
-                i + 1
-            );
+            assert!(off < 1e-12, "{jump:?}, {i}: {found} for {expected}");
         }
     }
 
@@ -117,9 +113,8 @@ mod tests {
         let jump = DVec3::new(0.1, -0.2, 0.3);
         let behind = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
         assert_moved([jump, zero, zero, zero], |sigma| behind(sigma) * jump);
-        assert_moved([zero, jump, zero, zero], |sigma| {
-            behind(sigma) * jump.cross((sigma - 0.5) * DVec3::X)
-        });
+        let turned = |sigma: f64| behind(sigma) * jump.cross((sigma - 0.5) * DVec3::X);
+        assert_moved([zero, jump, zero, zero], turned);
     }
 
     /// Removing a jump of force or moment is equivalent to a load of that size at the
@@ -128,9 +123,8 @@ mod tests {
     fn before_a_jump_of_a_force_the_held_part_bends_back() {
         let zero = DVec3::ZERO;
         let axial = DVec3::new(0.7, 0.0, 0.0);
-        assert_moved([zero, zero, axial, zero], |sigma| {
-            -sigma.min(0.5) / 40.0 * axial
-        });
+        let pulled = |sigma: f64| -sigma.min(0.5) / 40.0 * axial;
+        assert_moved([zero, zero, axial, zero], pulled);
         // A cantilever of half the length under a moment M at its end: M s^2/(2 A).
         let moment = DVec3::new(0.0, 0.0, 0.6);
         assert_moved([zero, zero, zero, moment], |sigma| {

@@ -157,20 +157,16 @@ mod tests {
         ]
         .map(row);
         let (peers, remarks) = about(&rows, "leaf", 5, 2.0);
-        let names: Vec<(&str, &str)> = peers
-            .iter()
-            .map(|peer| (peer.name.as_str(), peer.knob.as_str()))
-            .collect();
+        let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
+        let names: Vec<(&str, &str)> = names.collect();
         assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);
         assert_eq!((peers[0].seconds.median, peers[0].seconds.runs), (2.0, 3));
         assert_eq!(peers[0].true_error, Some(2e-3));
         assert_eq!(peers[2].true_error, None);
-        assert_eq!(
-            remarks,
-            [
-                "3 rows of --peers are about another leaf, and left out",
-                "2 rows of --peers are without the error of a leaf at rest, and left out"
-            ]
-        );
+        let wanted = [
+            "3 rows of --peers are about another leaf, and left out",
+            "2 rows of --peers are without the error of a leaf at rest, and left out",
+        ];
+        assert_eq!(remarks, wanted);
     }
 }

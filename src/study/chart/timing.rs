@@ -227,10 +227,8 @@ mod tests {
     #[test]
     fn quartiles() {
         let spread = Spread::of(&[1.0, 2.0, 3.0, 4.0, 10.0]).unwrap();
-        assert_eq!(
-            (spread.min, spread.q1, spread.median, spread.q3),
-            (1.0, 2.0, 3.0, 4.0)
-        );
+        let found = [spread.min, spread.q1, spread.median, spread.q3];
+        assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
         let spread = Spread::of(&[1.0, 2.0]).unwrap();
         assert_eq!((spread.q1, spread.median), (1.25, 1.5));
         assert_eq!(Spread::of(&[]), None);
