@@ -4,7 +4,7 @@ mod common;
 mod workplace;
 
 use common::*;
-use leafdyn::relax::{Limit, SemiImplicit};
+use leafdyn::relax::SemiImplicit;
 use leafdyn::study::{All, all};
 use workplace::{Json, Workplace, timeless};
 

@@ -14,9 +14,8 @@ const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0
 #[test]
 fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let place = Workplace::new();
-    let run = place.run(format!(
-        "trace leaf.toml {COLUMN} --vary stiffness.bending_3=0.5..2"
-    ));
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let run = place.run(format!("trace leaf.toml {COLUMN} {bending}"));
     run.ends(0).says(&[
         "load.tip_force[0] from 0.0 to -6.0",
         "stiffness.bending_3 from 0.5 to 2.0",
@@ -25,10 +24,8 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
         "the end of a range",
         "written",
     ]);
-    place.holds(
-        "out/small",
-        "boundary.csv boundary.json boundary.png boundary.svg",
-    );
+    let files = "boundary.csv boundary.json boundary.png boundary.svg";
+    place.holds("out/small", files);
     let picture = place.picture("out/small/boundary");
     let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
     contains(&picture, &parts);
@@ -47,10 +44,8 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
 fn a_curve_that_goes_on_is_an_outcome() {
     let place = Workplace::new();
     let bending = "--vary stiffness.bending_3=0.5..2";
-    let json = place.told(
-        1,
-        format!("trace leaf.toml {COLUMN} {bending}:100 --points 20"),
-    );
+    let few = format!("trace leaf.toml {COLUMN} {bending}:100 --points 20");
+    let json = place.told(1, few);
     assert_eq!(json["complete"], false);
     assert_eq!(json["curves"][0]["ends"][1], "most-points");
     let short = COLUMN.replace("0..-6", "0..-1");

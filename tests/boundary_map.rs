@@ -1,9 +1,10 @@
 //! The map under the curves of a boundary, against Euler's load; and the page.
 
+mod common;
 mod workplace;
 
-use std::f64::consts::PI;
-
+use common::PI;
+use common::branch::weak_veins;
 use serde_json::{Value, json};
 use workplace::{Json, Workplace, all_refused, contains, floats, timeless};
 
@@ -34,9 +35,8 @@ fn indices(map: &Value) -> Vec<usize> {
 fn cells_are_stable_below_the_load_and_not_above() {
     let place = Workplace::new();
     let axes = "--vary load.tip_force[0]=0..-6 --vary stiffness.bending_3=0.5..2";
-    let run = place.run(format!(
-        "{COLUMN} {STRIP} {axes} --map 6x4 --write json,svg,html"
-    ));
+    let how = "--map 6x4 --write json,svg,html";
+    let run = place.run(format!("{COLUMN} {STRIP} {axes} {how}"));
     run.ends(0).says(&["6 x 4 cells", "all as the curves say"]);
     let found = place.json("out/small/boundary.json");
     let map = map(&found);
@@ -104,9 +104,7 @@ fn a_curve_that_rows_meet_twice_is_followed_once() {
         "trace scenarios/classic/hanging_curved.toml --set rest.bend_3=5 --map 3x5 \
         --vary load.gravity[0]=8..20 --vary rest.bend_3=5..6.4 --write json",
     );
-    let [curve] = found["curves"].list() else {
-        panic!("{found:#}");
-    };
+    let curve = found["curves"].only();
     assert_eq!(curve["ends"], json!(["reached", "reached"]));
     let points = curve["points"].list();
     let rest = |k: usize| points[k]["values"][1].number();
@@ -142,11 +140,7 @@ fn cells_behind_a_fold_are_reached_round_its_cusp() {
 /// elsewhere than on a fine one.
 #[test]
 fn rows_that_run_along_a_curve_stay_on_its_sheet() {
-    let veins = (0..11).filter(|vein| *vein != 5);
-    let keys: Vec<_> = veins
-        .map(|vein| format!("stiffness.bending_2[{vein}]"))
-        .collect();
-    let (keys, half) = (keys.join("+"), ["0.07"; 5].join(","));
+    let (keys, half) = (weak_veins(), ["0.07"; 5].join(","));
     let asked = format!(
         "trace scenarios/study/undulation.toml --set load.gravity=[0,0,0] --tolerance 1e-4 \
         --set stiffness.bending_2=[{half},1000,{half}] --map 2x3 --write none \
@@ -165,10 +159,8 @@ fn a_cell_close_beyond_a_curve_is_counted_on_finer_grids() {
     let trace = place.told(0, format!("{column}-6"));
     let load = trace["branches"][0]["critical"][0]["value"].number();
     let end = load * (1.0 + 2e-5) / 0.75;
-    let found = place.told(
-        0,
-        format!("{column}{end} --vary stiffness.torsion=1..2 --map 2x2"),
-    );
+    let wide = format!("{column}{end} --vary stiffness.torsion=1..2 --map 2x2");
+    let found = place.told(0, wide);
     assert_eq!(map(&found)["index"], json!([[0, 1], [0, 1]]));
 }
 

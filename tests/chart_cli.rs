@@ -6,7 +6,7 @@ mod workplace;
 use std::collections::HashMap;
 
 use serde_json::{Value, json};
-use workplace::{Json, Workplace, all_refused, contains, pairs};
+use workplace::{Json, Workplace, all_refused, contains, pairs, tells};
 
 const FILES: &str = "chart.csv chart.json chart.png chart.svg";
 
@@ -86,9 +86,7 @@ fn a_leaf_is_charted_and_written_down() {
 fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
     let place = Workplace::new();
     let (rows, chart) = chart(&place, TWO, THREE);
-    assert_eq!(chart["scenario"], "small");
-    assert_eq!(chart["rods"], 2);
-    assert_eq!(chart["threads"], 1);
+    tells(&chart, "scenario=small rods=2 threads=1");
     assert!(chart["rounds"].count() >= 3);
     let reference = &chart["reference"];
     assert_eq!(reference["confirmed"], true);

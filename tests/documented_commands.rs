@@ -43,18 +43,17 @@ fn read(path: &Path) -> Page {
         match line.strip_prefix("```") {
             Some(language) if !inside => {
                 inside = true;
-                blocks.push(Block {
-                    language: language.to_owned(),
-                    lines: Vec::new(),
-                });
+                let (language, lines) = (language.to_owned(), Vec::new());
+                blocks.push(Block { language, lines });
             }
             Some(_) => inside = false,
             None if inside => blocks.last_mut().unwrap().lines.push(line.to_owned()),
             None => prose.push(line.to_owned()),
         }
     }
+    let path = path.to_owned();
     Page {
-        path: path.to_owned(),
+        path,
         blocks,
         prose,
     }
@@ -78,10 +77,9 @@ fn pages() -> Vec<Page> {
 fn commands<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<String> {
     let joined = lines.collect::<Vec<_>>().join("\n").replace("\\\n", " ");
     let spaced = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
-    let lines = joined.lines().map(spaced);
+    let mut lines: Vec<String> = joined.lines().map(spaced).collect();
+    lines.retain(|line| !line.is_empty() && !line.starts_with('#'));
     lines
-        .filter(|line| !line.is_empty() && !line.starts_with('#'))
-        .collect()
 }
 
 fn of_block(block: &Block) -> Vec<String> {
@@ -90,10 +88,8 @@ fn of_block(block: &Block) -> Vec<String> {
 
 fn of_scripts() -> HashSet<String> {
     let texts = SCRIPTS.map(|script| fs::read_to_string(top().join(script)).unwrap());
-    texts
-        .iter()
-        .flat_map(|text| commands(text.lines()))
-        .collect()
+    let all = texts.iter().flat_map(|text| commands(text.lines()));
+    all.collect()
 }
 
 /// What a shell is given to run a command with the program that was built.
@@ -189,10 +185,8 @@ fn every_command_runs_here_or_in_a_script() {
         }
         let mut prose = page.prose.iter();
         let hidden = prose.find(|line| line.contains("`leafdyn") && line.contains(".toml"));
-        assert_eq!(
-            hidden, None,
-            "{place}: a command without a block of its own"
-        );
+        let alone = format!("{place}: a command without a block of its own");
+        assert_eq!(hidden, None, "{alone}");
     }
 }
 

@@ -8,9 +8,8 @@ use workplace::{Workplace, contains};
 /// The figure of a trace of these arguments.
 fn figure(arguments: &str) -> String {
     let place = Workplace::new();
-    place
-        .run(format!("trace {arguments} --write svg --out out"))
-        .ends(0);
+    let run = place.run(format!("trace {arguments} --write svg --out out"));
+    run.ends(0);
     place.read("out/trace.svg")
 }
 
@@ -18,9 +17,7 @@ fn figure(arguments: &str) -> String {
 fn groups<'s>(svg: &'s str, name: &str) -> Vec<&'s str> {
     let start = format!("<g id=\"{name}\">");
     let groups = svg.split(start.as_str()).skip(1);
-    groups
-        .map(|rest| rest.split("</g>").next().unwrap())
-        .collect()
+    groups.flat_map(|rest| rest.split("</g>").next()).collect()
 }
 
 fn attribute(tag: &str, name: &str) -> Option<f64> {
@@ -61,10 +58,8 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
 #[test]
 fn the_key_and_the_title_name_what_there_is() {
     let svg = figure(PITCHFORK);
-    contains(
-        &svg,
-        &["stable drawn solid, unstable dashed", "branches cross"],
-    );
+    let parts = ["stable drawn solid, unstable dashed", "branches cross"];
+    contains(&svg, &parts);
     assert!(!svg.contains(">fold<"));
     let svg = figure("scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-1");
     assert!(svg.contains(">stable equilibria<"));

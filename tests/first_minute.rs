@@ -54,15 +54,10 @@ fn what_is_there_is_not_replaced() {
     // On a full disk there is no part of it.
     if cfg!(unix) {
         let full = place.command("new rod part.toml");
-        let run = Command::new("sh")
-            .args([
-                "-c",
-                "trap '' XFSZ; ulimit -f 0; exec \"$0\" new rod part.toml",
-            ])
-            .arg(full.get_program())
-            .current_dir(place.path("."))
-            .output()
-            .unwrap();
+        let script = "trap '' XFSZ; ulimit -f 0; exec \"$0\" new rod part.toml";
+        let mut shell = Command::new("sh");
+        let shell = shell.args(["-c", script]).arg(full.get_program());
+        let run = shell.current_dir(place.path(".")).output().unwrap();
         assert_eq!(run.status.code(), Some(2));
         assert_eq!(place.names("."), ["mine.toml"]);
     }

@@ -6,7 +6,7 @@ mod common;
 mod workplace;
 
 use common::*;
-use leafdyn::relax::{Outcome, RelaxError, relax};
+use leafdyn::relax::{RelaxError, relax};
 use workplace::{Json, Workplace, contains};
 
 /// A leaf of five veins of length two, with a kink in a stiffness.
@@ -27,9 +27,8 @@ fn place() -> Workplace {
 
 #[track_caller]
 fn refused(arguments: &str, parts: &[&str]) {
-    let message = place()
-        .refuses(format!("relax leaf.toml {arguments}"), parts[0])
-        .err;
+    let run = place().refuses(format!("relax leaf.toml {arguments}"), parts[0]);
+    let message = run.err;
     contains(&message, parts);
     assert!(message.trim().lines().count() <= 8, "too long: {message}");
 }
@@ -77,10 +76,8 @@ fn the_library_refuses_alike() {
     }
     let nan = ask(to(f64::NAN));
     assert!(matches!(nan, RelaxError::Tolerance { found } if found.is_nan()));
-    assert_eq!(
-        ask(on(2)),
-        RelaxError::TooFewSegments { found: 2, least: 3 }
-    );
+    let few = RelaxError::TooFewSegments { found: 2, least: 3 };
+    assert_eq!(ask(on(2)), few);
     let many = ask(on(usize::MAX));
     assert!(matches!(many, RelaxError::TooManyNodes { rods: 5, .. }));
 }
@@ -123,9 +120,8 @@ fn hard_scenes_end_in_an_outcome_after_bounded_work() {
 #[test]
 fn a_run_that_fails_is_written_down_and_has_status_one() {
     let place = place();
-    let run = place
-        .run("relax leaf.toml --json --set load.tip_force=[-5e6,0,0]")
-        .ends(1);
+    let run = place.run("relax leaf.toml --json --set load.tip_force=[-5e6,0,0]");
+    let run = run.ends(1);
     let summary = run.json();
     let outcome = summary["outcome"].text();
     let failures = ["tolerance-not-reached", "not-at-rest", "diverged"];
@@ -133,8 +129,6 @@ fn a_run_that_fails_is_written_down_and_has_status_one() {
     let remark = summary["remark"].text();
     assert!(remark.len() > 20);
     contains(&run.err, &[remark]);
-    place.holds(
-        "out/leaf",
-        "centerlines.csv figure.png figure.svg summary.json",
-    );
+    let files = "centerlines.csv figure.png figure.svg summary.json";
+    place.holds("out/leaf", files);
 }

@@ -109,10 +109,8 @@ fn wrong_types() {
         "y = { at = [0, 1], value = [1, 2] }" => "coupling.y", "a number or a list of 2 (one per gap";
     }
     let leaf = Scenario::from_toml("name = \"leaf\"\nleaf = 3");
-    holds(
-        leaf,
-        &["scenario:2: leaf = 3: must be a table: write [leaf]"],
-    );
+    let table = "scenario:2: leaf = 3: must be a table: write [leaf]";
+    holds(leaf, &[table]);
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! Requests that would take all memory, or days, are refused before they start;
 //! numbers of any size break nothing; what is late says so.
 
+mod common;
 mod workplace;
 
 use std::time::Instant;
 
+use common::motion::moving;
 use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{Options, Scheme, Simulation};
-use workplace::{Json, Workplace, contains, leaf};
+use leafdyn::simulate::{Scheme, Simulation};
+use workplace::{Json, Workplace, leaf};
 
 #[test]
 fn what_takes_more_memory_than_is_allowed_is_refused() {
@@ -110,16 +112,12 @@ fn a_simulation_of_weeks_is_refused_before_it_starts() {
     let place = Workplace::new();
     for method in ["explicit", "semi-implicit"] {
         let steps = "the time step of 1.000e-12 makes 1.0e13 steps, which take some";
-        place.refuses(
-            format!("simulate leaf.toml --method {method} --step 1e-12"),
-            steps,
-        );
+        let short = format!("simulate leaf.toml --method {method} --step 1e-12");
+        place.refuses(short, steps);
     }
     let stiff = "--set stiffness.torsion=1e12 --set dynamics.section_radius=1e-6";
-    place.refuses(
-        format!("simulate leaf.toml {stiff}"),
-        "at most 3 are allowed",
-    );
+    let most = "at most 3 are allowed";
+    place.refuses(format!("simulate leaf.toml {stiff}"), most);
 }
 
 /// A vein with a kink whose shooting takes several intervals: its grid is that of
@@ -135,10 +133,8 @@ fn stations_of_a_profile_with_knots_are_compared_by_place() {
     let check = place.ok("check knots.toml --json").json();
     assert_eq!(check["verdict"], "agree");
     assert_eq!(check["within_estimates"], true);
-    assert_eq!(
-        check["stations"].list().len(),
-        check["differences"].list().len()
-    );
+    let [stations, along] = ["stations", "differences"].map(|key| check[key].list().len());
+    assert_eq!(stations, along);
     let trace = "trace knots.toml --vary load.gravity[2]=-3000..-2900:2";
     assert_eq!(place.told(0, trace)["complete"], true);
 }
@@ -147,11 +143,7 @@ fn stations_of_a_profile_with_knots_are_compared_by_place() {
 fn a_checkpoint_with_an_impossible_number_is_refused() {
     let scenario = Scenario::from_toml(&leaf("small", 2)).unwrap();
     for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
-        let options = Options {
-            scheme: Some(scheme),
-            ..Options::default()
-        };
-        let mut simulation = Simulation::new(&scenario, &options).unwrap();
+        let mut simulation = Simulation::new(&scenario, &moving(scheme, None)).unwrap();
         simulation.next_frame().unwrap();
         let state = simulation.save();
         assert!(simulation.restore(&state), "{scheme:?}");
@@ -191,13 +183,10 @@ fn a_text_of_many_tables_is_weighed_by_them() {
 fn cells_of_huge_grids_are_late_at_once() {
     let place = Workplace::new();
     let huge = "--set leaf.rods=1 --set method.segments=1000000 --methods semi-implicit";
-    let map = place.ok(format!(
-        "map leaf.toml {huge} --vary load.gravity[2]=-1..-2:2 --cell-seconds 1 --write csv"
-    ));
-    contains(&map.out, &["out-of-time"]);
+    let how = "--vary load.gravity[2]=-1..-2:2 --cell-seconds 1 --write csv";
+    let map = place.ok(format!("map leaf.toml {huge} {how}"));
+    map.says(&["out-of-time"]);
     let rows = place.read("out/small/map.csv");
-    assert_eq!(
-        rows.matches("1000000 nodes take longer than 1 s").count(),
-        2
-    );
+    let late = rows.matches("1000000 nodes take longer than 1 s");
+    assert_eq!(late.count(), 2);
 }

@@ -169,9 +169,8 @@ fn shards_joined_equal_the_whole() {
     // and so does one elsewhere that is given the joined file, or all.
     let all = parts.map(|part| format!("out/{part}")).join(" ");
     for files in ["out/../joined.csv", &all] {
-        shared
-            .run(small(&format!("--out drawn --draw {files}")))
-            .ends(0);
+        let draw = small(&format!("--out drawn --draw {files}"));
+        shared.run(draw).ends(0);
         assert_eq!(timeless(&shared, "drawn/map.csv"), whole);
         shared.holds("drawn", FILES);
         fs::remove_dir_all(shared.path("drawn")).unwrap();

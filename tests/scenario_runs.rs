@@ -18,9 +18,8 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
     for file in files {
         let name = file.file_stem().unwrap().to_str().unwrap();
         let folder = file.parent().unwrap().file_name().unwrap().display();
-        let run = place
-            .run(format!("relax scenarios/{folder}/{name}.toml --json"))
-            .ends(0);
+        let run = place.run(format!("relax scenarios/{folder}/{name}.toml --json"));
+        let run = run.ends(0);
         let summary = run.json();
         let outcome = summary["outcome"].text();
         assert!(outcome.starts_with("converged"), "{name}: {outcome}");
@@ -39,12 +38,7 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
         assert!(number("residual") < 1e-5, "{name}: {}", number("residual"));
         let work = &summary["work"];
         assert!(work["force_evaluations"].count() < 1000, "{name}: {work}");
-        for file in [
-            "summary.json",
-            "centerlines.csv",
-            "figure.svg",
-            "figure.png",
-        ] {
+        for file in "summary.json centerlines.csv figure.svg figure.png".split(' ') {
             let file = place.path("out").join(name).join(file);
             assert!(fs::metadata(&file).unwrap().len() > 500, "{file:?}");
         }

@@ -15,10 +15,8 @@ fn several_scenarios_have_a_folder_each_and_one_table() {
     run.says(&["small: 5 veins", "wide: 9 veins", "out: table.csv"]);
     place.holds("out", "small table.csv wide");
     let table = place.read("out/table.csv");
-    let rows: Vec<Vec<&str>> = table
-        .lines()
-        .map(|line| line.split(',').collect())
-        .collect();
+    let rows = table.lines().map(|line| line.split(',').collect());
+    let rows: Vec<Vec<&str>> = rows.collect();
     assert_eq!(rows[0][..3], ["file", "exit_status", "scenario"]);
     assert_eq!(rows.len(), 3);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()));
@@ -80,10 +78,8 @@ fn a_table_is_not_replaced_by_that_of_other_leaves() {
     place.ok("relax c.toml d.toml --write json,csv --out out");
     assert_eq!(rows(), 2);
     place.write("out/table.csv", "x,y\n1,2\n");
-    place.refuses(
-        "relax a.toml b.toml",
-        "out/table.csv is no table of results",
-    );
+    let foreign = "out/table.csv is no table of results";
+    place.refuses("relax a.toml b.toml", foreign);
     // What was refused left no result.
     place.write("bad.toml", "name = 3");
     fs::remove_file(place.path("out/table.csv")).unwrap();
@@ -98,15 +94,11 @@ fn several_leaves_side_by_side_are_those_one_by_one() {
     for (rods, name) in (2..10).zip(&names) {
         place.write(&format!("{name}.toml"), leaf(name, rods));
     }
-    let files = names
-        .each_ref()
-        .map(|name| format!("{name}.toml"))
-        .join(" ");
+    let files = names.join(".toml ") + ".toml";
     place.run_on("4", &format!("relax --out all {files}")).ok();
     for name in &names {
-        place
-            .run_on("1", &format!("relax {name}.toml --out one/{name}"))
-            .ok();
+        let alone = format!("relax {name}.toml --out one/{name}");
+        place.run_on("1", &alone).ok();
         for file in ["centerlines.csv", "figure.svg", "figure.png"] {
             let path = |out: &str| place.path(&format!("{out}/{name}/{file}"));
             let [one, all] = ["one", "all"].map(|out| fs::read(path(out)).unwrap());

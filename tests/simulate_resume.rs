@@ -13,7 +13,7 @@ use leafdyn::files::{Document, Recording, Selection};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
 use serde_json::json;
-use workplace::{Run, Workplace, contains, interrupt, leaf};
+use workplace::{Run, Workplace, contains, interrupt, leaf, pairs};
 
 /// So many outputs are waited for before a run is stopped.
 const OUTPUTS: usize = 20;
@@ -57,19 +57,11 @@ fn outputs(place: &Workplace, folder: &str) -> usize {
     if !folder.is_dir() {
         return 0;
     }
-    let energy = |name: &str| name.contains("energy.csv") && name.ends_with(".part");
-    let names = place.names(folder.to_str().unwrap()).into_iter();
-    let files = names
-        .filter(|name| energy(name))
-        .map(|name| folder.join(name));
-    let lines = |file| {
-        fs::read(file)
-            .unwrap_or_default()
-            .split(|&byte| byte == b'\n')
-            .count()
-            - 1
-    };
-    files.map(lines).sum()
+    let mut names = place.names(folder.to_str().unwrap());
+    names.retain(|name| name.contains("energy.csv") && name.ends_with(".part"));
+    let bytes = |name| fs::read(folder.join(name)).unwrap_or_default();
+    let lines = |bytes: Vec<u8>| bytes.iter().filter(|&&byte| byte == b'\n').count();
+    names.iter().map(bytes).map(lines).sum()
 }
 
 /// Waits until there are so many outputs, and stops the run.
@@ -100,9 +92,8 @@ fn stopped(place: &Workplace, arguments: &str) {
 #[track_caller]
 fn ends_the_same(arguments: &str) {
     let place = workplace();
-    let whole = place
-        .run(format!("simulate {arguments} --out whole"))
-        .ends(0);
+    let whole = place.run(format!("simulate {arguments} --out whole"));
+    let whole = whole.ends(0);
 
     stopped(&place, arguments);
     let left = place.names("out");
@@ -223,24 +214,16 @@ fn only_the_same_run_is_resumed() {
         contains(&run.ends(2).err, messages);
         assert_eq!(place.names("out"), LEFT, "{arguments:?}");
     };
-    for (other, message) in [
-        ("EXPLICIT --segments 8", "segments 16, now 8"),
-        ("EXPLICIT --step 1e-3", "time step "),
-        (
-            "EXPLICIT --tolerance 1e-5",
-            "tolerance 0.000001, now 0.00001",
-        ),
-        (
-            "EXPLICIT --set leaf.rods=6",
-            "an override of it, has changed",
-        ),
-        ("EXPLICIT --set name=other", "scenario small, now other"),
-        ("leaf.toml", "an override of it, has changed"),
-        (
-            "long.toml --method semi-implicit",
-            "method explicit, now semi-implicit",
-        ),
-    ] {
+    let table = "
+        EXPLICIT --segments 8 => segments 16, now 8
+        EXPLICIT --step 1e-3 => time step 0.00
+        EXPLICIT --tolerance 1e-5 => tolerance 0.000001, now 0.00001
+        EXPLICIT --set leaf.rods=6 => an override of it, has changed
+        EXPLICIT --set name=other => scenario small, now other
+        leaf.toml => an override of it, has changed
+        long.toml --method semi-implicit => method explicit, now semi-implicit
+    ";
+    for (other, message) in pairs(table) {
         let messages = ["out/checkpoint.json is of another run", message, "--resume"];
         refused(&other.replace("EXPLICIT", EXPLICIT), &messages);
     }
@@ -293,10 +276,8 @@ fn a_run_goes_on_when_there_is_room_on_the_disk_again() {
     };
     // Blocks are of 512 or of 1024 bytes.
     let run_out = run("ulimit -f 600;", "").ends(2);
-    contains(
-        &run_out.err,
-        &["cannot write out/motion.csv", "go on with --resume"],
-    );
+    let parts = ["cannot write out/motion.csv", "go on with --resume"];
+    contains(&run_out.err, &parts);
     assert_eq!(place.names("out"), LEFT);
 
     run("", "--resume").ends(0);

@@ -47,10 +47,8 @@ fn a_motion_and_what_it_lists() {
         "simulate motion.toml --set dynamics.duration=1 --segments 8 --write vtk,glb,gif,html";
     let place = done("motion", &[short]);
     let out = place.path("out/motion");
-    place.holds(
-        "out/motion",
-        "motion.gif motion.glb motion.html motion.pvd motion_vtp",
-    );
+    let files = "motion.gif motion.glb motion.html motion.pvd motion_vtp";
+    place.holds("out/motion", files);
     let list = place.read("out/motion/motion.pvd");
     let listed = list.split("file=\"").skip(1);
     let listed: Vec<&str> = listed.flat_map(|rest| rest.split('"').next()).collect();

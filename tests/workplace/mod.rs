@@ -6,7 +6,8 @@
 #[path = "../common/pairs.rs"]
 mod pairs;
 
-use std::fs;
+use std::fs::{self, DirEntry};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
@@ -110,9 +111,8 @@ impl Workplace {
     /// What a run that ends so says with `--json`.
     #[track_caller]
     pub fn told(&self, status: i32, arguments: impl AsRef<str>) -> Value {
-        self.run(format!("{} --json", arguments.as_ref()))
-            .ends(status)
-            .json()
+        let run = self.run(format!("{} --json", arguments.as_ref()));
+        run.ends(status).json()
     }
 
     /// A run on so many threads.
@@ -154,9 +154,8 @@ impl Workplace {
     /// Names in a folder, sorted; hidden ones too.
     pub fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).unwrap();
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let name = |entry: io::Result<DirEntry>| entry.unwrap().file_name();
+        let mut names: Vec<_> = entries.map(|it| name(it).into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -235,6 +234,8 @@ pub fn all_refused(common: &str, table: &str) {
 /// What a JSON value must be.
 pub trait Json {
     fn list(&self) -> &[Value];
+    /// The only one of a list.
+    fn only(&self) -> &Value;
     fn number(&self) -> f64;
     fn count(&self) -> usize;
     fn text(&self) -> &str;
@@ -244,6 +245,12 @@ impl Json for Value {
     #[track_caller]
     fn list(&self) -> &[Value] {
         self.as_array().expect("a list")
+    }
+
+    #[track_caller]
+    fn only(&self) -> &Value {
+        assert_eq!(self.list().len(), 1, "{self:#}");
+        &self[0]
     }
 
     #[track_caller]
@@ -259,6 +266,16 @@ impl Json for Value {
     #[track_caller]
     fn text(&self) -> &str {
         self.as_str().expect("a text")
+    }
+}
+
+/// Asserts that a JSON object tells this, as in `outcome=converged stable=true`.
+#[track_caller]
+pub fn tells(object: &Value, entries: &str) {
+    for entry in entries.split(' ') {
+        let (key, wanted) = entry.split_once('=').expect("key=value");
+        let wanted: Value = serde_json::from_str(wanted).unwrap_or_else(|_| wanted.into());
+        assert_eq!(object[key], wanted, "{key}");
     }
 }
 
