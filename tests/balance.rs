@@ -41,10 +41,10 @@ fn vector(a: [f64; 3]) -> DVec3 {
 
 /// Nodal weights of the trapezoidal rule, fractions of the length.
 fn weights(leaf: &Equilibrium) -> Vec<f64> {
-    let at = |i: usize| leaf.shape.stations[i.min(leaf.shape.stations.len() - 1)];
-    (0..leaf.shape.stations.len())
-        .map(|i| 0.5 * (at(i + 1) - at(i.saturating_sub(1))))
-        .collect()
+    let nodes = leaf.shape.stations.len();
+    let at = |i: usize| leaf.shape.stations[i.min(nodes - 1)];
+    let weight = |i: usize| 0.5 * (at(i + 1) - at(i.saturating_sub(1)));
+    (0..nodes).map(weight).collect()
 }
 
 /// From the first rod of a gap to the second, at a node.
@@ -60,10 +60,9 @@ fn coupling(scenario: &Scenario, leaf: &Equilibrium, gap: usize, i: usize) -> DV
 }
 
 fn tip_forces(scenario: &Scenario) -> usize {
-    if scenario.joined {
-        1
-    } else {
-        scenario.rods.len()
+    match scenario.joined {
+        true => 1,
+        false => scenario.rods.len(),
     }
 }
 
@@ -256,9 +255,8 @@ fn quadrature(scenario: &Scenario, leaf: &Equilibrium) -> f64 {
         }
     }
     for rod in 0..tip_forces(scenario) {
-        energy -= tip_node(&leaf.shape.rods, rod)
-            .position
-            .dot(vector(scenario.tip_force));
+        let tip = tip_node(&leaf.shape.rods, rod).position;
+        energy -= tip.dot(vector(scenario.tip_force));
     }
     energy
 }
@@ -266,8 +264,8 @@ fn quadrature(scenario: &Scenario, leaf: &Equilibrium) -> f64 {
 #[test]
 fn the_energy_is_that_of_the_fields() {
     for scenario in scenes() {
-        let sums = [16, 32, 64, 128]
-            .map(|segments| quadrature(&scenario, &settle_on(&scenario, segments, false)));
+        let on = |segments| quadrature(&scenario, &settle_on(&scenario, segments, false));
+        let sums = [16, 32, 64, 128].map(on);
         let leaf = settle(&scenario, 1e-11);
         let (sum, energy) = (extrapolate(&sums, 0.25), leaf.energy.unwrap());
         close("energy", sum, energy, 1e-9);

@@ -4,23 +4,20 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::branch::{text, weightless};
 use common::*;
 use leafdyn::internals::branch::{Equations, Family};
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid};
 use leafdyn::internals::relax::{settle_from, start};
-use leafdyn::relax::{Limit, Outcome};
 
 /// Euler's load of the clamped-free column, EI = L = 1.
 const EULER: f64 = PI * PI / 4.0;
 
 fn column(load: f64, stiffness: f64, other: f64) -> Scenario {
-    let stiffness = set_stiffness(stiffness, stiffness);
+    let (stiffness, load) = (set_stiffness(stiffness, stiffness), -load);
+    let pushed = format!("load.tip_force=[{load}, 0, 0]");
     rod(&format!(
-        "{stiffness}; stiffness.bending_2={other:?}; load.tip_force=[{}, 0, 0]",
-        -load
+        "{stiffness}; stiffness.bending_2={other:?}; {pushed}"
     ))
 }
 
@@ -69,9 +66,14 @@ fn held(how: &str, other: f64, beyond: f64) -> Scenario {
 /// see the test of lateral buckling.
 fn strip(beyond: f64) -> Scenario {
     const TIP: f64 = 4.536899035739;
-    let force = -TIP * 0.8_f64.sqrt() * (1.0 + beyond);
+    pushed_up(0.8, 10.0, -TIP * 0.8_f64.sqrt() * (1.0 + beyond))
+}
+
+/// A strip with these stiffnesses, and a force at its tip.
+fn pushed_up(torsion: f64, strong: f64, force: f64) -> Scenario {
+    let section = format!("stiffness.torsion={torsion}; stiffness.bending_2={strong}");
     rod(&format!(
-        "{RIGID}; stiffness.torsion=0.8; stiffness.bending_2=10.0; load.tip_force=[0, 0, {force:?}]"
+        "{RIGID}; {section}; load.tip_force=[0, 0, {force:?}]"
     ))
 }
 
@@ -164,10 +166,8 @@ fn what_no_grid_can_tell_the_eigenvalues_do() {
                     true => (Outcome::Saddle, index),
                     false => (Outcome::Converged, 0),
                 };
-                assert_eq!(
-                    leaf.outcome, outcome,
-                    "{other} {tolerance} {modes} {beyond}"
-                );
+                let what = format!("{other} {tolerance} {modes} {beyond}");
+                assert_eq!(leaf.outcome, outcome, "{what}");
                 assert_eq!(leaf.stability.negative_eigenvalues, Some(index));
             }
         }
@@ -178,10 +178,7 @@ fn what_no_grid_can_tell_the_eigenvalues_do() {
 
 /// A strip of 10^8 times the stiffness in its plane, loaded by so much more than what it bears.
 fn flat_strip(beyond: f64) -> Scenario {
-    let force = 4.0126 * 0.5_f64.sqrt() * (1.0 + beyond);
-    rod(&format!(
-        "{RIGID}; stiffness.torsion=0.5; stiffness.bending_2=1e8; load.tip_force=[0, 0, {force:?}]"
-    ))
+    pushed_up(0.5, 1e8, 4.0126 * 0.5_f64.sqrt() * (1.0 + beyond))
 }
 
 /// The first grid finer than those of its shape is stuck where these are: the strip starts again

@@ -4,8 +4,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::branch::{text, weak_veins};
 use common::plane::{follow, followed};
 use common::*;
@@ -154,10 +152,8 @@ fn a_round_column_buckles_in_two_directions_all_along() {
     let curve = only(&found);
     assert_eq!(curve.multiplicity, 2);
     for point in &curve.points {
-        assert!(
-            off(point, -0.25 * PI * PI * point.values[1]) < 1e-8,
-            "{point:?}"
-        );
+        let wanted = -0.25 * PI * PI * point.values[1];
+        assert!(off(point, wanted) < 1e-8, "{point:?}");
         assert_eq!([point.index_before, point.index_behind], [0, 2]);
     }
     // Not if one of the stiffnesses changes alone.
@@ -367,9 +363,8 @@ fn points_stand_in_order_where_the_given_number_changes() {
     };
     for curve in &found.curves {
         let places: Vec<[f64; 2]> = curve.points.iter().map(fraction).collect();
-        let ways: Vec<[f64; 2]> = (places.windows(2))
-            .map(|pair| [0, 1].map(|i| pair[1][i] - pair[0][i]))
-            .collect();
+        let way = |pair: &[[f64; 2]]| [0, 1].map(|i| pair[1][i] - pair[0][i]);
+        let ways: Vec<[f64; 2]> = places.windows(2).map(way).collect();
         for (k, pair) in ways.windows(2).enumerate() {
             let turn = pair[0][0] * pair[1][0] + pair[0][1] * pair[1][1];
             assert!(turn > 0.0, "point {}: {pair:?}", k + 2);

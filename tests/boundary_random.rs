@@ -26,12 +26,11 @@ struct Case {
 /// A random leaf that loses its stability along the first number, and the second.
 fn case(number: usize) -> Case {
     let mut draw = Draw(1000 * number as u64 + 7);
+    let torsion = draw.uniform(0.6, 1.5);
+    let [axial, shear_2, shear_3] = [(); 3].map(|_| draw.uniform(200.0, 3000.0));
     let stiffness = format!(
-        "stiffness.torsion={:?}; stiffness.axial={:?}; stiffness.shear_2={:?}; stiffness.shear_3={:?}",
-        draw.uniform(0.6, 1.5),
-        draw.uniform(200.0, 3000.0),
-        draw.uniform(200.0, 3000.0),
-        draw.uniform(200.0, 3000.0),
+        "stiffness.torsion={torsion:?}; stiffness.axial={axial:?}; \
+         stiffness.shear_2={shear_2:?}; stiffness.shear_3={shear_3:?}"
     );
     let [low, high] = [draw.uniform(0.6, 0.9), draw.uniform(1.1, 1.6)];
     // A column, a strip on edge, a lens whose midrib grows, and a rod that hangs.

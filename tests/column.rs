@@ -4,19 +4,19 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::branch::{changes_at, follow};
 use common::*;
 
 /// A straight column, clamped at the base, EI = 1 sideways and `other` up and
 /// down.
 fn column(other: f64, [axial, shear]: [f64; 2], tip_force: f64, gravity: f64) -> Scenario {
-    let (stiffness, force, weight) = (set_stiffness(axial, shear), -tip_force, -gravity);
+    let (force, weight) = (-tip_force, -gravity);
     let loads = format!("load.tip_force=[{force}, 0, 0]; load.gravity=[{weight}, 0, 0]");
-    rod(&format!(
-        "{stiffness}; stiffness.bending_2={other:?}; {loads}"
-    ))
+    let section = format!(
+        "{}; stiffness.bending_2={other:?}",
+        set_stiffness(axial, shear)
+    );
+    rod(&format!("{section}; {loads}"))
 }
 
 /// A thousand times as stiff up and down: it never buckles that way here.
@@ -65,12 +65,8 @@ fn euler_the_first_three_critical_loads_are_the_closed_form() {
     let strip = follow(ROD, &strip, "load.tip_force[0]=0..-70", false);
     changes_at("Euler", &strip, &[1, 2, 3].map(|k| (-euler(k), 1)), 1e-8);
     let round = follow(ROD, &stiff, "load.tip_force[0]=0..-30", false);
-    changes_at(
-        "Euler, round",
-        &round,
-        &[1, 2].map(|k| (-euler(k), 2)),
-        1e-8,
-    );
+    let twice = [1, 2].map(|k| (-euler(k), 2));
+    changes_at("Euler, round", &round, &twice, 1e-8);
 }
 
 /// P (1 + P/GA - P/EA) = pi^2/4 EI/L^2 for a column that stretches and shears

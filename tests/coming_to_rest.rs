@@ -109,10 +109,7 @@ fn loads(draw: &mut Draw, kind: &Kind, rods: usize, softest: f64) -> [Option<Vec
     };
     let gravity = draw.vector(kind.weight * unit, kind.decades);
     let tip_force = draw.vector(kind.tip_force * unit * veins as f64, kind.decades);
-    [
-        draw.chance(0.8).then_some(gravity),
-        draw.chance(0.6).then_some(tip_force),
-    ]
+    [(0.8, gravity), (0.6, tip_force)].map(|(part, load)| draw.chance(part).then_some(load))
 }
 
 /// A random leaf.
@@ -219,15 +216,11 @@ fn failures(kind: &Kind, least: usize) -> (usize, usize) {
 }
 
 #[test]
-fn wild_leaves() {
-    let (failed, count) = failures(&WILD, 40);
-    assert!(failed <= count / 1000);
-}
-
-#[test]
-fn edge_leaves() {
-    let (failed, count) = failures(&EDGE, 12);
-    assert!(failed <= count / 100);
+fn wild_and_edge_leaves() {
+    for (kind, least, one_of) in [(&WILD, 40, 1000), (&EDGE, 12, 100)] {
+        let (failed, count) = failures(kind, least);
+        assert!(failed <= count / one_of, "{}: {failed}", kind.name);
+    }
 }
 
 /// On 16 segments this leaf's waves bend a segment by more than a right angle; on

@@ -4,20 +4,14 @@
 mod common;
 
 use common::*;
-use leafdyn::relax::Method;
-use leafdyn::shape::Difference;
 
 /// To the first two the errors on a grid of 4 or 8 segments alone are taken off.
 const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-9];
 
 fn found(leaf: &Scenario, options: &Options) -> Equilibrium {
     let found = relaxed(leaf, options);
-    assert!(
-        found.outcome.is_at_rest(),
-        "{}: {:?}",
-        leaf.name,
-        found.remark
-    );
+    let what = format!("{}: {:?}", leaf.name, found.remark);
+    assert!(found.outcome.is_at_rest(), "{what}");
     found
 }
 

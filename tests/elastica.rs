@@ -3,8 +3,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::branch::follow;
 use common::*;
 use leafdyn::study::PointKind;

@@ -52,9 +52,8 @@ impl Verdict {
             if error > estimate + uncertain || estimate > tolerance * length {
                 let found = format!("error {error:.1e}, estimate {estimate:.3e}");
                 let grids = leaf.accuracy.segments;
-                self.wrong.push(format!(
-                    "{name} at {tolerance:e}, length {length:.3}: {found} on {grids:?}"
-                ));
+                let what = format!("{name} at {tolerance:e}, length {length:.3}");
+                self.wrong.push(format!("{what}: {found} on {grids:?}"));
             }
             if error > 10.0 * uncertain {
                 self.ratios.push(estimate / error);
@@ -149,10 +148,8 @@ fn of_a_saddle_that_is_kept() {
         assert!(grids.is_sorted(), "{k}, {tolerance:e}: {grids:?}");
         let (told, uncertain) = (estimate(&saddle), estimate(&truth));
         let error = distance(&saddle, &truth);
-        assert!(
-            error <= told + uncertain,
-            "{k}, {tolerance:e}: {error:e}, {told:e}"
-        );
+        let what = format!("{k}, {tolerance:e}: {error:e}, {told:e}");
+        assert!(error <= told + uncertain, "{what}");
     }
 }
 

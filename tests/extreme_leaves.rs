@@ -7,7 +7,6 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use common::*;
-use leafdyn::relax::{Outcome, relax};
 
 const RIGID: [f64; 3] = [f64::INFINITY; 3];
 
@@ -195,24 +194,18 @@ fn veins_of_different_kinds() {
     }
     stable(&leaf, 1e-6);
     let mut leaf = fig04(5);
+    let kinks = linear(&[0.0, 0.01, 0.5, 0.501, 1.0], &[1.0, 0.1, 1.0, 0.01, 1.0]);
     for rod in &mut leaf.rods {
-        rod.couple_stiffness[0] =
-            linear(&[0.0, 0.01, 0.5, 0.501, 1.0], &[1.0, 0.1, 1.0, 0.01, 1.0]);
+        rod.couple_stiffness[0] = kinks.clone();
     }
     stable(&leaf, 1e-6);
 }
 
 #[test]
 fn veins_wound_up_at_rest() {
-    for (rest, rods) in [
-        ([0.0, 0.0, 300.0], 1),
-        ([50.0, 0.0, 200.0], 1),
-        ([0.0, 6.0, 0.0], 5),
-        ([0.0, 20.0, 0.0], 5),
-        ([30.0, 0.0, 0.0], 5),
-        ([6.0, 3.0, 0.0], 5),
-    ] {
-        let mut leaf = fig04(rods);
+    let rows = "1 0 0 300\n 1 50 0 200\n 5 0 6 0\n 5 0 20 0\n 5 30 0 0\n 5 6 3 0";
+    for [rods, rest @ ..] in table::<4>(rows) {
+        let mut leaf = fig04(rods as usize);
         for rod in &mut leaf.rods {
             rod.rest_curvature = rest.map(Profile::Constant);
         }
@@ -222,20 +215,10 @@ fn veins_wound_up_at_rest() {
 
 #[test]
 fn loads_from_all_sides() {
-    for weight in [
-        [0.0, 0.0, 10.0],
-        [-50.0, 0.0, 0.0],
-        [0.0, 0.0, -1e3],
-        [1e3, 0.0, 0.0],
-    ] {
+    for weight in table("0 0 10\n -50 0 0\n 0 0 -1e3\n 1e3 0 0") {
         stable(&loaded(fig04(5), weight, [0.0; 3]), 1e-6);
     }
-    for force in [
-        [-100.0, 0.0, 0.0],
-        [-1e3, 0.0, 0.0],
-        [1e5, 0.0, 1.0],
-        [0.0, 100.0, 0.0],
-    ] {
+    for force in table("-100 0 0\n -1e3 0 0\n 1e5 0 1\n 0 100 0") {
         stable(&loaded(fig04(5), [0.0; 3], force), 1e-6);
     }
     // Inextensible rods, pulled: they point where the force does.
@@ -269,14 +252,13 @@ fn many_veins() {
 #[test]
 fn a_leaf_without_resistance_to_torsion() {
     for torsion in [1e-7, 1e-8, 1e-9] {
-        let overrides = ["leaf.rods=4".into(), format!("stiffness.torsion={torsion}")];
-        let scenario = Scenario::read_with(&path("paper/fig04"), &overrides);
-        let scenario = scenario.unwrap();
+        let soft = format!("leaf.rods=4; stiffness.torsion={torsion}");
+        let scenario = scenario("paper/fig04", &soft);
         let leaf = settle(&scenario, 1e-6);
         let sharp = scenario.relaxation().tolerance(1e-8).run().unwrap();
         let rests = [Outcome::Converged, Outcome::ToleranceNotReached];
         assert!(rests.contains(&sharp.outcome), "{:?}", sharp.remark);
-        let told = [&leaf, &sharp].map(|it| it.accuracy.error_estimate.unwrap());
+        let told = [&leaf, &sharp].map(estimate);
         assert!((tip(&leaf) - tip(&sharp)).length() < told[0] + told[1]);
     }
 }
@@ -285,7 +267,7 @@ fn a_leaf_without_resistance_to_torsion() {
 /// only.
 #[test]
 fn a_leaf_that_needs_many_segments() {
-    let scenario = Scenario::from_toml(
+    let scenario = parse(
         r#"
         name = "edge"
         [leaf]
@@ -306,14 +288,14 @@ fn a_leaf_that_needs_many_segments() {
         gravity = [0.19848254629124962, 0.047280533807095085, 0.20432850601779637]
         "#,
     );
-    stable_within(40_000, &scenario.unwrap(), 1e-6);
+    stable_within(40_000, &scenario, 1e-6);
 }
 
 /// Interpolation between the stations of the solution would lose the tolerance: the leaf is
 /// solved again with a smaller one.
 #[test]
 fn stations_keep_the_tolerance() {
-    let scenario = Scenario::from_toml(
+    let scenario = parse(
         r#"
         name = "wild"
         [leaf]
@@ -340,15 +322,10 @@ fn stations_keep_the_tolerance() {
         tip_force = [0.6251948400748418, -0.0479611992042154, -0.8759177734442191]
         "#,
     );
-    let scenario = scenario.unwrap();
-    let options = |stations| Options {
-        every_node: true,
-        stations,
-        ..Options::default()
-    };
     let at = |stations| {
-        let found = relax(&scenario, &options(stations), &mut |_| {}).unwrap();
-        found.at_stations(&scenario, Some(20))
+        let mut options = Options::default();
+        (options.every_node, options.stations) = (true, stations);
+        relaxed(&scenario, &options).at_stations(&scenario, Some(20))
     };
     assert_eq!(at(None).outcome, Outcome::ToleranceNotReached);
     let kept = at(Some(20));

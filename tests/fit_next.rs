@@ -49,9 +49,8 @@ fn pinned(position: [f64; 3]) -> String {
 fn reactions_give_stiffnesses() {
     let truth = "stiffness.bending_2=1.7; stiffness.axial=31";
     let text = pinned([0.9, 0.0, -0.1]);
-    let mut table = String::from(
-        "tip.position[0],reaction_x,reaction_y,reaction_z,sd_reaction_x,sd_reaction_y,sd_reaction_z\n",
-    );
+    let felt = "reaction_x,reaction_y,reaction_z,sd_reaction_x,sd_reaction_y,sd_reaction_z";
+    let mut table = format!("tip.position[0],{felt}\n");
     for x in [0.9, 0.95, 1.0, 1.03] {
         let placed = base(&text, &format!("{truth}; tip.position=[{x:?}, 0.0, -0.1]"));
         let leaf = settle(placed.scenario(), 1e-9);

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::fit::{LEAF, PULLS, VEIN, fitted, gives_back, pulls, request};
+use common::fit::{LEAF, PULLS, THREE, VEIN, fitted, gives_back, pulls, request};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::FitOutcome;
@@ -14,12 +14,7 @@ fn exact_data_give_the_exact_numbers() {
     let truth = "stiffness.bending_2=1.7; stiffness.bending_3=0.6; stiffness.axial=31";
     let exact = pulls(VEIN, truth, &PULLS, 0.0, &mut Draw(1));
     let exact = exact.replace(",0.0,0.0,0.0\n", ",1e-3,1e-3,1e-3\n");
-    let free = [
-        "stiffness.bending_2",
-        "stiffness.bending_3",
-        "stiffness.axial",
-    ];
-    let mut wanted = request(base(VEIN, ""), &[&exact], &free);
+    let mut wanted = request(base(VEIN, ""), &[&exact], &THREE);
     wanted.tolerance = Some(1e-8);
     let found = fitted(&wanted);
     assert_eq!(found.outcome, FitOutcome::Converged, "{:?}", found.remarks);
@@ -37,10 +32,8 @@ fn frequencies_give_stiffness_and_mass() {
     let found = relaxed(truth.scenario(), &with_modes(2, to(1e-8)));
     let modes = found.stability.modes.unwrap();
     let hertz = |k: usize| modes[k].frequency().unwrap() / std::f64::consts::TAU;
-    let (header, [one, two]) = (
-        "frequency_1,frequency_2,sd_frequency_1,sd_frequency_2",
-        [0, 1].map(hertz),
-    );
+    let header = "frequency_1,frequency_2,sd_frequency_1,sd_frequency_2";
+    let [one, two] = [0, 1].map(hertz);
     let data = format!("{header}\n{one:?},{two:?},1e-3,1e-3\n");
     let free = ["stiffness.bending_2", "stiffness.bending_3"];
     let begin = base(VEIN, "stiffness.bending_2=1.2");
@@ -81,9 +74,7 @@ fn what_weight_and_stiffness_share_is_named_in_their_units() {
     }
     let free = ["stiffness.bending_2", "load.gravity[2]"];
     let found = fitted(&request(base(&heavy, ""), &[&table], &free));
-    let [open] = found.undetermined.as_slice() else {
-        panic!("{:?}", found.says);
-    };
+    let open = only(&found.undetermined);
     let rate = open["load.gravity[2]"] / open["stiffness.bending_2"];
     close("change of gravity", rate, -20.0, 0.05);
     assert!(found.says.concat().contains("20 ln t"), "{:?}", found.says);

@@ -4,7 +4,7 @@ mod common;
 
 use common::fit::{LEAF, request};
 use common::*;
-use leafdyn::study::{Data, FitError, FitRequest, fit};
+use leafdyn::study::{Data, FitError, fit};
 
 /// Data in lines between `|`, `=>` and a part of the message, with one number free.
 const DATA: &str = "
@@ -59,22 +59,16 @@ fn tried(lines: &str, free: &str) -> Result<(), FitError> {
     let text: String = lines.map(|line| format!("{line}\n")).collect();
     data.read(&text, "data.csv", 5)?;
     let free = free.split(' ').map(str::parse).collect::<Result<_, _>>()?;
-    let request = request(base(LEAF, ""), &[], &[]);
-    let request = FitRequest {
-        data,
-        free,
-        ..request
-    };
+    let mut request = request(base(LEAF, ""), &[], &[]);
+    (request.data, request.free) = (data, free);
     fit(&request, &mut |_| {}).map(|_| ())
 }
 
 #[test]
 fn tables_divided_in_other_ways_are_explained() {
+    let tabs = "load.tip_force[2]\ttip_z\n-0.1\t-0.2\n";
     for (text, said) in [
-        (
-            "load.tip_force[2]\ttip_z\n-0.1\t-0.2\n",
-            "columns are divided by commas",
-        ),
+        (tabs, "columns are divided by commas"),
         ("tip_z\r-0.1\r", "line ends of CR alone"),
     ] {
         let refused = Data::default().read(text, "data.csv", 5).unwrap_err();

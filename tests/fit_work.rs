@@ -3,23 +3,17 @@
 
 mod common;
 
-use common::fit::{LEAF, fitted, pulls, request, within_bars};
+use common::fit::{LEAF, THREE, fitted, pulls, request, within_bars};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::{Fit, fit};
-
-const FREE: [&str; 3] = [
-    "stiffness.bending_2",
-    "stiffness.bending_3",
-    "stiffness.axial",
-];
 
 fn on(threads: usize) -> Fit {
     let truth = "stiffness.bending_2=1.4; stiffness.bending_3=0.7; stiffness.axial=40";
     let forces = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0_f64];
     let forces = forces.map(|k| [1.0 + k, 0.5 * (k - 4.0), 0.7 * k.cos()]);
     let data = pulls(LEAF, truth, &forces, 5e-4, &mut Draw(2));
-    let asked = request(base(LEAF, ""), &[&data], &FREE);
+    let asked = request(base(LEAF, ""), &[&data], &THREE);
     on_threads(threads, || fit(&asked, &mut |_| {}).unwrap())
 }
 
@@ -77,7 +71,7 @@ fn equal_experiments_share_a_leaf() {
     let pulls = "0.5,-0.11,,0.01,\n1.0,-0.05,,0.01,\n0.5,,0.3,,0.1\n";
     let asked = |count: usize| {
         let data = header.to_string() + &pulls.repeat(count);
-        fitted(&request(base(LEAF, ""), &[&data], &FREE[..1]))
+        fitted(&request(base(LEAF, ""), &[&data], &THREE[..1]))
     };
     let [once, often] = [1, 5_000].map(asked);
     let last = [&once, &often].map(|fit| fit.work.last.factorizations);

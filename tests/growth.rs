@@ -4,10 +4,8 @@
 
 mod common;
 
-use common::motion::{BOTH, run};
+use common::motion::{BOTH, moving, run};
 use common::*;
-use leafdyn::relax::Method;
-use leafdyn::simulate;
 
 /// A rod of length two.
 fn rod(overrides: &str) -> Scenario {
@@ -115,12 +113,8 @@ fn and_moves_like_it() {
     for scheme in BOTH {
         let [a, b] = [true, false].map(|in_stretch| {
             let scenario = leaf(1.2, in_stretch);
-            let options = simulate::Options {
-                scheme: Some(scheme),
-                segments: Some(12),
-                step: Some(1e-3),
-                ..simulate::Options::default()
-            };
+            let mut options = moving(scheme, Some(12));
+            options.step = Some(1e-3);
             let frame = run(&scenario, &options);
             (frame.positions, frame.energy)
         });

@@ -6,8 +6,6 @@ mod common;
 
 use common::random::{cases, leaves};
 use common::*;
-use leafdyn::relax::Outcome;
-use leafdyn::shape::Difference;
 use proptest::prelude::*;
 
 /// A leaf made of the upper half of another and its mirror image.

@@ -3,8 +3,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::branch::{changes_at, follow, text};
 use common::*;
 

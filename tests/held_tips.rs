@@ -9,7 +9,6 @@ use common::branch::{changes_at, follow};
 use common::motion::{BOTH, moving};
 use common::random::{drawn, leaves};
 use common::*;
-use leafdyn::relax::Method;
 use leafdyn::scenario::{Clamp, HeldTip};
 use leafdyn::simulate::{Frame, Simulation};
 
@@ -82,12 +81,10 @@ fn held_beams_vibrate_at_their_frequencies() {
     ] {
         let stiffness = set_stiffness(1e7, f64::INFINITY);
         let mass = "dynamics.density=1; dynamics.rotary_inertia=1e-9";
-        let beam = held_rod(
-            how,
-            &format!("{stiffness}; {mass}; stiffness.bending_3=2.0"),
-        );
-        let mut options = to(1e-9);
-        (options.modes, options.mode_shapes) = (2, true);
+        let flat = format!("{stiffness}; {mass}; stiffness.bending_3=2.0");
+        let beam = held_rod(how, &flat);
+        let mut options = with_modes(2, to(1e-9));
+        options.mode_shapes = true;
         let modes = relaxed(&beam, &options).stability.modes.unwrap();
         let beta = beta * beta;
         for (mode, exact) in modes.iter().zip([beta, 2.0_f64.sqrt() * beta]) {
@@ -167,9 +164,8 @@ fn the_travel_of_a_grip_is_followed() {
         "leaf.fan[0]=0.3..1",
     ] {
         let found = follow(&held("clamped"), arch, travel, false);
-        let [branch] = &found.branches[..] else {
-            panic!("{travel}: {} branches", found.branches.len());
-        };
+        assert_eq!(found.branches.len(), 1, "{travel}");
+        let branch = &found.branches[0];
         assert!(found.complete, "{travel}: {:?}", branch.end);
         let followed = found.factorizations;
         assert!(followed < 100, "{travel}: {followed}");
@@ -194,11 +190,8 @@ fn the_travel_of_a_grip_is_followed() {
 #[test]
 fn pinned_ends_meet() {
     let angle = 130.7099107079_f64.to_radians();
-    let rod = strip(
-        "pinned",
-        &format!("leaf.fan=[{angle}]; tip.position=[0, 0, 0]"),
-    );
-    let leaf = settle(&rod, 1e-9);
+    let met = format!("leaf.fan=[{angle}]; tip.position=[0, 0, 0]");
+    let leaf = settle(&strip("pinned", &met), 1e-9);
     let off = held_by(&leaf) - DVec3::X * 21.54908744351816;
     assert!(off.length() < 1e-7, "{off}");
     let base = leaf.shape.rods[0].nodes[0].m;

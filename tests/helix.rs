@@ -50,11 +50,10 @@ fn a_wrench_about_the_axis_holds_a_straight_rod_in_a_helix() {
             let [force_is, moment_is] =
                 loads.map(|(key, value)| set_vector(&format!("load.tip_{key}"), value));
             let stiffness = format!("{RIGID}; stiffness.torsion={TORSION}");
-            let leaf = Both::of(&rod(&format!(
-                "leaf.length={length:?}; {stiffness}; {force_is}; {moment_is}"
-            )));
+            let long = format!("leaf.length={length:?}; {stiffness}");
+            let leaf = Both::of(&rod(&format!("{long}; {force_is}; {moment_is}")));
             let what = format!("twist {twist}, length {length}");
-            let estimate = leaf.relaxed.accuracy.error_estimate.unwrap();
+            let estimate = estimate(&leaf.relaxed);
             for (rods, estimate) in leaf.shapes().into_iter().zip([estimate, f64::INFINITY]) {
                 for (&sigma, node) in leaf.relaxed.shape.stations.iter().zip(&rods[0].nodes) {
                     let error = (node.position - helix(sigma * length)).length();

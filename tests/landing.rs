@@ -8,7 +8,7 @@ mod common;
 use common::motion::{Scheme, moving};
 use common::random::Draw;
 use common::*;
-use leafdyn::relax::{Limit, SemiImplicit};
+use leafdyn::relax::SemiImplicit;
 use leafdyn::simulate::Simulation;
 use leafdyn::study;
 
@@ -100,10 +100,8 @@ fn is_that_of_the_motion() {
     println!("{count} of {judged} elsewhere, {doubtful} more with a remark; {drawn} drawn");
     // docs/tried.md tells of more.
     assert!(count <= judged / 50, "{elsewhere:?}");
-    assert!(
-        doubtful <= judged / 10,
-        "{doubtful} of {judged} are not certain"
-    );
+    let uncertain = format!("{doubtful} of {judged} are not certain");
+    assert!(doubtful <= judged / 10, "{uncertain}");
 }
 
 #[test]
@@ -130,14 +128,10 @@ fn of_a_mirror_symmetric_leaf_is_found_on_half_of_it() {
 #[test]
 fn of_a_column_that_is_pushed_along_its_axis_stays_doubtful() {
     // It stands on a saddle, which its motion in time does not leave.
-    let column = parse(
-        r#"
-        name = "column"
-        leaf = { rods = 1, length = 1.0, fan = [0.0] }
-        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 0.5, axial = 1e4, shear_2 = 1e4, shear_3 = 1e4 }
-        load = { tip_force = [-4.0, 0.0, 0.0] }
-        "#,
-    );
+    let stiff = set_stiffness(1e4, 1e4);
+    let column = rod(&format!(
+        "{stiff}; stiffness.bending_3=0.5; load.tip_force=[-4, 0, 0]"
+    ));
     let rest = column.relax().unwrap();
     assert!(rest.stability.saddle.is_some());
     assert!(rest.remark.unwrap().contains("softened"));

@@ -67,7 +67,7 @@ fn the_full_model_tends_to_it_with_the_square_of_the_load() {
             let errors = [1.0, 0.5, 0.25].map(|part| relative_error(axis, part * most, tension));
             assert!(errors[0] < 0.02, "{tension}: {errors:?}");
             for pair in errors.windows(2) {
-                let order = (pair[0] / pair[1]).log2();
+                let order = order(pair[0], pair[1]);
                 assert!((order - 2.0).abs() < 0.05, "{axis}, {tension}: {errors:?}");
             }
         }
@@ -83,7 +83,7 @@ fn its_wavenumber_is_the_one_that_is_reported() {
         let number = tension.abs() * LENGTH * LENGTH / A2;
         assert!((vein.load_number / number - 1.0).abs() < 1e-3);
         let waves = match tension < 0.0 {
-            true => number.sqrt() / (2.0 * std::f64::consts::PI),
+            true => number.sqrt() / (2.0 * PI),
             false => 0.0,
         };
         assert!((vein.predicted_waves() - waves).abs() < 1e-3);

@@ -37,27 +37,21 @@ fn an_arch_snaps_where_its_branch_loses_its_stability() {
     // It comes back stable far below: between them there are two equilibria.
     assert_eq!(critical.len(), 4);
     let lost = critical[0].1.value;
-    let [jump] = map.jumps.as_deref().unwrap() else {
-        panic!("{:?}", map.jumps);
-    };
+    let jump = only(map.jumps.as_deref().unwrap());
     let [a, b] = jump.between;
     assert!(b < lost && lost < a + (a - b), "{lost} {jump:?}");
     assert!((a - b) < 1e-2);
     assert!(jump.distance > 0.1);
-    assert_eq!(
-        (&jump.from[0][..], &jump.to[0][..]),
-        ("-75.5", "-100.333333333")
-    );
+    let cells = [&jump.from[0][..], &jump.to[0]];
+    assert_eq!(cells, ["-75.5", "-100.333333333"]);
 }
 
 /// The same along either axis of a map of two, and only there.
 #[test]
 fn both_axes_are_looked_along() {
     let (load, bending) = ("load.gravity[1]", "scale:stiffness.bending_3");
-    let axes = [
-        &format!("{load}=-60..-100:2")[..],
-        &format!("{bending}=1..1.5:2"),
-    ];
+    let axes = [format!("{load}=-60..-100:2"), format!("{bending}=1..1.5:2")];
+    let axes = axes.each_ref().map(String::as_str);
     let jumps = mapped(base(ARCH, ""), &axes).jumps.unwrap();
     // A stiffer arch snaps later, at -80.6 times 1.5 if it did not stretch.
     let keys: Vec<&str> = jumps.iter().map(|jump| jump.key.as_str()).collect();

@@ -4,7 +4,6 @@
 mod common;
 
 use common::*;
-use leafdyn::relax::Method;
 use leafdyn::study::{Base, Confidence, MapMethod, MapOutcome, MapRequest, MapRow};
 
 use MapOutcome::{Diverged, NotConverged, OtherEquilibrium, OutOfTime, Right, Saddle};

@@ -6,8 +6,6 @@
 mod common;
 mod workplace;
 
-use std::f64::consts::PI;
-
 use common::branch::follow;
 use common::*;
 use leafdyn::relax::{Fate, Loss, Margin, Push};
@@ -16,6 +14,9 @@ use workplace::{Json, Workplace, timeless};
 
 /// Euler's load of a clamped column.
 const EULER: f64 = 0.25 * PI * PI;
+
+/// That leaves its plane and twists only under much more.
+const STIFF: &str = "stiffness.torsion=50; stiffness.bending_2=50";
 
 /// A leaf to 1e-8, and its margin.
 fn found(scenario: &Scenario) -> (Equilibrium, Margin) {
@@ -106,7 +107,7 @@ fn across(tip: f64) -> f64 {
 /// holds it is largest; the pass is the straight one.
 #[test]
 fn a_buckled_column_snaps_as_the_elastica() {
-    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
+    let strip = format!("{RIGID}; {STIFF}");
     let column = rod(&format!("{strip}; load.tip_force=[{:?}, 0, 0]", -LOAD));
     let (leaf, margin) = found(&column);
     let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
@@ -167,12 +168,9 @@ fn vanish_as_at_a_fold(energies: [f64; 4]) {
 #[test]
 fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
     let (most, angle) = fold();
-    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
-    let bent = |force: f64| {
-        rod(&format!(
-            "{strip}; load.tip_force=[-{LOAD:?}, {force:?}, 0]"
-        ))
-    };
+    let strip = format!("{RIGID}; {STIFF}");
+    let load = |force: f64| format!("load.tip_force=[-{LOAD:?}, {force:?}, 0]");
+    let bent = |force: f64| rod(&format!("{strip}; {}", load(force)));
     let beyond = relaxed(&bent(-1.000001 * most), &Options::default());
     let barriers = PARTS.map(|part| {
         let force = (1.0 - part) * most;
@@ -201,7 +199,7 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
 fn the_barrier_of_a_clamped_arch_vanishes_at_its_fold() {
     let span = 0.3_f64.sin() / 0.3;
     let arch = format!(
-        "leaf.fan=[0.3]; stiffness.torsion=50; stiffness.bending_2=50; {}; rest.bend_3=-0.6; \
+        "leaf.fan=[0.3]; {STIFF}; {}; rest.bend_3=-0.6; \
          tip.held='clamped'; tip.position=[{span:?}, 0, 0]; tip.angles=-0.3; load.gravity=[0, 0, 0]",
         set_stiffness(1e4, f64::INFINITY)
     );
@@ -223,7 +221,7 @@ fn the_barrier_of_a_clamped_arch_vanishes_at_its_fold() {
 /// the pass to it is found.
 #[test]
 fn passes_next_to_a_fold_are_not_overstepped() {
-    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50; rest.bend_3=0.5");
+    let strip = format!("{RIGID}; {STIFF}; rest.bend_3=0.5");
     let energies = [1.1, 1.2, 1.269, 1.34, 1.382, 1.3964, 1.4035].map(|force| {
         let column = rod(&format!("{strip}; load.tip_force=[-3, {:?}, 0]", -force));
         let (leaf, margin) = found(&column);
@@ -283,12 +281,8 @@ fn beyond_its_load_the_barrier_of_a_strip_is_that_of_the_elastica() {
         let found = found.unwrap_or_else(|| panic!("{part}"));
         let (energy, error) = (found.energy, found.error.unwrap());
         // The closed form is a difference of numbers of the order of the load.
-        close(
-            &format!("{part}"),
-            energy,
-            barrier(load),
-            error + 1e-14 * load,
-        );
+        let within = error + 1e-14 * load;
+        close(&format!("{part}"), energy, barrier(load), within);
         assert!(error < 1e-6 * energy);
         assert!((found.saddle.tip.x - 1.0).abs() < 1e-9);
     }
@@ -310,10 +304,8 @@ fn shortened(beyond: f64) -> Scenario {
     let load = 0.5 * AXIAL * (1.0 - (1.0 - 16.0 * PI * PI / AXIAL).sqrt());
     let tip = 1.0 - (1.0 + beyond) * load / AXIAL;
     let stiffness = set_stiffness(AXIAL, f64::INFINITY);
-    rod(&format!(
-        "stiffness.torsion=50; stiffness.bending_2=50; {stiffness}; \
-         tip.held='clamped'; tip.position=[{tip:?}, 0, 0]"
-    ))
+    let held = format!("tip.held='clamped'; tip.position=[{tip:?}, 0, 0]");
+    rod(&format!("{STIFF}; {stiffness}; {held}"))
 }
 
 /// Held at both ends, from 10 to 0.5 % beyond: H/2 times the square of the strain beyond, but
@@ -354,9 +346,12 @@ fn what_has_no_margin_is_said() {
 fn margins_do_not_depend_on_threads() {
     let place = Workplace::new();
     let [one, two] = ["1", "2"].map(|threads| {
-        let asked =
-            "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1";
-        timeless(place.run_on(threads, asked).ends(0).json()["margin"].clone())
+        let pushed = "--set load.tip_force=[-3,0,0] --set leaf.rods=1";
+        let run = place.run_on(
+            threads,
+            &format!("relax leaf.toml --margin --json {pushed}"),
+        );
+        timeless(run.ends(0).json()["margin"].clone())
     });
     assert_eq!(one, two);
     assert_eq!(one["pushes"].list().len(), 6);

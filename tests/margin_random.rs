@@ -5,18 +5,16 @@ mod common;
 use common::random::Draw;
 use common::*;
 use leafdyn::internals::branch::{Equations, Family};
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, State};
 use leafdyn::internals::relax::{project, settle_from};
-use leafdyn::relax::Limit;
 use leafdyn::study::relax_with_margin;
 
 /// A soft leaf that may have several places to rest.
 fn soft(draw: &mut Draw) -> Scenario {
     let rods = 1 + (3.0 * draw.even()) as usize;
-    let coupling = if rods > 1 {
-        "coupling = { y = 1.0, z = 1.0 }"
-    } else {
-        ""
+    let coupling = match rods {
+        1 => "",
+        _ => "coupling = { y = 1.0, z = 1.0 }",
     };
     parse(&format!(
         r#"
@@ -80,11 +78,9 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
         let family = Family::new(&make, (0.0, 2.0), false).unwrap();
         let leaf = Leaf::new(&scenario);
         // On one grid, fine enough for its folds.
-        let alone = Options {
-            every_node: true,
-            ..on(64)
-        };
-        let alone = relaxed(&scenario, &alone);
+        let mut options = on(64);
+        options.every_node = true;
+        let alone = relaxed(&scenario, &options);
         if alone.tips[0].distance(rest.tips[0]) > 1e-2 {
             continue;
         }

@@ -3,25 +3,21 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, three_veins};
 use common::random::{cases, drawn, leaves};
 use common::vibration::Linear;
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Physics;
-use leafdyn::relax::{Method, Mode, relax};
+use leafdyn::relax::{Mode, relax};
 use leafdyn::scenario::Dynamics;
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
 
 fn with(count: usize) -> Options {
-    Options {
-        modes: count,
-        mode_shapes: true,
-        ..Options::default()
-    }
+    let mut options = with_modes(count, Options::default());
+    options.mode_shapes = true;
+    options
 }
 
 /// On one grid.

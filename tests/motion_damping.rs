@@ -15,7 +15,7 @@ mod common;
 use common::motion::{BOTH, Scheme, discrete, explicit, method, released};
 use common::vibration::Linear;
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation;
 
@@ -112,20 +112,12 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
 }
 
 #[test]
-fn external_damping() {
+fn external_and_internal_damping_and_both() {
     for c in [0.5, 3.0, 8.0] {
         assert_decays(&format!("external {c}"), c, 0.0, &[0, 1, 4, 20]);
     }
-}
-
-#[test]
-fn internal_damping() {
     for eta in [1e-3, 0.02, 0.2] {
         assert_decays(&format!("internal {eta}"), 0.0, eta, &[0, 1, 4, 20]);
     }
-}
-
-#[test]
-fn both() {
     assert_decays("both", 1.0, 0.01, &[0, 4]);
 }

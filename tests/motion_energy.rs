@@ -6,9 +6,9 @@ mod common;
 
 use common::motion::*;
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Energy;
-use leafdyn::scenario::{Dynamics, Schedule};
+use leafdyn::scenario::Dynamics;
 
 /// Energies at the start and at so many instants until `until`.
 fn energies(
@@ -116,21 +116,19 @@ fn when_shaken(name: &str, leaf: Scenario, change: impl Fn(&mut Dynamics)) {
     }
 }
 
+/// A rod and a leaf; a rod that curls and is twisted; and one that rests in half its own
+/// curvature under a moment, for which no potential exists, before it is shaken.
 #[test]
-fn of_a_shaken_rod() {
+fn of_what_is_shaken() {
     when_shaken("rod", twisted_rod(), |_| {});
-}
-
-#[test]
-fn of_a_shaken_leaf() {
     when_shaken("leaf", three_veins(), |_| {});
-}
-
-#[test]
-fn of_a_rod_that_curls_and_is_twisted() {
     when_shaken("curling rod", twisted_rod(), |dynamics| {
         dynamics.rest = curling(4.0);
         dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);
+    });
+    when_shaken("rod under a moment", twisted_rod(), |dynamics| {
+        dynamics.rest = Schedule::constant(0.5);
+        dynamics.tip_moment = Schedule::constant([0.7, -0.8, 0.9]);
     });
 }
 
@@ -141,16 +139,6 @@ fn of_a_long_row_of_segments() {
     let mut rod = shaken(twisted_rod(), (1.5, 1e-4));
     rod.dynamics.rest = curling(4.0);
     assert_order_on("300 segments", &rod, Scheme::Explicit, 300, (1e-4, 0.2));
-}
-
-/// A rod that rests in half its own curvature under a moment, for which no
-/// potential exists, before it is shaken.
-#[test]
-fn of_a_rod_with_half_its_curvature_under_a_moment() {
-    when_shaken("rod under a moment", twisted_rod(), |dynamics| {
-        dynamics.rest = Schedule::constant(0.5);
-        dynamics.tip_moment = Schedule::constant([0.7, -0.8, 0.9]);
-    });
 }
 
 /// A rod in its rest shape has no energy, whatever the factor of its

@@ -9,7 +9,7 @@ mod common;
 
 use common::motion::{Scheme, discrete, explicit, moving, released};
 use common::*;
-use leafdyn::internals::leaf::{DiscreteLeaf, Leaf};
+use leafdyn::internals::leaf::DiscreteLeaf;
 use leafdyn::internals::motion::{Method, Physics, Snapshot};
 use leafdyn::simulate::{self, Refused, Simulation};
 

@@ -12,7 +12,7 @@ use common::motion::{
     three_veins, twisted_rod,
 };
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 
 /// How equal limits can be: internal damping also takes the fast waves, whose
 /// error falls with the order but is large.

@@ -4,10 +4,8 @@
 mod common;
 
 use common::motion::*;
-use glam::DVec3;
-use leafdyn::internals::leaf::Leaf;
+use common::{DVec3, Leaf, Schedule, table};
 use leafdyn::internals::motion::{Method, Physics, Snapshot, Steps};
-use leafdyn::scenario::Schedule;
 
 /// A pulse that rises from nothing at time `at`, to a peak after a quarter of its `width`.
 fn pulse(at: f64, width: f64, impulse: [f64; 3]) -> Schedule<[f64; 3]> {
@@ -19,9 +17,8 @@ fn pulse(at: f64, width: f64, impulse: [f64; 3]) -> Schedule<[f64; 3]> {
 
 fn momentum(leaf: &Leaf, segments: usize, snapshot: &Snapshot) -> DVec3 {
     let (physics, grid) = (Physics::new(leaf), discrete(leaf, segments));
-    let masses = grid
-        .each(0..=segments)
-        .map(|(j, i)| physics.inertia(&grid, j, i).mass);
+    let nodes = grid.each(0..=segments);
+    let masses = nodes.map(|(j, i)| physics.inertia(&grid, j, i).mass);
     let momenta = masses.zip(&snapshot.velocity);
     let sum: DVec3 = momenta.map(|(mass, v)| mass * v.linear).sum();
     sum * leaf.scale.force() * physics.time
@@ -32,12 +29,7 @@ const IMPULSE: [f64; 3] = [0.02, -0.1, 0.05];
 /// Within a step, over the end of one, over the middle of one, and over two and a half.
 #[test]
 fn a_free_rod_has_the_momentum_of_the_pulse() {
-    for (at, width) in [
-        (0.1, 1e-5),
-        (0.49999, 2e-5),
-        (0.5049999, 3e-7),
-        (0.51, 0.025),
-    ] {
+    for [at, width] in table("0.1 1e-5\n 0.49999 2e-5\n 0.5049999 3e-7\n 0.51 0.025") {
         for gravity in [true, false] {
             let mut rod = twisted_rod();
             rod.dynamics.clamped = false;
@@ -118,18 +110,10 @@ fn short_and_long_steps_agree() {
         for (k, method) in coarse.into_iter().enumerate() {
             let found = after(method);
             let off = (found.0 - fine.0).length();
-            println!(
-                "{k}: tip {off:.1e}, work {} {}, balance {:.1e}",
-                found.1, fine.1, found.2
-            );
+            let ([work, right], balance) = ([found.1, fine.1], found.2);
             assert!(off < 5e-3, "{k}: {off}");
-            assert!(
-                (found.1 / fine.1 - 1.0).abs() < 0.03,
-                "{k}: {} {}",
-                found.1,
-                fine.1
-            );
-            assert!(found.2.abs() < 0.1 * fine.1, "{k}: {}", found.2);
+            assert!((work / right - 1.0).abs() < 0.03, "{k}: {work} {right}");
+            assert!(balance.abs() < 0.1 * right, "{k}: {balance}");
         }
     }
 }

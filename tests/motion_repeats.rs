@@ -5,23 +5,17 @@ mod common;
 
 use common::motion::{explicit, released, semi_implicit};
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::{Method, Steps};
 
 /// A damped leaf under loads that change.
-fn scenario(rods: usize) -> Scenario {
-    parse(&format!(
-        r#"
-        name = "leaf"
-        leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
-        stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }}
-        coupling = {{ y = 1.0, z = 2.0 }}
-        load = {{ gravity = [0.0, 0.0, -1.0] }}
-        [dynamics]
-        internal_damping = 0.001
-        gravity = {{ at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, 0]] }}
-        "#
-    ))
+fn damped(rods: usize) -> Scenario {
+    let tilted = "dynamics.gravity={ at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, 0]] }";
+    let damped = "coupling.z=2.0; dynamics.internal_damping=0.001";
+    scenario(
+        "paper/fig04",
+        &format!("leaf.rods={rods}; {damped}; {tilted}"),
+    )
 }
 
 /// Everything about a state, bit by bit.
@@ -41,16 +35,13 @@ fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn Method>; 2] {
 /// Leaves large enough to be shared out.
 #[test]
 fn on_any_number_of_threads() {
-    let scenario = scenario(30);
-    let leaf = Leaf::new(&scenario);
+    let leaf = Leaf::new(&damped(30));
     for method in 0..2 {
         let run = |threads: usize| {
             on_threads(threads, || {
                 let [explicit, semi_implicit] = methods(&leaf, 300);
-                let (mut method, until) = match method {
-                    0 => (explicit, 5e-3),
-                    _ => (semi_implicit, 1e-2),
-                };
+                let both = [(explicit, 5e-3), (semi_implicit, 1e-2)];
+                let (mut method, until) = both.into_iter().nth(method).unwrap();
                 method.advance(until).unwrap();
                 assert!(method.steps() > 5, "{}", method.steps());
                 (bits(&method.snapshot().state), method.save())
@@ -63,8 +54,7 @@ fn on_any_number_of_threads() {
 
 #[test]
 fn looked_at_or_not() {
-    let scenario = scenario(3);
-    let leaf = Leaf::new(&scenario);
+    let leaf = Leaf::new(&damped(3));
     for (mut looked, mut other) in methods(&leaf, 20).into_iter().zip(methods(&leaf, 20)) {
         for k in 1..=4 {
             looked.advance(0.1 * k as f64).unwrap();
@@ -78,8 +68,7 @@ fn looked_at_or_not() {
 
 #[test]
 fn from_saved_numbers() {
-    let scenario = scenario(3);
-    let leaf = Leaf::new(&scenario);
+    let leaf = Leaf::new(&damped(3));
     for (mut through, mut other) in methods(&leaf, 20).into_iter().zip(methods(&leaf, 20)) {
         through.advance(0.2).unwrap();
         assert!(other.restore(&through.save()));

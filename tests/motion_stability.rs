@@ -8,9 +8,8 @@ use common::motion::{discrete, explicit, ramp, released};
 use common::random::{cases, movers};
 use common::vibration::Linear;
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::{Energy, Method, Physics, Stopped};
-use leafdyn::scenario::Schedule;
 use leafdyn::simulate::{Options, Refused, Simulation};
 use proptest::prelude::*;
 
@@ -201,7 +200,6 @@ fn steps_beyond_the_limit_are_refused() {
     };
     let stable = of(None).unwrap();
     assert_eq!(of(Some(0.999 * stable)), Ok(stable));
-    let refused = of(Some(1.001 * stable));
-    let unstable = matches!(refused, Err(Refused::Unstable { .. }));
-    assert!(unstable, "{refused:?}");
+    let refused = of(Some(1.001 * stable)).unwrap_err();
+    assert!(matches!(refused, Refused::Unstable { .. }), "{refused:?}");
 }

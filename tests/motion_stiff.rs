@@ -8,9 +8,8 @@ use common::motion::{
     distance, explicit, numbers, ramp, released, rest, semi_implicit, three_veins, twisted_rod,
 };
 use common::*;
-use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::{Method, Snapshot, Steps};
-use leafdyn::scenario::Schedule;
 
 fn stiff(mut leaf: Scenario, stiffness: f64) -> Scenario {
     for rod in &mut leaf.rods {

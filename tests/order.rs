@@ -27,26 +27,19 @@ fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 /// its order says.
 fn assert_orders(name: &str, scenario: &Scenario, coarsest: usize) {
     let grids = [1, 2, 4, 8, 16, 32, 64];
-    let mut column = grids
-        .map(|times| positions(scenario, coarsest, times))
-        .to_vec();
+    let on = |times| positions(scenario, coarsest, times);
+    let mut column = grids.map(on).to_vec();
     let orders = [(2.0, 0.01), (4.0, 0.05), (6.0, 0.1), (8.0, 0.6)];
     for (m, (order, slack)) in orders.into_iter().enumerate() {
         let changes: Vec<f64> = column.windows(2).map(|w| distance(&w[0], &w[1])).collect();
         // Two successive changes above rounding, as fine as possible.
         let rounding = if m < 3 { 1e-12 } else { 3e-14 };
-        let seen = changes
-            .iter()
-            .take_while(|change| **change > rounding)
-            .count();
+        let above = changes.iter().take_while(|change| **change > rounding);
+        let seen = above.count();
         assert!(seen >= 2, "{name}: column {m} changes by {changes:?}");
-        let observed = (changes[seen - 2] / changes[seen - 1]).log2();
-        close(
-            &format!("order of {name}, {changes:?}"),
-            observed,
-            order,
-            slack,
-        );
+        let observed = common::order(changes[seen - 2], changes[seen - 1]);
+        let what = format!("order of {name}, {changes:?}");
+        close(&what, observed, order, slack);
         let power = 4f64.powi(m as i32 + 1);
         let next = |w: &[Vec<DVec3>]| {
             let pairs = w[0].iter().zip(&w[1]);

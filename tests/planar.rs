@@ -12,8 +12,7 @@ use leafdyn::internals::rod::{
     Element, Ends, Nodes, PlanarElement, Section, Sections, SpatialElement,
 };
 use leafdyn::internals::rotation;
-use leafdyn::relax::{Outcome, SemiImplicit};
-use leafdyn::shape::Difference;
+use leafdyn::relax::SemiImplicit;
 use proptest::prelude::*;
 use pulp::Scalar;
 
@@ -125,11 +124,8 @@ proptest! {
 /// and at rest.
 #[test]
 fn the_paper_s_flat_leaf_is_found_in_its_plane() {
-    for (rods, work) in [
-        (5, [4, 10, 10, 16]),
-        (21, [4, 10, 10, 14]),
-        (35, [4, 10, 10, 13]),
-    ] {
+    for (rods, iterations) in [(5, 16), (21, 14), (35, 13)] {
+        let work = [4, 10, 10, iterations];
         let leaf = fig05(&format!("leaf.rods={rods}"));
         let [planar, full] = reduced_and_full(&leaf, None);
         assert!(planar.model.planar && !full.model.planar);
@@ -137,20 +133,14 @@ fn the_paper_s_flat_leaf_is_found_in_its_plane() {
         assert_eq!(planar.accuracy.segments, full.accuracy.segments);
         let [found, full_work] = [&planar, &full].map(|leaf| {
             let work = leaf.work;
-            [
-                work.steps,
-                work.factorizations,
-                work.force_evaluations,
-                work.cg_iterations,
-            ]
+            let solved = [work.steps, work.factorizations];
+            [&solved[..], &[work.force_evaluations, work.cg_iterations]].concat()
         });
         assert_eq!(found, work, "{rods} rods");
         assert_eq!([found[0], found[3]], [full_work[0], full_work[3]]);
         let apart = Difference::between(&planar.shape.rods, &full.shape.rods);
-        assert!(
-            apart.position < 1e-13 && apart.rotation < 1e-12,
-            "{apart:?}"
-        );
+        let same = apart.position < 1e-13 && apart.rotation < 1e-12;
+        assert!(same, "{apart:?}");
         for (a, b) in [
             (planar.model.shear_effect, full.model.shear_effect),
             (planar.model.stretch_effect, full.model.stretch_effect),

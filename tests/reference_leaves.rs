@@ -20,10 +20,8 @@ fn references() -> Vec<(Scenario, Value)> {
     let text = include_str!("data/reference_leaves.json");
     let leaves: Vec<Value> = serde_json::from_str(text).unwrap();
     assert_eq!(leaves.len(), 7);
-    leaves
-        .into_iter()
-        .map(|leaf| (scenario_of(&leaf), leaf))
-        .collect()
+    let with = |leaf| (scenario_of(&leaf), leaf);
+    leaves.into_iter().map(with).collect()
 }
 
 fn scenario_of(reference: &Value) -> Scenario {

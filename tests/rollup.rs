@@ -3,10 +3,7 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::*;
-use leafdyn::relax::Outcome;
 
 /// An arc of the angle M L/EI, with no force in it, whatever its stretch and
 /// shear stiffness (closed form).

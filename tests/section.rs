@@ -3,9 +3,6 @@
 mod common;
 
 use common::*;
-use std::f64::consts::PI;
-
-use leafdyn::relax::Method;
 
 fn with(section: &str) -> Result<Scenario, String> {
     let text = format!(
@@ -40,16 +37,9 @@ fn the_same_leaf_with_its_stiffnesses_written_out() {
         let values: Vec<f64> = profiles.iter().map(|profile| profile.at(0.5)).collect();
         format!("{key} = {values:?}\n")
     };
-    let keys = [
-        "torsion",
-        "bending_2",
-        "bending_3",
-        "axial",
-        "shear_2",
-        "shear_3",
-    ];
+    let keys = "torsion bending_2 bending_3 axial shear_2 shear_3".split(' ');
     let mut text = String::from("[stiffness]\n");
-    for (k, key) in keys.iter().enumerate() {
+    for (k, key) in keys.enumerate() {
         let profiles = leaf.rods.iter().map(|rod| match k {
             0..3 => &rod.couple_stiffness[k],
             _ => &rod.force_stiffness[k - 3],
@@ -57,11 +47,9 @@ fn the_same_leaf_with_its_stiffnesses_written_out() {
         text += &list(key, profiles.collect());
     }
     text += "[dynamics]\n";
-    text += &list("density", leaf.dynamics.density.iter().collect());
-    text += &list(
-        "rotary_inertia",
-        leaf.dynamics.rotary_inertia.iter().collect(),
-    );
+    let dynamics = &leaf.dynamics;
+    text += &list("density", dynamics.density.iter().collect());
+    text += &list("rotary_inertia", dynamics.rotary_inertia.iter().collect());
     assert_eq!(with(&text).unwrap(), leaf);
     // Mass of the first vein per length: 2 times 0.2 times 0.05.
     common::close("density", leaf.dynamics.density[0].at(0.1), 0.02, 1e-16);

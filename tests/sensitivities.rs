@@ -6,7 +6,7 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::*;
-use leafdyn::relax::{Outcome, Reaction, Sensitivity};
+use leafdyn::relax::{Mode, Reaction, Sensitivity};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 
 /// Leaves to be tried; `LEAFDYN_LEAVES` in the environment asks for more.
@@ -170,11 +170,8 @@ fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
     let count = all.len();
     let modes = leaf.stability.modes.as_deref().unwrap_or_default();
     all.extend(modes.iter().take(1).map(|mode| mode.eigenvalue));
-    all.extend(
-        modes
-            .iter()
-            .map(|mode| mode.frequency().unwrap_or(f64::NAN) / TAU),
-    );
+    let hertz = |mode: &Mode| mode.frequency().unwrap_or(f64::NAN) / TAU;
+    all.extend(modes.iter().map(hertz));
     (all, count)
 }
 
@@ -269,10 +266,8 @@ fn their_errors_are_bounds() {
                 let tips = rough.tips.iter().zip(&fine.tips);
                 let apart = largest(tips.map(|(a, b)| a.distance(*b)));
                 let [error, least] = [rough, fine].map(|found| found.tip_error.unwrap());
-                assert!(
-                    apart <= error + least,
-                    "{number} {key}: {apart:e} {error:e}"
-                );
+                let what = format!("{number} {key}: {apart:e} {error:e}");
+                assert!(apart <= error + least, "{what}");
                 assert!(least < 1e-3 * error + 1e-8);
                 let error = rough.energy_error.unwrap() + fine.energy_error.unwrap();
                 close(&format!("{number} {key}"), rough.energy, fine.energy, error);
@@ -285,23 +280,16 @@ fn their_errors_are_bounds() {
 /// the lowest eigenvalue, which has no derivative then; weight along the rod does not.
 #[test]
 fn an_eigenvalue_that_splits_has_no_derivative() {
-    let text = r#"
-        name = "round"
-        leaf = { rods = 1, length = 1.0, fan = [0.0] }
-        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1e3, shear_2 = 1e3, shear_3 = 1e3 }
-        load = { gravity = [-1.0, 0.0, 0.0] }
-    "#;
+    let round = format!("{}; load.gravity=[-1.0, 0.0, 0.0]", set_stiffness(1e3, 1e3));
     let wanted = [
         "stiffness.bending_2",
         "load.gravity[0]",
         "stiffness.torsion",
     ];
-    let base = base(text, "");
+    let base = base(ROD, &round);
     let options = with_modes(3, common::to(1e-8));
     let found = derivatives(&base, &wanted, &options).1;
-    let [bending, weight, torsion] = found.as_slice() else {
-        panic!("{found:?}");
-    };
+    let [bending, weight, torsion] = [0, 1, 2].map(|k| &found[k]);
     assert_eq!(bending.lowest_eigenvalue, None);
     assert_eq!(bending.lowest_eigenvalue_error, None);
     assert_eq!(bending.frequencies[..2], [None, None]);

@@ -5,7 +5,7 @@
 mod common;
 
 use common::*;
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, State};
 
 /// Scenes with one equilibrium, or with one that continuation from the arcs
 /// leads to: the relaxed one.

@@ -33,17 +33,13 @@ fn covered(what: &str, scenario: &Scenario, rough: &Solution, truth: &Solution) 
     let fields = |d: leafdyn::shape::Difference| [d.position, d.rotation, d.force, d.moment];
     let scaled = |d| std::array::from_fn(|k| fields(d)[k] / units[k]);
     let (estimate, uncertain): ([f64; 4], [f64; 4]) = (scaled(rough.error), scaled(truth.error));
-    for (k, which) in ["position", "rotation", "force", "moment"]
-        .iter()
-        .enumerate()
-    {
-        let bound = estimate[k] + uncertain[k];
-        close(
-            &format!("error of {which}, {what}"),
-            fields(error)[k],
-            0.0,
-            bound,
+    let all = ["position", "rotation", "force", "moment"];
+    for (k, which) in all.iter().enumerate() {
+        let (what, bound) = (
+            format!("error of {which}, {what}"),
+            estimate[k] + uncertain[k],
         );
+        close(&what, fields(error)[k], 0.0, bound);
     }
     (error.position > 100.0 * uncertain[0]).then(|| estimate[0] / error.position)
 }

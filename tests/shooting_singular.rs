@@ -4,8 +4,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::*;
 use leafdyn::internals::bvp::{Neutral, Reason, Solution};
 
@@ -51,13 +49,9 @@ fn a_column_at_eulers_load_would_move_sideways() {
         }
         let stations = shot.stations.clone();
         let neutral = neutral(shot);
-        assert_eq!(
-            neutral.to_string(),
-            words("vein 1 would move, mostly along y")
-        );
-        let [rod] = neutral.displacement.as_slice() else {
-            panic!("one rod");
-        };
+        let said = words("vein 1 would move, mostly along y");
+        assert_eq!(neutral.to_string(), said);
+        let rod = only(&neutral.displacement);
         let side = rod.last().unwrap().y.signum();
         for (moved, sigma) in rod.iter().zip(stations) {
             let mode = DVec3::new(0.0, side * (1.0 - (0.5 * PI * sigma).cos()), 0.0);
@@ -123,14 +117,10 @@ fn all_veins_of_a_pair_would_move() {
 /// `tests/hanging_curved.rs`, without any eigenvalue being counted.
 #[test]
 fn published_bifurcations_are_seen() {
-    let lens = |length: f64| {
-        let entry = format!("leaf.length=[1.0, {length:?}, 1.0]");
-        scenario("classic/lens_midrib", &entry)
-    };
-    let hanging = |weight: f64| {
-        let entry = format!("load.gravity=[{weight:?}, 0, 0]");
-        scenario("classic/hanging_curved", &entry)
-    };
+    let long = |length: f64| format!("leaf.length=[1.0, {length:?}, 1.0]");
+    let lens = |length| scenario("classic/lens_midrib", &long(length));
+    let heavy = |weight: f64| format!("load.gravity=[{weight:?}, 0, 0]");
+    let hanging = |weight| scenario("classic/hanging_curved", &heavy(weight));
     let (length, weight) = (0.93780575743, 11.868750740620);
     for (leaf, moves) in [(lens(length), "all veins"), (hanging(weight), "vein 1")] {
         let text = neutral(alone(&leaf)).to_string();
@@ -179,31 +169,25 @@ fn what_moves_and_why_it_failed_is_put_into_words() {
         let because = "the equations are singular (ratio of singular values 1.5e-12)";
         assert_eq!(why, format!("{because}: {text}"));
     }
-    let unbounded = |fixed| {
-        let sigma = 0.25;
-        Reason::Unbounded { sigma, fixed }.to_string()
-    };
-    assert_eq!(
-        unbounded(true),
-        "integrated from the start, the leaf grows out of all bounds at 0.250 of its length: \
-         use more intervals"
-    );
+    let (sigma, correction, more) = (0.25, 2.5e-3, "use more intervals");
+    let unbounded = |fixed| Reason::Unbounded { sigma, fixed }.to_string();
+    let grows =
+        "integrated from the start, the leaf grows out of all bounds at 0.250 of its length";
+    assert_eq!(unbounded(true), format!("{grows}: {more}"));
     // The program chose the number.
     let other = "lower the load, or start from the relaxed leaf";
     assert!(unbounded(false).ends_with(&format!("of its length: {other}")));
-    let stuck = |growth| Reason::NoConvergence {
-        correction: 2.5e-3,
-        growth,
-        fixed: true,
+    let stuck = |growth| {
+        let fixed = true;
+        Reason::NoConvergence {
+            correction,
+            growth,
+            fixed,
+        }
+        .to_string()
     };
-    assert_eq!(
-        stuck(12.2).to_string(),
-        "Newton's method stops at corrections of 2.5e-3; \
-         perturbations grow 10^12 times over an interval: use more intervals"
-    );
-    assert_eq!(
-        stuck(2.0).to_string(),
-        "Newton's method stops at corrections of 2.5e-3: \
-         lower the load, or start from the relaxed leaf"
-    );
+    let stops = "Newton's method stops at corrections of 2.5e-3";
+    let grow = "perturbations grow 10^12 times over an interval";
+    assert_eq!(stuck(12.2), format!("{stops}; {grow}: {more}"));
+    assert_eq!(stuck(2.0), format!("{stops}: {other}"));
 }

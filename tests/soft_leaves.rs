@@ -8,7 +8,6 @@
 mod common;
 
 use common::*;
-use leafdyn::relax::Outcome;
 
 fn figure(name: &str, rods: usize) -> Scenario {
     scenario(&format!("paper/{name}"), &format!("leaf.rods={rods}"))

@@ -7,7 +7,7 @@ mod common;
 use common::random::{drawn, leaves};
 use common::*;
 use leafdyn::internals::branch::{Equations, Family, Kind, Point, Walk, walk};
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, State};
 use leafdyn::internals::relax::project;
 
 /// The leaf under loads turned over, from as they are to their opposite times

@@ -3,8 +3,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
-
 use common::*;
 use glam::{DMat3, DQuat};
 use leafdyn::undulation::{Hand, Undulation, Vein};

@@ -12,10 +12,8 @@ pub fn text(name: &str) -> String {
 /// The keys, as one, by which all veins of `study/undulation` but the midrib bend up and down.
 pub fn weak_veins() -> String {
     let weak = (0..11).filter(|vein| *vein != 5);
-    let keys: Vec<_> = weak
-        .map(|vein| format!("stiffness.bending_2[{vein}]"))
-        .collect();
-    keys.join("+")
+    let keys = weak.map(|vein| format!("stiffness.bending_2[{vein}]"));
+    keys.collect::<Vec<_>>().join("+")
 }
 
 /// The entries of `study/undulation` without weight, in which the other veins bend so easily.
@@ -43,10 +41,8 @@ pub fn request(base: Base, vary: &str, tolerance: f64, most_points: usize) -> Tr
 
 /// Follows the scenario of a text with entries replaced.
 pub fn follow(text: &str, overrides: &str, vary: &str, switch: bool) -> Trace {
-    let request = TraceRequest {
-        switch,
-        ..request(base(text, overrides), vary, 1e-8, 2000)
-    };
+    let mut request = request(base(text, overrides), vary, 1e-8, 2000);
+    request.switch = switch;
     trace(&request, &mut |_, _, _| {}).unwrap()
 }
 
@@ -114,9 +110,8 @@ pub fn critical_of_rigid(
     unstable: impl Fn(f64, usize, f64) -> bool,
 ) -> f64 {
     let values = [1e4, 2e4, 4e4].map(|stiffness| {
-        critical(low, high, coarsest, |load, segments| {
-            unstable(load, segments, stiffness)
-        })
+        let unstable = |load, segments| unstable(load, segments, stiffness);
+        critical(low, high, coarsest, unstable)
     });
     extrapolate(&values, 0.5)
 }

@@ -23,6 +23,13 @@ pub const LEAF: &str = r#"
     load = { gravity = [0.0, 0.0, -1.0] }
 "#;
 
+/// What is free, of a vein or of all.
+pub const THREE: [&str; 3] = [
+    "stiffness.bending_2",
+    "stiffness.bending_3",
+    "stiffness.axial",
+];
+
 /// A fit of free numbers to these tables.
 pub fn request(base: Base, data: &[&str], free: &[&str]) -> FitRequest {
     let rods = base.scenario().rods.len();
@@ -71,8 +78,8 @@ pub fn within_bars(found: &Fit, wanted: &[f64], halves: f64) {
 
 /// Tips of a leaf with these numbers pulled by these forces, as a table with noise of a deviation.
 pub fn pulls(text: &str, truth: &str, forces: &[[f64; 3]], sd: f64, noise: &mut Draw) -> String {
-    let header = "load.tip_force[0],load.tip_force[1],load.tip_force[2],tip_x,tip_y,tip_z,sd_tip_x,sd_tip_y,sd_tip_z\n";
-    let mut table = String::from(header);
+    let forces_are = "load.tip_force[0],load.tip_force[1],load.tip_force[2]";
+    let mut table = format!("{forces_are},tip_x,tip_y,tip_z,sd_tip_x,sd_tip_y,sd_tip_z\n");
     for force in forces {
         let pulled = base(text, &format!("{truth}; load.tip_force={force:?}"));
         let tip = settle(pulled.scenario(), 1e-9).tips[0].to_array();

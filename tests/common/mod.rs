@@ -14,17 +14,19 @@ mod shot;
 pub mod valid;
 pub mod vibration;
 
-use std::f64::consts::PI;
+pub use std::f64::consts::PI;
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
 pub use branch::{NEUTRAL, critical, critical_of_rigid};
 pub use glam::DVec3;
-use leafdyn::internals::leaf::{Leaf, Scale};
-pub use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape};
-use leafdyn::relax::{Method, SemiImplicit, relax};
+pub use leafdyn::internals::leaf::Leaf;
+use leafdyn::internals::leaf::Scale;
+pub use leafdyn::relax::{Equilibrium, Limit, Method, NodeState, Options, Outcome, RodShape};
+use leafdyn::relax::{SemiImplicit, relax};
 use leafdyn::scenario::{Dynamics, Radii, Rod, Units};
-pub use leafdyn::scenario::{Profile, Scenario};
-use leafdyn::shape::Difference;
+pub use leafdyn::scenario::{Profile, Scenario, Schedule};
+pub use leafdyn::shape::Difference;
 use leafdyn::study::Base;
 pub use numerics::*;
 pub use pairs::pairs;
@@ -61,6 +63,13 @@ pub fn entries(text: &str) -> Vec<String> {
 /// What the environment asks for by a name, such as how many leaves are tried.
 pub fn asked(name: &str, otherwise: usize) -> usize {
     std::env::var(name).map_or(otherwise, |text| text.parse().expect(name))
+}
+
+/// The only one of them.
+#[track_caller]
+pub fn only<T: Debug>(all: &[T]) -> &T {
+    assert_eq!(all.len(), 1, "{all:?}");
+    &all[0]
 }
 
 /// Largest of some numbers, none of which is negative; NaN if one of them is.

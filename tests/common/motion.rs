@@ -63,12 +63,8 @@ pub fn at_beginning(scenario: &Scenario) -> Scenario {
     resting.tip_force = dynamics.tip_force.at(0.0);
     resting.tip_moment = dynamics.tip_moment.at(0.0);
     let factor = dynamics.rest.at(0.0);
-    for curvature in resting
-        .rods
-        .iter_mut()
-        .flat_map(|rod| &mut rod.rest_curvature)
-    {
-        *curvature = curvature.scaled(factor);
+    for rod in &mut resting.rods {
+        rod.rest_curvature = rod.rest_curvature.each_ref().map(|it| it.scaled(factor));
     }
     resting
 }
@@ -126,11 +122,9 @@ pub fn rest(scenario: &Scenario, segments: usize) -> State {
 pub fn state_of(scenario: &Scenario, found: &Equilibrium) -> State {
     let length = Leaf::new(scenario).scale.length;
     let nodes = || nodes(&found.shape.rods);
-    State::new(
-        found.shape.stations.len() - 1,
-        nodes().map(|node| node.position / length).collect(),
-        nodes().map(|node| node.rotation).collect(),
-    )
+    let x = nodes().map(|node| node.position / length).collect();
+    let q = nodes().map(|node| node.rotation).collect();
+    State::new(found.shape.stations.len() - 1, x, q)
 }
 
 /// How far, over the amplitude `size`, leapfrog with steps of `h` is from the cosine at which

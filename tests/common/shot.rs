@@ -22,14 +22,10 @@ pub fn shoot_over(
     scenario: &Scenario,
     leaf: &Equilibrium,
 ) -> Result<Solution, Failure> {
-    let start = Start::Leaf {
-        stations: &leaf.shape.stations,
-        rods: &leaf.shape.rods,
-    };
-    let options = bvp::Options {
-        intervals,
-        ..bvp::Options::new(start, &leaf.shape.stations, LocalError(SHARP))
-    };
+    let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
+    let start = Start::Leaf { stations, rods };
+    let mut options = bvp::Options::new(start, stations, LocalError(SHARP));
+    options.intervals = intervals;
     bvp::solve(scenario, &options, &mut |_| {})
 }
 

@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 use leafdyn::internals::leaf::{DiscreteLeaf, State};
-use leafdyn::internals::motion::{Inertia, Physics};
+use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation::outer;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -47,14 +47,9 @@ impl Linear {
         for _ in 0..rods {
             freedoms.push(None);
             for i in 1..=n {
-                let turn = next();
-                let shift = match tip {
-                    Some(tip) if i == n && joined => tip,
-                    _ => next(),
-                };
-                if i == n {
-                    tip = Some(shift);
-                }
+                let (turn, met) = (next(), tip.filter(|_| i == n && joined));
+                let shift = met.unwrap_or_else(&mut next);
+                tip = (i == n).then_some(shift).or(tip);
                 freedoms.push(Some([turn, shift]));
             }
         }
@@ -126,14 +121,12 @@ impl Linear {
                 let node = state.base(j) + i;
                 let [turn, shift] = self.freedoms[node].unwrap();
                 let inertia = physics.inertia(leaf, j, i);
-                let Inertia {
-                    mass, transverse, ..
-                } = inertia;
                 let d1 = state.q[node] * DVec3::X;
-                let own = (transverse / inertia.polar()).sqrt() - 1.0;
-                let root = (DMat3::IDENTITY + own * outer(d1, d1)) * transverse.sqrt().recip();
+                let own = (inertia.transverse / inertia.polar()).sqrt() - 1.0;
+                let root = inertia.transverse.sqrt().recip();
+                let root = root * (DMat3::IDENTITY + own * outer(d1, d1));
                 add(&mut self.per_root_mass, (turn, turn), &root);
-                masses[shift] += mass;
+                masses[shift] += inertia.mass;
             }
         }
         for (shift, mass) in masses.into_iter().enumerate() {
@@ -179,10 +172,8 @@ impl Linear {
     pub fn numbered(&self, shape: &[[f64; 6]]) -> DVector<f64> {
         let mut numbered = DVector::zeros(self.strains.nrows());
         for (freedoms, increment) in self.freedoms.iter().zip(shape) {
-            for (part, at) in freedoms.iter().flatten().enumerate() {
-                numbered
-                    .rows_mut(*at, 3)
-                    .copy_from_slice(&increment[3 * part..][..3]);
+            for (at, part) in freedoms.iter().flatten().zip(increment.chunks(3)) {
+                numbered.rows_mut(*at, 3).copy_from_slice(part);
             }
         }
         numbered
