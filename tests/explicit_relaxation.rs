@@ -39,10 +39,7 @@ fn on_every_figure_of_the_paper() {
         // The paper's soft leaves bend too much for fewer.
         agree_on(&read(&file, "leaf.rods=5"), 32);
     }
-}
-
-#[test]
-fn on_fig_4_with_as_many_veins_as_the_paper() {
+    // With as many veins as the paper's.
     agree_on(&scenario("paper/fig04", ""), 16);
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::fit::{PULLS, VEIN, fitted, pulls, request};
+use common::fit::{PULLS, THREE, VEIN, fitted, pulls, request};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::FitOutcome;
@@ -82,11 +82,7 @@ fn check([inside, all, asked, lost]: [usize; 4], numbers: usize) {
 
 #[test]
 fn three_numbers() {
-    let names = [
-        ("stiffness.bending_2", 1.0),
-        ("stiffness.bending_3", 1.0),
-        ("stiffness.axial", 20.0),
-    ];
+    let names: Vec<_> = THREE.into_iter().zip([1.0, 1.0, 20.0]).collect();
     check(covered(&names, &PULLS, OF_THREE), 3);
 }
 

@@ -57,24 +57,21 @@ fn in_space(name: &str, mut scenario: Scenario, far: f64) {
     }
 }
 
-#[test]
-fn a_rod_in_space() {
+/// A rod that is pulled.
+fn pulled() -> Scenario {
     let mut rod = twisted_rod();
     rod.dynamics.tip_force = ramp(2.0, [-5.0, 10.0, 16.0]);
-    in_space("rod", rod, 0.4);
+    rod
 }
 
+/// A rod, a leaf, and a rod with a moment on the tip and a rest shape that curls up.
 #[test]
-fn a_leaf_in_space() {
+fn of_a_rod_and_a_leaf_in_space_and_a_rod_that_changes_its_rest_shape() {
+    in_space("rod", pulled(), 0.4);
     let mut leaf = three_veins();
     leaf.dynamics.tip_force = ramp(2.0, [-8.0, 16.0, 26.0]);
     leaf.dynamics.gravity = ramp(2.0, [0.7, -0.7, -1.3]);
     in_space("leaf", leaf, 0.6);
-}
-
-/// A moment on the tip, and a rest shape that curls up.
-#[test]
-fn a_rod_that_changes_its_rest_shape() {
     let mut rod = twisted_rod();
     rod.dynamics.rest = curling(5.0);
     rod.dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);
@@ -103,8 +100,7 @@ fn in_intervals(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> (Vec<f64>
 /// internal friction looks back over steps of different lengths.
 #[test]
 fn in_intervals_of_any_lengths() {
-    let mut rod = twisted_rod();
-    rod.dynamics.tip_force = ramp(2.0, [-5.0, 10.0, 16.0]);
+    let mut rod = pulled();
     rod.dynamics.external_damping = 1.0;
     rod.dynamics.internal_damping = 0.02;
     let leaf = Leaf::new(&rod);

@@ -30,23 +30,20 @@ fn on_every_figure_of_the_paper() {
             both_agree(&read(&file, &format!("leaf.rods={rods}")), CLOSE);
         }
     }
-}
-
-#[test]
-fn on_every_classic_problem() {
-    let classic = files("classic");
-    assert!(classic.len() >= 18);
-    for file in &classic {
-        both_agree(&read(file, ""), CLOSE);
+    // With as many veins as the paper.
+    for entry in ["leaf.rods=21", "leaf.rods=35"] {
+        both_agree(&scenario("paper/fig04", entry), 1e-8);
     }
 }
 
-/// The same sections and loads in fans of other numbers of veins, where what
+/// And on the same sections and loads in fans of other numbers of veins, where what
 /// the file lists vein by vein does not forbid it.
 #[test]
-fn on_fans_made_of_the_classic_problems() {
-    let mut accepted = 0;
-    for file in &files("classic") {
+fn on_every_classic_problem() {
+    let (classic, mut accepted) = (files("classic"), 0);
+    assert!(classic.len() >= 18);
+    for file in &classic {
+        both_agree(&read(file, ""), CLOSE);
         for rods in [2, 3, 5] {
             let fan = entries(&format!("leaf.rods={rods}; leaf.fan='symmetric'"));
             if let Ok(fan) = Scenario::read_with(file, &fan) {
@@ -56,13 +53,6 @@ fn on_fans_made_of_the_classic_problems() {
         }
     }
     assert!(accepted >= 30, "{accepted}");
-}
-
-#[test]
-fn on_fig_4_with_as_many_veins_as_the_paper() {
-    for entry in ["leaf.rods=21", "leaf.rods=35"] {
-        both_agree(&scenario("paper/fig04", entry), 1e-8);
-    }
 }
 
 /// The solution does not remember where it came from: from leaves relaxed to

@@ -36,23 +36,16 @@ fn unequal(mut leaf: Scenario) -> Scenario {
     leaf
 }
 
+/// Profiles, unequal lengths, free tips, and a dead moment on the tip.
 #[test]
-fn profiles() {
+fn relaxation_and_both_ways_of_shooting_agree() {
     all_agree("tapered", &tapered());
     let mut single = tapered();
     single.rods.truncate(1);
     single.coupling.clear();
     all_agree("one vein", &single);
-}
-
-#[test]
-fn unequal_lengths() {
     all_agree("Fig. 4", &unequal(fig04(5)));
-    all_agree("tapered", &unequal(tapered()));
-}
-
-#[test]
-fn free_tips() {
+    all_agree("tapered, unequal", &unequal(tapered()));
     for mut leaf in [fig04(3), unequal(fig04(3)), unequal(tapered())] {
         leaf.joined = false;
         leaf.tip_force = [0.3, -0.2, 0.5];
@@ -60,10 +53,6 @@ fn free_tips() {
         leaf.coupling = vec![[0.0; 3]; 2];
         all_agree("uncoupled", &leaf);
     }
-}
-
-#[test]
-fn a_dead_moment_on_the_tip() {
     for moment in [[0.0, 0.0, 1.0], [0.4, 0.5, -0.6], [-1.0, 0.8, 0.3]] {
         let mut rod = paper_leaf(1, [0.8, 1.0, 1.5], [100.0, 80.0, 60.0], 0.5);
         rod.tip_force = [0.2, 0.1, -0.3];
