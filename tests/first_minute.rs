@@ -94,18 +94,16 @@ fn shells_and_manuals_know_every_verb() {
 
 /// What the schema refuses of a scenario: unknown keys and wrong types.
 fn refused(schema: &Value, value: &Value, path: &str) -> Vec<String> {
+    let unless = |fits: bool, what: String| Vec::from_iter((!fits).then_some(what));
     if let Some(alternatives) = schema["anyOf"].as_array() {
-        let fits = |one: &&Value| refused(one, value, path).is_empty();
-        return match alternatives.iter().find(fits) {
-            Some(_) => Vec::new(),
-            None => vec![format!("{path}: fits nothing")],
-        };
+        let fits = |one: &Value| refused(one, value, path).is_empty();
+        return unless(
+            alternatives.iter().any(fits),
+            format!("{path}: fits nothing"),
+        );
     }
     if let Some(words) = schema["enum"].as_array() {
-        return match words.contains(value) {
-            true => Vec::new(),
-            false => vec![format!("{path}: no such word")],
-        };
+        return unless(words.contains(value), format!("{path}: no such word"));
     }
     let fits = match schema["type"].as_str() {
         Some("object") => value.is_object(),
@@ -116,10 +114,7 @@ fn refused(schema: &Value, value: &Value, path: &str) -> Vec<String> {
         Some("number") => value.is_number(),
         _ => false,
     };
-    let mut wrong = match fits {
-        true => Vec::new(),
-        false => vec![format!("{path}: {value} is no {}", schema["type"])],
-    };
+    let mut wrong = unless(fits, format!("{path}: {value} is no {}", schema["type"]));
     for (key, value) in value.as_object().into_iter().flatten() {
         match schema["properties"].get(key) {
             Some(schema) => wrong.extend(refused(schema, value, &format!("{path}.{key}"))),
@@ -150,24 +145,23 @@ fn json(value: toml::Value) -> Value {
     }
 }
 
-fn scenarios(folder: &Path, found: &mut Vec<String>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            scenarios(&path, found);
-        } else if path.extension().is_some_and(|it| it == "toml") {
-            found.push(fs::read_to_string(&path).unwrap());
-        }
-    }
+fn scenarios(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let all = entries.map(|entry| entry.unwrap().path());
+    let texts = all.flat_map(|path| match path.extension() {
+        _ if path.is_dir() => scenarios(&path),
+        Some(kind) if kind == "toml" => vec![fs::read_to_string(&path).unwrap()],
+        _ => Vec::new(),
+    });
+    texts.collect()
 }
 
 #[test]
 fn the_schema_fits_every_scenario_and_no_slip() {
     let schema = schema();
-    let mut texts = Vec::new();
     let top = Path::new(env!("CARGO_MANIFEST_DIR"));
-    scenarios(&top.join("scenarios"), &mut texts);
-    scenarios(&top.join("src/cli/examples"), &mut texts);
+    let texts = ["scenarios", "src/cli/examples"].map(|it| scenarios(&top.join(it)));
+    let texts = texts.concat();
     assert!(texts.len() > 30);
     let judge = |text: &str| {
         let scenario = json(toml::Value::Table(text.parse().unwrap()));

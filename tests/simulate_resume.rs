@@ -131,13 +131,8 @@ fn without_wall_seconds(summary: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_stopped_explicit_run_goes_on() {
-    ends_the_same(EXPLICIT);
-}
-
-#[test]
-fn a_stopped_semi_implicit_run_goes_on() {
-    ends_the_same(SEMI_IMPLICIT);
+fn a_stopped_run_goes_on_by_either_method() {
+    [EXPLICIT, SEMI_IMPLICIT].map(ends_the_same);
 }
 
 /// Wherever a run is kept: before its first step, and after its last.
