@@ -115,35 +115,32 @@ fn between(from: f64, to: f64, fraction: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn schedule<T: Copy>(at: &[f64], value: &[T]) -> Schedule<T> {
+        let (at, value) = (at.to_vec(), value.to_vec());
+        Schedule { at, value }
+    }
+
+    /// A force that changes from time 0 to 2.
+    fn sloping() -> Schedule<[f64; 3]> {
+        schedule(&[0.0, 2.0], &[[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]])
+    }
+
     #[test]
     fn linear_between_times_exact_at_them_and_constant_outside() {
-        let factor = Schedule {
-            at: vec![-1.0, 0.5, 0.7],
-            value: vec![1.0, 4.0, 0.1],
-        };
+        let factor = schedule(&[-1.0, 0.5, 0.7], &[1.0, 4.0, 0.1]);
         let values = [-1e9, -1.0, 0.0, 0.5, 0.7, 1e9].map(|time| factor.at(time));
         assert_eq!(values, [1.0, 1.0, 3.0, 4.0, 0.1, 0.1]);
-        let force = Schedule {
-            at: vec![0.0, 2.0],
-            value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
-        };
-        assert_eq!(force.at(0.5), [1.0, 1.0, -0.5]);
+        assert_eq!(sloping().at(0.5), [1.0, 1.0, -0.5]);
         assert!(!factor.is_constant());
     }
 
     #[test]
     fn means_see_every_pulse() {
-        let pulse = Schedule {
-            at: vec![0.5, 0.5 + 1e-6, 0.5 + 4e-6],
-            value: vec![0.0, 3e6, 0.0],
-        };
+        let pulse = schedule(&[0.5, 0.5 + 1e-6, 0.5 + 4e-6], &[0.0, 3e6, 0.0]);
         assert!((pulse.mean(0.0, 2.0) - 3.0).abs() < 1e-9);
         assert!((pulse.mean(0.0, 0.5 + 1e-6) - 3.0).abs() < 1e-5);
         assert_eq!(pulse.mean(0.6, 0.9), 0.0);
-        let slope = Schedule {
-            at: vec![0.0, 2.0],
-            value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
-        };
+        let slope = sloping();
         assert_eq!(slope.mean(0.25, 0.75), slope.at(0.5));
         assert_eq!(slope.mean(0.5, 0.5), slope.at(0.5));
         assert_eq!(slope.mean(1.0, 3.0), [3.5, 1.0, -1.75]);
@@ -151,11 +148,7 @@ mod tests {
 
     #[test]
     fn equal_values_are_constant_however_many() {
-        let still = Schedule {
-            at: vec![0.0, 1.0],
-            value: vec![0.3, 0.3],
-        };
-        for still in [still, Schedule::constant(0.3)] {
+        for still in [schedule(&[0.0, 1.0], &[0.3, 0.3]), Schedule::constant(0.3)] {
             assert!(still.is_constant());
             let times = [f64::NEG_INFINITY, -1.0, 0.0, 0.7, 1e300, f64::INFINITY];
             assert_eq!(times.map(|time| still.at(time)), [0.3; 6]);

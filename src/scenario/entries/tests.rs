@@ -31,13 +31,13 @@ fn parts_and_scales_are_whole_values() {
         coupling.y[0]=3 => coupling.y=[3, 1]
         coupling.z[1] = 0.25; coupling.z[0]=1 => coupling.z=[1, 0.25]
         load.gravity[2]=-7 => load.gravity=[0, 0.5, -7]
-        stiffness.bending_2.value[1]=2.0 => stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [1, 2.0, 0.25] }
-        stiffness.bending_2.at[1]=0.25 => stiffness.bending_2={ at = [0.0, 0.25, 1.0], value = [1, 0.5, 0.25] }
-        stiffness.bending_3.value[2][0]=9 => stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [9, 6]] }
-        stiffness.bending_3.value[2]=[7, 8] => stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [7, 8]] }
-        dynamics.gravity.value[1][2]=-3 => dynamics.gravity={ at = [0, 1], value = [[0, 0, -1], [0, 0, -3]] }
-        scale:stiffness.bending_2=0.5 => stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [0.5, 0.25, 0.125] }
-        scale:stiffness.bending_3.value[0]=2 => stiffness.bending_3={ at = [0, 1], value = [[2, 4], [3, 4], [5, 6]] }
+        stiffness.bending_2.value[1]=2.0 => stiffness.bending_2={at=[0,0.5,1],value=[1,2.0,0.25]}
+        stiffness.bending_2.at[1]=0.25 => stiffness.bending_2={at=[0,0.25,1],value=[1,0.5,0.25]}
+        stiffness.bending_3.value[2][0]=9 => stiffness.bending_3={at=[0,1],value=[[1,2],[3,4],[9,6]]}
+        stiffness.bending_3.value[2]=[7, 8] => stiffness.bending_3={at=[0,1],value=[[1,2],[3,4],[7,8]]}
+        dynamics.gravity.value[1][2]=-3 => dynamics.gravity={at=[0,1],value=[[0,0,-1],[0,0,-3]]}
+        scale:stiffness.bending_2=0.5 => stiffness.bending_2={at=[0,0.5,1],value=[0.5,0.25,0.125]}
+        scale:stiffness.bending_3.value[0]=2 => stiffness.bending_3={at=[0,1],value=[[2,4],[3,4],[5,6]]}
         scale:stiffness.shear_2=2 => stiffness.shear_2=[inf, 200, 2e3]
         scale:stiffness.axial=2 => stiffness.axial=inf
         scale:leaf.length=1.5 => leaf.length=1.5
