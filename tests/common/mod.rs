@@ -28,6 +28,7 @@ use leafdyn::scenario::{Dynamics, Radii, Rod, Units};
 pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::Base;
+pub use motion::TIMOSHENKO;
 pub use numerics::*;
 pub use pairs::pairs;
 pub use shot::*;
@@ -444,12 +445,3 @@ pub fn apart(scenario: &Scenario, a: &[RodShape], b: &[RodShape]) -> Difference 
         moment: difference.moment / scale.moment(),
     }
 }
-
-/// Slenderness r^2 = I/(A L^2) and s^2 = EI/(k G A L^2); frequencies of the clamped Timoshenko
-/// beam, times sqrt(rho A L^4/EI): roots of its frequency equation (T. C. Huang, J. Appl.
-/// Mech. 28, 1961) to 13 digits.
-pub const TIMOSHENKO: &str = "
-    1e-4    2.6e-4   3.513078252179  21.90711479483  60.85906859261  117.9269574473
-    0.0016  0.00416  3.470067483695  20.23985098215  51.63550442718  90.90518380084
-    0.01    0.026    3.259779790893  15.02362640182  33.03084600553  50.83238503823
-";

@@ -100,6 +100,15 @@ pub const CHAIN: [f64; 2] = [1.445796490736696, 7.617815585915522];
 /// cos b cosh b = -1 (S. Timoshenko, Vibration problems in engineering).
 pub const SLENDER: [f64; 3] = [1.875104068711961, 4.694091132974175, 7.854757438237613];
 
+/// Slenderness r^2 = I/(A L^2) and s^2 = EI/(k G A L^2); frequencies of the clamped Timoshenko
+/// beam, times sqrt(rho A L^4/EI): roots of its frequency equation (T. C. Huang, J. Appl.
+/// Mech. 28, 1961) to 13 digits.
+pub const TIMOSHENKO: &str = "
+    1e-4    2.6e-4   3.513078252179  21.90711479483  60.85906859261  117.9269574473
+    0.0016  0.00416  3.470067483695  20.23985098215  51.63550442718  90.90518380084
+    0.01    0.026    3.259779790893  15.02362640182  33.03084600553  50.83238503823
+";
+
 /// A layer at the clamp of a chain bends: points that are most of them there.
 pub fn layered(count: u32) -> Vec<f64> {
     let growth = 4.2_f64;
