@@ -3,7 +3,7 @@
 use super::Explicit;
 use crate::leaf::State;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::kernel::Forces;
+use crate::motion::kernel::{Forces, Layout};
 use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use crate::motion::nodes::vector;
 use glam::DVec3;
@@ -131,7 +131,11 @@ impl Method for Explicit {
     }
 
     fn save(&self) -> Vec<f64> {
+        // How the arrays are laid out, by which others are recognised.
+        let Layout { stride, pack, .. } = self.layout;
         let mut numbers = vec![
+            stride as f64,
+            pack as f64,
             self.stepped,
             self.time,
             self.steps as f64,
@@ -153,10 +157,11 @@ impl Method for Explicit {
     }
 
     fn restore(&mut self, numbers: &[f64]) -> bool {
-        if numbers.len() != self.save().len() {
+        let own = self.save();
+        if numbers.len() != own.len() || numbers[..2] != own[..2] {
             return false;
         }
-        let mut numbers = numbers.iter().copied();
+        let mut numbers = numbers[2..].iter().copied();
         let mut next = || numbers.next().unwrap_or_default();
         self.stepped = next();
         self.time = next();
