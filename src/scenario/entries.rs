@@ -6,11 +6,12 @@ use std::sync::{Arc, LazyLock};
 
 use toml::{Table, Value};
 
-use super::error::{Place, ScenarioError, shorten};
+use super::error::{Place, ScenarioError};
+use super::excerpt::shorten;
 use super::form::from_json;
 use super::key::{Form, Key, LeftOut};
+use super::node::number;
 use super::part::Part;
-use super::value::number;
 
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.

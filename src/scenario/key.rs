@@ -3,7 +3,7 @@
 //! A new key needs a row here, a field of the checked scenario, and a line in `check`
 //! that reads it.
 
-use super::error::shorten;
+use super::excerpt::shorten;
 use Form::*;
 use LeftOut::*;
 use Range::*;

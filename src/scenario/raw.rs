@@ -8,9 +8,10 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
 use super::entries::{Entries, Override, left_out};
-use super::error::{Place, ScenarioError, line_of, shorten, snippet};
+use super::error::{Place, ScenarioError};
+use super::excerpt::{line_of, shorten, snippet};
 use super::key::{Form, Key, LeftOut, nearest};
-use super::value::Node;
+use super::node::Node;
 
 /// All entries of a scenario, with those of `--set` replacing those of the file.
 pub(super) struct Raw<'a> {

@@ -5,7 +5,8 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::entries::{Entries, resolve};
-use super::error::{ScenarioError, line_of};
+use super::error::ScenarioError;
+use super::excerpt::line_of;
 use super::form::from_json;
 use super::raw::Raw;
 use super::{Scenario, check};

@@ -30,6 +30,7 @@
 mod cells;
 mod follow;
 mod grids;
+mod halt;
 mod manifold;
 mod neighbours;
 mod plane;
@@ -41,8 +42,9 @@ mod table;
 mod walk;
 
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
-pub use follow::{Boundary, Halt, follow};
+pub use follow::{Boundary, follow};
 pub use grids::coarsened;
+pub use halt::Halt;
 #[cfg(test)]
 pub use manifold::Direction;
 pub use manifold::Solution;

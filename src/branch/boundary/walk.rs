@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::follow::Halt;
 use super::grids::on_finer;
+use super::halt::Halt;
 use super::manifold::Manifold;
 use super::plane::Plane;
 use super::refine::{Accuracy, Step, refine};

@@ -4,9 +4,9 @@
 use glam::DVec3;
 
 use super::data::Origin;
-use super::derivatives::Responses;
 use super::experiments::{Case, Observed};
 use super::quantity::{Kind, Quantity};
+use super::responses::Responses;
 use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;

@@ -20,6 +20,7 @@ mod least_squares;
 mod model;
 mod neighbourhood;
 mod quantity;
+mod responses;
 mod result;
 mod statistics;
 mod vein;
