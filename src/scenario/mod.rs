@@ -26,8 +26,8 @@ mod value;
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
 pub(crate) use entries::{resolve, with_overrides};
-#[cfg(feature = "cli")]
 pub use error::{Place, ScenarioError};
+#[cfg(feature = "cli")]
 pub(crate) use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
