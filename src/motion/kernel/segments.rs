@@ -137,6 +137,12 @@ fn directors<S: Simd>((s, sw): Quaternions<S>, twice: Lanes<S>) -> [Vectors<S>; 
     ]
 }
 
+/// A stiffness along the directors: that along d2, and the excess along d1 and d3 over it.
+#[inline(always)]
+fn stiffness<S: Simd>(along_2: Lanes<S>, excess_1: Lanes<S>, excess_3: Lanes<S>) -> Vectors<S> {
+    Vectors::new(along_2 + excess_1, along_2, along_2 + excess_3)
+}
+
 #[inline(always)]
 fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
@@ -214,11 +220,7 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         }
         if let Some((_, (one, two))) = &mut past {
             let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
-            let friction = Vectors::new(
-                rate.x * (bend + excess_1),
-                rate.y * bend,
-                rate.z * (bend + excess_3),
-            );
+            let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
             extra = friction.times(retardation, extra);
         }
@@ -253,11 +255,7 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
             );
             if let Some(((one, two), _)) = &mut past {
                 let rate = rate((one, two), (v, at), rates, law.remember);
-                let friction = Vectors::new(
-                    rate.x * (shear + excess_1),
-                    rate.y * shear,
-                    rate.z * (shear + excess_3),
-                );
+                let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
                 extra = friction.times(retardation, extra);
             }
