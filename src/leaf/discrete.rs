@@ -56,21 +56,6 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The same rods, all of them, as those of `leaf`.
-    pub fn with_leaf(&self, leaf: &Leaf) -> Self {
-        DiscreteLeaf {
-            leaf: leaf.clone(),
-            ..self.clone()
-        }
-    }
-
-    /// The same without the restriction to its plane.
-    pub fn in_space(&self) -> Self {
-        let mut spatial = self.clone();
-        spatial.leaf.planar = false;
-        spatial
-    }
-
     /// The smallest compliance of any segment, in units of L^2/A.
     pub fn stiffest(&self) -> f64 {
         self.sections
