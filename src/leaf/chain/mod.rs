@@ -12,6 +12,7 @@ use self::kernels::{Backward, Factorize, Forward};
 use super::state::Increment;
 use crate::lanes::{Four, GROUP, Lanes, run};
 use crate::rod::{self, UNKNOWNS};
+use glam::DVec3;
 use pulp::{Arch, Simd};
 
 /// Increments of a node, or the forces dual to them, of all rods of a group.
@@ -213,14 +214,14 @@ impl TipFactor {
         Some(TipFactor(a))
     }
 
-    pub fn solve(&self, mut b: [f64; 3]) -> [f64; 3] {
+    pub fn solve(&self, mut b: DVec3) -> DVec3 {
         let u = &self.0;
-        b[1] -= u[0][1] * b[0];
-        b[2] -= u[0][2] * b[0] + u[1][2] * b[1];
-        let z = b[2] * u[2][2];
-        let y = b[1] * u[1][1] - u[1][2] * z;
-        let x = b[0] * u[0][0] - u[0][1] * y - u[0][2] * z;
-        [x, y, z]
+        b.y -= u[0][1] * b.x;
+        b.z -= u[0][2] * b.x + u[1][2] * b.y;
+        let z = b.z * u[2][2];
+        let y = b.y * u[1][1] - u[1][2] * z;
+        let x = b.x * u[0][0] - u[0][1] * y - u[0][2] * z;
+        DVec3::new(x, y, z)
     }
 }
 

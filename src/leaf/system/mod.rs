@@ -310,7 +310,7 @@ impl System {
     pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
-            0.5 * (mass[0] * dot(&v[..3], &v[..3]) + mass[1] * dot(&v[3..], &v[3..]))
+            0.5 * (mass[0] * turn(v).length_squared() + mass[1] * shift(v).length_squared())
         };
         let rods = velocity.iter().enumerate();
         rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
@@ -381,8 +381,4 @@ impl Group {
             partial: 0.0,
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
