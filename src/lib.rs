@@ -163,9 +163,7 @@ pub mod internals {
         };
     }
     pub mod rod {
-        pub use crate::rod::{
-            Element, Ends, Nodes, PlanarElement, Section, Sections, Segment, SpatialElement,
-        };
+        pub use crate::rod::{Ends, Section, Segment};
     }
     pub mod rotation {
         pub use crate::rotation::{exp, log, outer};

@@ -75,9 +75,6 @@ pub struct Definite {
     /// The observed convergence of Newton's method so far.
     pub contraction: Contraction,
     pub direct: Option<SparsePattern>,
-    /// For a planar leaf: the system of the spatial leaf, whose matrix must be positive
-    /// definite too, as otherwise the spatial leaf would move differently.
-    pub space: Option<System>,
 }
 
 impl Definite {
@@ -104,7 +101,6 @@ impl Definite {
             match solved {
                 Solved::Yes(_) => return true,
                 Solved::Indefinite(_) => return false,
-                Solved::TooSlow(_) if !system.spatial() => return false,
                 Solved::TooSlow(_) => {
                     work.factorizations += 1;
                     self.direct = SparsePattern::new(system).ok();
@@ -119,24 +115,6 @@ impl Definite {
             factor.solve(system, inertia);
         }
         positive
-    }
-
-    /// Whether K + `shift` M of the leaf in space, if it is checked, is positive definite rod
-    /// by rod: then the step in the plane is that of the spatial leaf.
-    pub fn convex_in_space(
-        &mut self,
-        leaf: Option<&DiscreteLeaf>,
-        state: &State,
-        shift: f64,
-        work: &mut Work,
-    ) -> bool {
-        let (Some(leaf), Some(system)) = (leaf, &mut self.space) else {
-            return true;
-        };
-        leaf.assemble(state, system);
-        work.force_evaluations += 1;
-        work.factorizations += 1;
-        system.factorize(shift)
     }
 }
 
@@ -213,10 +191,6 @@ impl Newton<'_> {
         equations: Equations,
     ) -> Result<f64, Stop> {
         let (longest, refused) = equations.limits();
-        let space = match &equations {
-            Equations::Definite { solver, .. } if solver.space.is_some() => Some(leaf.in_space()),
-            _ => None,
-        };
         let any_sign = longest.is_finite();
         let mut linear = Linear {
             equations,
@@ -233,7 +207,7 @@ impl Newton<'_> {
             if turn > RESOLVED_TURN {
                 return Err(Stop::Unresolved);
             }
-            let solved = linear.solve(space.as_ref(), (state, previous), system, self.work);
+            let solved = linear.solve((state, previous), system, self.work);
             let tolerance = solved.ok_or(Stop::Stuck)?;
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
@@ -290,7 +264,6 @@ impl Linear<'_> {
     /// solution, or `None` if there is none.
     fn solve(
         &mut self,
-        space: Option<&DiscreteLeaf>,
         (state, previous): (&State, f64),
         system: &mut System,
         work: &mut Work,
@@ -332,9 +305,7 @@ impl Linear<'_> {
                 let tolerance = cg_tolerance(previous, *loosest);
                 loop {
                     let shift = self.neutral + self.shift;
-                    if solver.convex_in_space(space, state, shift, work)
-                        && solver.solve(system, shift, None, tolerance, work)
-                    {
+                    if solver.solve(system, shift, None, tolerance, work) {
                         return Some(tolerance);
                     }
                     self.shift = (4.0 * self.shift).max(FIRST_SHIFT);

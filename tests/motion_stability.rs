@@ -109,7 +109,7 @@ fn of_a_leaf_that_coupling_rules() {
             let h = part * stable.step;
             method(h).advance(2e4 * h)
         };
-        assert_eq!(steps(0.99), Ok(()));
+        assert!(steps(0.99).is_ok());
         assert!(steps(1.05 * ratio).is_err());
     }
 }
@@ -182,7 +182,8 @@ fn what_begins_gently_or_suddenly_goes_on() {
             let h = method.longest_step();
             for k in 1..=1000 {
                 let found = method.advance(h * k as f64);
-                assert_eq!(found, Ok(()), "{until}, {segments} segments, step {k}");
+                let what = format!("{until}, {segments} segments, step {k}");
+                assert!(found.is_ok(), "{what}: {:?}", found.err());
             }
         }
     }

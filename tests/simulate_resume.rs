@@ -172,7 +172,7 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
                 let mut recording = recording.unwrap();
                 while !simulation.done() && Some(simulation.frames().1) != outputs {
                     let frame = simulation.next_frame().unwrap();
-                    recording.add(&simulation, &frame).unwrap();
+                    recording.add(&mut simulation, &frame).unwrap();
                 }
                 if outputs.is_some() {
                     let time = recording.checkpointer().write().unwrap().unwrap();

@@ -208,7 +208,7 @@ impl Motion {
             let mut again = Simulation::new(&self.scenario, &self.options)?;
             let mut recording = Recording::begin(&folder, &mut again, &selection)?;
             for frame in state.frames.iter().skip(1) {
-                recording.add(&again, frame)?;
+                recording.add(&mut again, frame)?;
             }
             let record = recording.record(&state.simulation, state.stopped)?;
             Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)

@@ -89,9 +89,10 @@ impl<'e, 'a> Integrator<'e, 'a> {
         Ok(())
     }
 
-    /// One step towards `until`, never beyond it.
+    /// One step towards `until`, never beyond it or a kink.
     pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
         let failed = Unbounded { sigma: self.sigma };
+        let until = self.equations.stop(self.sigma, until);
         loop {
             self.steps += 1;
             let left = until - self.sigma;
@@ -166,7 +167,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
 }
 
 /// y + h sum of weights times slopes.
-fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut [f64]) {
+pub fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut [f64]) {
     result.copy_from_slice(y);
     for (weight, slopes) in weights.iter().zip(slopes) {
         if *weight != 0.0 {

@@ -193,10 +193,10 @@ impl<'a> Equations<'a> {
         self.coupling[g] != DVec3::ZERO
     }
 
-    /// Where integration steps must end: at kinks in between, and at `to`.
-    pub fn stops(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let kinks = self.kinks.iter().copied();
-        kinks.filter(move |s| *s > from && *s < to).chain([to])
+    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
+    pub fn stop(&self, from: f64, to: f64) -> f64 {
+        let next = self.kinks.partition_point(|kink| *kink <= from);
+        self.kinks.get(next).map_or(to, |kink| kink.min(to))
     }
 
     /// The state at the base for given forces and moments: conditions (a) and (c).

@@ -115,14 +115,12 @@ pub fn integrate(
             let y = nodes.states[k].clone();
             let mut integrator = Integrator::new(equations, begin, y, tolerance);
             let (mut steps, mut count) = (Vec::new(), 0);
-            for stop in equations.stops(begin, end) {
-                integrator.run(stop, |integrator| {
-                    count += 1;
-                    if linearise {
-                        steps.push(LinearStep::of(equations, integrator));
-                    }
-                })?;
-            }
+            integrator.run(end, |integrator| {
+                count += 1;
+                if linearise {
+                    steps.push(LinearStep::of(equations, integrator));
+                }
+            })?;
             Ok(Integrated {
                 end: integrator.y,
                 steps,
@@ -212,7 +210,7 @@ fn responses_of<const W: usize>(
     for step in steps {
         perturbations.advance(equations, step);
     }
-    (perturbations.rods.start, perturbations.rows.concat())
+    (perturbations.rods.start, perturbations.all)
 }
 
 /// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
@@ -231,28 +229,26 @@ pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Node
         let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
             .map(|j| Perturbations::unit(j..j + 1, j))
             .collect();
-        for stop in equations.stops(begin, 1.0) {
-            while integrator.sigma < stop {
-                let before = integrator.sigma;
-                let failed = integrator.step(stop).is_err();
-                let grown = failed || {
-                    let step = LinearStep::of(equations, &integrator);
-                    rods.iter_mut().any(|rod| {
-                        rod.advance(equations, &step);
-                        own_growth(&rod.rows) > GROWTH
-                    })
-                };
-                if grown {
-                    let enough = before > begin;
-                    let end = if enough { before } else { integrator.sigma };
-                    if end <= begin || end >= 1.0 {
-                        break 'intervals;
-                    }
-                    // At a station the start is known; elsewhere it is interpolated.
-                    let known = near.last_station(end).filter(|s| *s > begin);
-                    sigma.push(known.unwrap_or(end));
-                    continue 'intervals;
+        while integrator.sigma < 1.0 {
+            let before = integrator.sigma;
+            let failed = integrator.step(1.0).is_err();
+            let grown = failed || {
+                let step = LinearStep::of(equations, &integrator);
+                rods.iter_mut().any(|rod| {
+                    rod.advance(equations, &step);
+                    own_growth(rod.rows()) > GROWTH
+                })
+            };
+            if grown {
+                let enough = before > begin;
+                let end = if enough { before } else { integrator.sigma };
+                if end <= begin || end >= 1.0 {
+                    break 'intervals;
                 }
+                // At a station the start is known; elsewhere it is interpolated.
+                let known = near.last_station(end).filter(|s| *s > begin);
+                sigma.push(known.unwrap_or(end));
+                continue 'intervals;
             }
         }
         break;
@@ -271,12 +267,10 @@ fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64
         if k == 0 || known(here) || !known(sigma[k - 1]) {
             return near.at(here);
         }
-        let before = Nodes {
-            sigma: vec![sigma[k - 1], here],
-            states: vec![near.at(sigma[k - 1])],
-        };
-        match integrate(equations, &before, START, false) {
-            Ok(mut integrated) => integrated.remove(0).end,
+        let before = sigma[k - 1];
+        let mut integrator = Integrator::new(equations, before, near.at(before), START);
+        match integrator.run(here, |_| ()) {
+            Ok(()) => integrator.y,
             Err(_) => near.at(here),
         }
     };

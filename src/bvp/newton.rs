@@ -7,7 +7,6 @@
 //! corrections with corrections, and is therefore independent of the scaling of the
 //! equations and of their conditioning.
 
-use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
 use super::intervals::{
     GROWTH, Integrated, Units, choose_intervals, integrate, responses, sensitivities,
@@ -51,12 +50,13 @@ const NUDGE: f64 = 1e-5;
 /// Stations at which it is computed.
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
-/// Why Newton's method did not converge.
-enum NewtonFailure {
-    /// An initial-value problem has no bounded solution at the start.
-    Unbounded(Unbounded),
-    /// Corrections do not decrease; the last one, relative.
-    NoProgress(f64),
+/// Corrections do not decrease; the last one, relative.
+fn no_progress(correction: f64) -> Reason {
+    Reason::NoConvergence {
+        correction,
+        growth: 0.0,
+        fixed: false,
+    }
 }
 
 /// The state of a run; its linearisation is kept between calls.
@@ -128,10 +128,11 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
 
     /// Solves to the accuracy of an integration with `tolerance`.
     pub fn solve(&mut self, tolerance: f64) -> Result<(), Reason> {
-        self.iterate(tolerance).map_err(|stuck| self.reason(stuck))
+        self.iterate(tolerance)
+            .map_err(|reason| self.explained(reason))
     }
 
-    fn iterate(&mut self, tolerance: f64) -> Result<(), NewtonFailure> {
+    fn iterate(&mut self, tolerance: f64) -> Result<(), Reason> {
         self.now.wanted = tolerance;
         let mut factor: f64 = 1.0;
         let mut fresh = self.condensed.is_none();
@@ -183,7 +184,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 }
                 return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
                     true => Ok(()),
-                    false => Err(NewtonFailure::NoProgress(size)),
+                    false => Err(no_progress(size)),
                 };
             }
             if self.only_near && ratio > NEAR {
@@ -197,10 +198,10 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             };
             fresh = !keep;
         }
-        Err(NewtonFailure::NoProgress(size))
+        Err(no_progress(size))
     }
 
-    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, NewtonFailure> {
+    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Reason> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
@@ -209,14 +210,14 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             !self.equations.limit.reached()
         });
         let Some(responses) = responses else {
-            return Err(NewtonFailure::NoProgress(f64::INFINITY));
+            return Err(no_progress(f64::INFINITY));
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
         self.condensed = March::new(self.equations, &self.units, maps);
         match self.condensed {
             Some(_) => Ok(residuals),
-            None => Err(NewtonFailure::NoProgress(f64::INFINITY)),
+            None => Err(no_progress(f64::INFINITY)),
         }
     }
 
@@ -226,7 +227,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         (self.log.progress)(&self.now);
     }
 
-    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, NewtonFailure> {
+    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Reason> {
         let integrated = self.integrate(nodes, tolerance, false)?;
         Ok(self.residuals(nodes, &integrated))
     }
@@ -236,12 +237,11 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         nodes: &Nodes,
         tolerance: f64,
         linear: bool,
-    ) -> Result<Vec<Integrated>, NewtonFailure> {
+    ) -> Result<Vec<Integrated>, Reason> {
         if self.equations.limit.reached() {
-            return Err(NewtonFailure::NoProgress(f64::INFINITY));
+            return Err(no_progress(f64::INFINITY));
         }
-        let integrated = integrate(self.equations, nodes, tolerance, linear)
-            .map_err(NewtonFailure::Unbounded)?;
+        let integrated = integrate(self.equations, nodes, tolerance, linear)?;
         for interval in &integrated {
             self.log.work.steps += interval.count;
             self.log.work.slopes += interval.evaluations;
@@ -282,11 +282,13 @@ impl Newton<'_, '_, '_> {
             .map_or(1.0, |condensed| condensed.condition())
     }
 
-    /// The reason that corresponds to a failure of Newton's method.
-    fn reason(&self, stuck: NewtonFailure) -> Reason {
-        let correction = match stuck {
-            NewtonFailure::Unbounded(unbounded) => return unbounded.into(),
-            NewtonFailure::NoProgress(correction) => correction,
+    /// Why there is no convergence, as far as the last linearisation shows it.
+    fn explained(&self, reason: Reason) -> Reason {
+        let Reason::NoConvergence {
+            correction, fixed, ..
+        } = reason
+        else {
+            return reason;
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),
@@ -296,7 +298,7 @@ impl Newton<'_, '_, '_> {
                 Reason::NoConvergence {
                     correction,
                     growth,
-                    fixed: false,
+                    fixed,
                 }
             }
         }

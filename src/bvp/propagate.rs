@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::dop853::Integrator;
+use super::dop853::{Integrator, combine};
 use super::equations::{Derivatives, Equations, TANGENT};
 use crate::tableau::{A, B, C, STAGES};
 use glam::DMat3;
@@ -37,37 +37,41 @@ impl LinearStep {
 #[derive(Clone, Debug)]
 pub struct Perturbations<const W: usize> {
     pub rods: Range<usize>,
-    pub rows: Vec<[f64; W]>,
-    stage: Vec<[f64; W]>,
-    slopes: Vec<Vec<[f64; W]>>,
+    /// Row after row.
+    pub all: Vec<f64>,
+    stage: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
 }
 
 impl<const W: usize> Perturbations<W> {
     /// Unit perturbations of the last `W` components of rod `j`.
     pub fn unit(rods: Range<usize>, j: usize) -> Self {
-        let mut rows = vec![[0.0; W]; TANGENT * rods.len()];
+        let mut all = vec![0.0; TANGENT * rods.len() * W];
         for k in 0..W {
-            rows[TANGENT * (j - rods.start) + TANGENT - W + k][k] = 1.0;
+            all[(TANGENT * (j - rods.start) + TANGENT - W + k) * W + k] = 1.0;
         }
         Perturbations {
             rods,
-            stage: rows.clone(),
-            slopes: vec![rows.clone(); STAGES],
-            rows,
+            stage: all.clone(),
+            slopes: vec![all.clone(); STAGES],
+            all,
         }
+    }
+
+    pub fn rows(&self) -> &[[f64; W]] {
+        self.all.as_chunks().0
     }
 
     /// Propagates them through a step.
     pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
         for i in 0..STAGES {
-            let (rows, stage) = (&self.rows, &mut self.stage);
-            combine(rows, step.width, A[i], &self.slopes, stage);
+            combine(&self.all, step.width, A[i], &self.slopes, &mut self.stage);
             let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
-            let (first, stage) = (self.rods.start, &self.stage);
-            slopes(equations, derivatives, first, stage, &mut self.slopes[i]);
+            let (stage, out) = (self.stage.as_chunks().0, self.slopes[i].as_chunks_mut().0);
+            slopes::<W>(equations, derivatives, self.rods.start, stage, out);
         }
-        combine(&self.rows, step.width, &B, &self.slopes, &mut self.stage);
-        std::mem::swap(&mut self.rows, &mut self.stage);
+        combine(&self.all, step.width, &B, &self.slopes, &mut self.stage);
+        std::mem::swap(&mut self.all, &mut self.stage);
     }
 }
 
@@ -126,27 +130,6 @@ fn products<const W: usize>(out: &mut [[f64; W]], terms: [(&DMat3, &[[f64; W]]);
             }
         }
         out[r] = sum;
-    }
-}
-
-/// rows + h sum of weights times slopes.
-fn combine<const W: usize>(
-    rows: &[[f64; W]],
-    h: f64,
-    weights: &[f64],
-    slopes: &[Vec<[f64; W]>],
-    result: &mut [[f64; W]],
-) {
-    for (i, (result, row)) in result.iter_mut().zip(rows).enumerate() {
-        let mut sum = *row;
-        for (weight, slopes) in weights.iter().zip(slopes) {
-            if *weight != 0.0 {
-                for w in 0..W {
-                    sum[w] += h * weight * slopes[i][w];
-                }
-            }
-        }
-        *result = sum;
     }
 }
 
@@ -262,7 +245,7 @@ mod tests {
                     let slope = (8.0 * narrow - wide) / 12e-3;
                     let rod = i / TANGENT;
                     let found = match linear.rods.contains(&rod) {
-                        true => linear.rows[i - TANGENT * linear.rods.start][k],
+                        true => linear.rows()[i - TANGENT * linear.rods.start][k],
                         false => 0.0,
                     };
                     let what = format!("number {i} by {k} of rod {j}: {found}, {slope}");
@@ -277,7 +260,7 @@ mod tests {
         let scenario = three();
         let equations = Equations::new(&scenario);
         let (all, some) = (linear::<TANGENT>(&equations, 1), linear::<6>(&equations, 1));
-        for (all, some) in all.rows.iter().zip(&some.rows) {
+        for (all, some) in all.rows().iter().zip(some.rows()) {
             assert_eq!(all[6..], some[..]);
         }
     }

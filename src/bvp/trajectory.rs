@@ -79,12 +79,10 @@ impl Trajectory {
     pub fn unstressed(equations: &Equations, tolerance: f64) -> Result<Self, Unbounded> {
         let mut integrator = Integrator::new(equations, 0.0, equations.clamped(), tolerance);
         let (mut sigma, mut states) = (vec![0.0], vec![integrator.y.clone()]);
-        for end in equations.stops(0.0, 1.0) {
-            integrator.run(end, |integrator| {
-                sigma.push(integrator.sigma);
-                states.push(integrator.y.clone());
-            })?;
-        }
+        integrator.run(1.0, |integrator| {
+            sigma.push(integrator.sigma);
+            states.push(integrator.y.clone());
+        })?;
         Ok(Trajectory::new(equations, sigma, states))
     }
 
@@ -104,20 +102,12 @@ impl Trajectory {
             let mut y = begin.clone();
             y[slot] = energy;
             let mut integrator = Integrator::new(equations, from, y, tolerance);
-            let mut stops: Vec<f64> = equations.stops(from, to).collect();
             let last = k + 1 == nodes.states.len();
             while let Some(station) = wanted.next_if(|s| *s < to || last) {
-                stops.push(station.clamp(from, to));
+                integrator.run(station.clamp(from, to), |_| ())?;
+                states.push(integrator.y.clone());
             }
-            stops.sort_by(f64::total_cmp);
-            stops.dedup();
-            for stop in stops {
-                integrator.run(stop, |_| ())?;
-                let here = |s: &f64| s.clamp(from, to) == stop && (*s < to || last);
-                if stations.get(states.len()).is_some_and(here) {
-                    states.push(integrator.y.clone());
-                }
-            }
+            integrator.run(to, |_| ())?;
             energy = integrator.y[slot];
         }
         Ok(Trajectory::new(equations, stations.to_vec(), states))

@@ -56,7 +56,7 @@ pub struct Relax {
     #[arg(long, conflicts_with_all = ["all", "sensitivity"])]
     margin: bool,
 
-    /// Solve for the whole leaf, in space, even if half of it or its plane would do
+    /// Solve for the whole leaf, even if half of it would do
     #[arg(long)]
     full_model: bool,
 }

@@ -21,8 +21,6 @@ pub struct Leaf {
     scenario: Arc<Scenario>,
     /// Whether this is half of a mirror-symmetric leaf.
     pub(super) mirrored: bool,
-    /// Whether it is solved in its plane.
-    pub(super) planar: bool,
     /// The units.
     pub scale: Scale,
     /// The loads at rest.
@@ -108,7 +106,6 @@ impl Leaf {
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
             mirrored: false,
-            planar: false,
             scale,
             loads: Loads {
                 gravity: vector(scenario.gravity, scale.force() / scale.length),
@@ -136,11 +133,6 @@ impl Leaf {
         rods.div_ceil(if self.mirrored { 2 } else { 1 })
     }
 
-    /// Whether it is solved in its plane.
-    pub fn planar(&self) -> bool {
-        self.planar
-    }
-
     /// Whether it is half of a leaf that is its own mirror image.
     pub fn in_half(&self) -> bool {
         self.mirrored
@@ -160,6 +152,15 @@ impl Leaf {
     /// Whether rod `j` of half a leaf is next to its own mirror image.
     pub fn beside_image(&self, j: usize) -> bool {
         self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
+    }
+
+    /// Whether no load, rest curvature or holder acts out of the plane z = 0.
+    pub fn is_planar(&self) -> bool {
+        let s = self.scenario();
+        let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
+        (s.gravity[2], s.tip_force[2], s.tip_moment) == (0.0, 0.0, [0.0; 3])
+            && self.held.is_none()
+            && curvatures.into_iter().all(|of| of.max_abs() == 0.0)
     }
 
     /// Whether all tips share one point.

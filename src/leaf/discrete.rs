@@ -56,21 +56,6 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The same rods, all of them, as those of `leaf`.
-    pub fn with_leaf(&self, leaf: &Leaf) -> Self {
-        DiscreteLeaf {
-            leaf: leaf.clone(),
-            ..self.clone()
-        }
-    }
-
-    /// The same without the restriction to its plane.
-    pub fn in_space(&self) -> Self {
-        let mut spatial = self.clone();
-        spatial.leaf.planar = false;
-        spatial
-    }
-
     /// The smallest compliance of any segment, in units of L^2/A.
     pub fn stiffest(&self) -> f64 {
         self.sections
@@ -90,15 +75,21 @@ impl DiscreteLeaf {
         soft
     }
 
-    /// Sets the force of every segment from its strain by the constitutive law.
-    pub fn strain_forces(&self, state: &mut State) {
-        let n = self.segments();
+    /// Sets the force of every segment to that of its strain, and in rigid directions to zero;
+    /// returns the largest strain in these, as a length.
+    pub fn strain_forces(&self, state: &mut State) -> f64 {
+        let (n, mut violation) = (self.segments(), 0.0_f64);
         for (j, i) in self.each(0..n) {
             let section = self.section(j, i);
             let idle = self.segment(state, j, i, DVec3::ZERO);
             let strain = idle.v(section) - section.rest_strain;
-            state.n[j * n + i] = idle.frame * (strain / section.compliance);
+            let rigid = section.compliance.cmpeq(DVec3::ZERO);
+            let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
+            state.n[j * n + i] = idle.frame * force;
+            let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
+            violation = violation.max(off.abs().max_element());
         }
+        violation
     }
 
     /// Whether nearly rigid segments have their lengths, with a total error of at most

@@ -247,21 +247,18 @@ impl SparseFactor<'_> {
     /// Solves for the right-hand side assembled in `system` plus `inertia` (see
     /// [`System::solve`]); the solution is stored in `system`.
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
-        let unknowns = &self.pattern.unknowns;
-        let mut b = vec![0.0; self.pattern.size];
-        for (j, rod) in system.rhs().iter().enumerate() {
-            for (i, mut rhs) in rod.iter().copied().enumerate() {
-                if let Some((velocity, per_step)) = inertia {
+        let mut rhs = system.rhs();
+        if let Some((velocity, per_step)) = inertia {
+            for (j, rod) in rhs.iter_mut().enumerate() {
+                for (i, rhs) in rod.iter_mut().enumerate() {
                     let mass = system.mass(j, i);
                     for c in 0..6 {
                         rhs[c] += mass[c / 3] * velocity[j][i][c] * per_step;
                     }
                 }
-                unknowns.gather(j, i, &rhs, &mut b);
             }
         }
-        self.solve_vector(&mut b);
-        system.set_solution(&self.pattern.unknowns.field(&b));
+        system.set_solution(&self.solve_bordered(&rhs, &[]).increments);
     }
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of

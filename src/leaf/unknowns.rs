@@ -106,7 +106,7 @@ pub fn entries(
     let n = system.segments;
     for j in 0..system.rods() {
         let (group, lane) = group_and_lane(j);
-        let chain = system.groups[group].matrix.spatial();
+        let chain = &system.groups[group].matrix;
         for i in 0..n {
             let (own, next) = chain.blocks(i, lane);
             let mass = system.mass(j, i);

@@ -112,14 +112,7 @@ impl EnergyBalance {
     pub fn begin(&mut self, start: &Snapshot) {
         self.balance = start.energy.balance();
         self.potential = start.energy.potential;
-        self.record(&start.energy);
-    }
-
-    /// Energy that has moved: present or dissipated, or put in by loads.
-    fn record(&mut self, energy: &Energy) {
-        let there = energy.kinetic + energy.elastic + energy.coupling + energy.dissipated;
-        let given = (energy.potential - self.potential - energy.work).abs();
-        self.largest = self.largest.max(there).max(given);
+        self.largest = start.energy.moved(self.potential);
     }
 
     pub fn add(&mut self, exchange: Exchange) {
@@ -146,7 +139,7 @@ impl EnergyBalance {
         otherwise: &'static str,
     ) -> Result<(), Stopped> {
         let time = now.time;
-        self.record(&now.energy);
+        self.largest = self.largest.max(now.energy.moved(self.potential));
         // The method's own damping may reduce energy, but nothing may increase it.
         let gain = now.energy.balance() - self.balance;
         let unresolved = unresolved_energy(leaf, physics, time, h);
@@ -163,18 +156,11 @@ impl EnergyBalance {
         resolved(leaf, time, turns.fold(0.0, f64::max))
     }
 
-    pub fn save(&self) -> [f64; 5] {
-        let Exchange { dissipated, work } = self.exchanged;
-        [dissipated, work, self.balance, self.potential, self.largest]
-    }
-
-    pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
-        let [dissipated, work, balance, potential, largest] = [(); 5].map(|()| next());
-        *self = EnergyBalance {
-            exchanged: Exchange { dissipated, work },
-            balance,
-            potential,
-            largest,
-        };
+    /// Passes all numbers to `each`.
+    pub fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let Exchange { dissipated, work } = &mut self.exchanged;
+        [dissipated, work].into_iter().for_each(&mut *each);
+        let numbers = [&mut self.balance, &mut self.potential, &mut self.largest];
+        numbers.into_iter().for_each(each);
     }
 }

@@ -36,6 +36,13 @@ impl Energy {
         self.kinetic + self.elastic + self.coupling + self.potential + self.dissipated - self.work
     }
 
+    /// The energy that has moved, present, dissipated or put in by loads, in a motion that began
+    /// with this `potential`.
+    pub(crate) fn moved(&self, potential: f64) -> f64 {
+        let there = self.kinetic + self.elastic + self.coupling + self.dissipated;
+        there.max((self.potential - potential - self.work).abs())
+    }
+
     /// Applies a function to all of them.
     pub(crate) fn map(self, change: impl Fn(f64) -> f64) -> Self {
         Energy {
@@ -133,16 +140,39 @@ pub trait Method {
     /// Number of time steps.
     fn steps(&self) -> usize;
 
-    /// Advances to exactly `until`.
-    fn advance(&mut self, until: f64) -> Result<(), Stopped>;
+    /// Advances to exactly `until`; returns the state there, in which the motion is reliable.
+    fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped>;
 
     /// The present state, with positions and velocities at the same instant.
     fn snapshot(&mut self) -> Snapshot;
 
-    /// All numbers that determine the further motion, to continue it with identical bits.
-    fn save(&self) -> Vec<f64>;
+    /// Passes all numbers that determine the further motion to `each`, which may replace them.
+    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64));
+
+    /// Those numbers, to continue the motion with identical bits.
+    fn save(&mut self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        self.each_number(&mut |number| numbers.push(*number));
+        numbers
+    }
 
     /// Restores the numbers that [`Method::save`] returned for the same leaf and
     /// method; false if they do not fit.
-    fn restore(&mut self, numbers: &[f64]) -> bool;
+    fn restore(&mut self, numbers: &[f64]) -> bool {
+        let mut own = 0;
+        self.each_number(&mut |_| own += 1);
+        let fits = numbers.len() == own;
+        if fits {
+            let mut numbers = numbers.iter();
+            self.each_number(&mut |number| *number = *numbers.next().unwrap_or(number));
+        }
+        fits
+    }
+}
+
+/// Passes a count to `each`, as a number.
+pub(super) fn pass_count(count: &mut usize, each: &mut dyn FnMut(&mut f64)) {
+    let mut number = *count as f64;
+    each(&mut number);
+    *count = number as usize;
 }

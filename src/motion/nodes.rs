@@ -145,13 +145,7 @@ impl Pack {
     }
 
     /// The arrays that determine the motion, without positions.
-    pub fn moving_arrays(&self) -> impl Iterator<Item = &Array> {
-        let Motion { q, v, p, .. } = &self.motion;
-        let past = self.past.one.iter().chain(&self.past.two).flatten();
-        q.iter().chain(v).chain(p).chain(past)
-    }
-
-    pub fn moving_arrays_mut(&mut self) -> impl Iterator<Item = &mut Array> {
+    pub fn moving_arrays(&mut self) -> impl Iterator<Item = &mut Array> {
         let Motion { q, v, p, .. } = &mut self.motion;
         let past = self.past.one.iter_mut().chain(&mut self.past.two).flatten();
         q.iter_mut().chain(v).chain(p).chain(past)

@@ -54,7 +54,7 @@ pub struct Model {
     /// Rods solved for; the others are their mirror images.
     #[serde(skip)]
     pub rods: usize,
-    /// Whether the leaf was solved in its plane, which it does not leave.
+    /// Whether nothing acts out of the leaf's plane, which it does not leave.
     #[serde(skip)]
     pub planar: bool,
     /// A description of the model, with the grids.
@@ -68,7 +68,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Of a leaf of `veins` rods, solved for `rods` of them, in their plane or not, on grids
+    /// Of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
     /// of these `segments`; the effects are those of shear and stretch.
     pub fn new(
         veins: usize,

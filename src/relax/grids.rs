@@ -81,7 +81,7 @@ impl Run<'_, '_> {
 
     /// Continues to a `finer` grid with all unknowns of a leaf at rest.
     pub fn continue_on(&mut self, finer: Grid) -> Result<bool, Stop> {
-        (self.solved, self.planar) = (self.leaf.rods(), self.leaf.planar());
+        self.solved = self.leaf.rods();
         self.settle_on(finer)?;
         self.refine()
     }

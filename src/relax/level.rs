@@ -9,15 +9,20 @@ pub struct Level {
     pub state: State,
 }
 
-/// The level of the whole leaf from that of the reduced one.
+/// The level of the whole leaf from that of its half, or from its own.
 pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
+    if !reduced.in_half() {
+        return level.clone();
+    }
     Level {
-        leaf: match reduced.rods() == whole.rods() {
-            true => level.leaf.with_leaf(whole),
-            false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
-        },
+        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
         state: whole_of(reduced, &level.state),
     }
+}
+
+/// Whether all nodes lie in the plane z = 0.
+pub fn flat(level: &Level) -> bool {
+    level.state.x.iter().all(|x| x.z == 0.0)
 }
 
 /// Positions of all rods at every `stride`-th node, dimensionless.

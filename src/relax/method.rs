@@ -42,8 +42,7 @@ pub struct SemiImplicit {
     /// Whether to stop at a saddle instead of leaving it. Newton's method then converges to
     /// equilibria of any kind.
     pub keep_unstable: bool,
-    /// Whether to solve for the whole leaf in space even where symmetry allows half of it or
-    /// its plane.
+    /// Whether to solve for the whole leaf even where symmetry allows half of it.
     pub full_model: bool,
     /// Start from the state of this number in an unlimited series of disturbed ones: each
     /// displaces the leaf out of its plane in a different pattern, consecutive numbers to
@@ -170,7 +169,7 @@ pub struct Settings {
     pub intervals: Option<usize>,
     /// Whether to stop at a saddle.
     pub keep_unstable: bool,
-    /// Whether to solve for the whole leaf, in space.
+    /// Whether to solve for the whole leaf.
     pub full_model: bool,
 }
 

@@ -12,7 +12,7 @@ use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::motion::{Method as _, Physics, SemiImplicit, Steps};
 use crate::newton::Stop;
 use crate::relax::grids::FINEST_RESOLVING;
-use crate::relax::level::Level;
+use crate::relax::level::{Level, flat};
 use crate::relax::method::{Method, SemiImplicit as How};
 use crate::relax::prolong::prolong;
 use crate::relax::run::Run;
@@ -43,11 +43,6 @@ const BUDGET: usize = 3_000_000;
 
 /// Largest displacement of a node, in lengths, between states of the same valley.
 const SAME_PLACE: f64 = 0.02;
-
-/// Whether all nodes lie in the plane z = 0.
-fn flat(level: &Level) -> bool {
-    level.state.x.iter().all(|x| x.z == 0.0)
-}
 
 /// Whether two states are in the same valley.
 fn same_place(a: &Level, b: &Level) -> bool {
@@ -120,10 +115,7 @@ impl Run<'_, '_> {
     /// The equilibrium in the valley where the leaf's own motion ends; `None` if that takes
     /// too long or ends at a saddle.
     fn follow_own_motion(&mut self, grid: Grid) -> Option<Level> {
-        let mut leaf = DiscreteLeaf::new(self.leaf, grid);
-        if self.leaf.planar() {
-            leaf = leaf.in_space();
-        }
+        let leaf = DiscreteLeaf::new(self.leaf, grid);
         let most = BUDGET / (leaf.rods() * leaf.segments());
         let mut system = System::new(&leaf);
         let (physics, start) = (Physics::at_rest(self.leaf), self.start(&leaf));

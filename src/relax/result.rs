@@ -6,7 +6,7 @@ use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
 use crate::relax::fields::{Fields, fields};
-use crate::relax::level::Level;
+use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
@@ -66,7 +66,10 @@ pub fn equilibrium(
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
-            (run.solved, run.planar),
+            (
+                run.solved,
+                run.planar && run.index == Some(0) && flat(finest),
+            ),
             &segments,
             (run.effects).map(|effect| effect.map(|effect| effect * scale.length)),
         ),

@@ -56,11 +56,11 @@ pub const BUDGET: usize = 10_000_000;
 /// The state of a run.
 pub struct Run<'a, 'o> {
     pub leaf: &'a Leaf,
-    /// The full leaf, if `leaf` is half of it or restricted to its plane.
+    /// The full leaf, if `leaf` is half of it.
     pub whole: Option<&'a Leaf>,
     /// Rods solved for.
     pub solved: usize,
-    /// Whether they are solved for in their plane.
+    /// Whether to tell that they stay in their plane, as nothing acts out of it.
     pub planar: bool,
     /// Displacements that would follow from neglecting shear, and stretch.
     pub effects: [Option<f64>; 2],
@@ -114,7 +114,7 @@ impl<'a, 'o> Run<'a, 'o> {
             leaf,
             whole: None,
             solved: leaf.rods(),
-            planar: leaf.planar(),
+            planar: false,
             effects: [None; 2],
             options,
             tolerance,

@@ -27,7 +27,7 @@ fn settles_where_it_starts(method: Method) -> bool {
     matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
 }
 
-/// Whether half of a leaf, or the leaf in its plane, may be solved in place of the whole.
+/// Whether half of a leaf may be solved in place of the whole.
 pub fn reducible(method: Method) -> bool {
     settles_where_it_starts(method)
         && matches!(method, Method::SemiImplicit(how) if !how.full_model)

@@ -197,8 +197,6 @@ impl Run<'_, '_> {
                 solver: Definite {
                     contraction: self.contraction,
                     direct: None,
-                    space: (leaf.leaf.planar() && self.levels.is_empty())
-                        .then(|| System::new(&leaf.in_space())),
                 },
                 most_evaluations: begun + allowed,
                 limit: &self.options.limit,

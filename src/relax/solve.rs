@@ -143,24 +143,27 @@ fn on_grids(
     // Four segments are too few to be divided among panels.
     let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
     let first = check_segments(&leaf, method.segments(), least)?;
-    let reduced = reducible(method).then(|| leaf.reduced()).flatten();
+    let half = reducible(method).then(|| leaf.half()).flatten();
+    let planar = reducible(method) && leaf.is_planar();
     let grid = Grid::new(first, leaf.kinks());
     let mut work = Work::default();
-    if let Some(reduced) = &reduced {
-        let mut run = Run::new(reduced, options, tolerance, progress);
+    if let Some(half) = &half {
+        let mut run = Run::new(half, options, tolerance, progress);
         run.whole = Some(&leaf);
+        run.planar = planar;
         run.shape_alone = shape_alone;
         let end = run.solve(grid.clone());
         let end = run.settle_by_own_motion(&grid, end);
         if end.is_ok() && run.index == Some(0) {
             return Ok(finished(run.completed(&leaf), end, clock));
         }
-        // The reduced model fails, as the leaf leaves its valley, breaks the mirror symmetry,
-        // or leaves the plane: solve the full leaf.
+        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
+        // solve the full leaf.
         work = run.work;
     }
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
+    run.planar = planar;
     run.shape_alone = shape_alone;
     let end = rest_from(&mut run, grid);
     Ok(finished(run, end, clock))

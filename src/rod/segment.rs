@@ -2,7 +2,6 @@
 
 use super::element::{Element, Nodes};
 use super::section::Section;
-use super::spatial::SpatialElement;
 use crate::lanes::Vectors;
 use crate::rotation::{self, Relative};
 use glam::{DMat3, DQuat, DVec3};
@@ -109,7 +108,7 @@ impl Section {
 impl Segment {
     /// The segment between `ends` that carries the spatial force `n`.
     pub fn new(section: &Section, ends: &Ends, n: DVec3) -> Self {
-        let element = SpatialElement::new(&section.into(), &ends.into(), n.into());
+        let element = Element::new(&section.into(), &ends.into(), n.into());
         let [d1, d2, d3] = element.frame.map(DVec3::from);
         Segment {
             frame: DMat3::from_cols(d1, d2, d3),
@@ -122,13 +121,13 @@ impl Segment {
         }
     }
 
-    fn element(&self) -> SpatialElement<Scalar> {
+    fn element(&self) -> Element<Scalar> {
         let DMat3 {
             x_axis,
             y_axis,
             z_axis,
         } = self.frame;
-        SpatialElement {
+        Element {
             frame: [x_axis, y_axis, z_axis].map(Vectors::from),
             u: self.u.into(),
             m: self.m.into(),

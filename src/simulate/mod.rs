@@ -32,7 +32,7 @@ pub use stills::{film, stills};
 use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
+use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
 use crate::words::words;
@@ -253,8 +253,12 @@ impl Simulation {
 
     /// The leaf now.
     pub fn frame(&mut self) -> Frame {
-        let snapshot = self.method.snapshot();
-        Frame::new(&self.leaf, &self.physics, &snapshot, self.method.steps())
+        let now = self.method.snapshot();
+        self.frame_of(&now)
+    }
+
+    fn frame_of(&self, now: &Snapshot) -> Frame {
+        Frame::new(&self.leaf, &self.physics, now, self.method.steps())
     }
 
     /// Advances to the time of the next output.
@@ -265,10 +269,12 @@ impl Simulation {
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
         let (clock, unit) = (Instant::now(), self.physics.time);
         let advanced = self.method.advance(self.output_time(self.made + 1));
-        let frame = advanced.map_err(|stopped| stopped.in_unit(unit)).map(|()| {
-            self.made += 1;
-            self.frame()
-        });
+        let frame = advanced
+            .map_err(|stopped| stopped.in_unit(unit))
+            .map(|now| {
+                self.made += 1;
+                self.frame_of(&now)
+            });
         self.moving += clock.elapsed();
         frame
     }
@@ -284,7 +290,7 @@ impl Simulation {
 
     /// All numbers that determine the further motion, to continue it with identical bits
     /// in a simulation of the same leaf with the same options.
-    pub fn save(&self) -> Vec<f64> {
+    pub fn save(&mut self) -> Vec<f64> {
         let mut numbers = vec![self.made as f64];
         numbers.extend(self.method.save());
         numbers

@@ -59,9 +59,7 @@ impl Imbalance {
         let start = moments.first()?.energy;
         let (mut moved, mut off) = (rounding, 0.0_f64);
         for Moment { energy: e, .. } in moments {
-            let present = e.kinetic + e.elastic + e.coupling + e.dissipated;
-            let given = (e.potential - start.potential - e.work).abs();
-            moved = moved.max(present).max(given);
+            moved = moved.max(e.moved(start.potential));
             off = off.max((e.balance() - start.balance()).abs());
         }
         (off > LARGEST_IMBALANCE * moved).then(|| Imbalance(off / moved))

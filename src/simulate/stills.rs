@@ -11,7 +11,7 @@ const CANDIDATES: usize = 400;
 /// The indices of `count` moments that show a motion, or of all if there are
 /// no more: the first, the last, and others with the tip far from that of
 /// the previous one, such as the turning points of a swing. If the tip hardly
-/// moves (`length`: the longest rod), they are at equal intervals of time.
+/// moves (`length`: the longest rod), they are at equal intervals.
 pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     if moments.len() <= count {
         return (0..moments.len()).collect();
@@ -21,20 +21,9 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     if distance.is_finite() && distance > HARDLY * length {
         return far_apart(moments, count);
     }
-    let times: Vec<f64> = moments.iter().map(|moment| moment.time).collect();
-    let (first, last) = (times[0], times[moments.len() - 1]);
-    let wanted = |k: usize| first + (last - first) * k as f64 / (count - 1) as f64;
-    let mut chosen: Vec<usize> = (0..count).map(|k| nearest(&times, wanted(k))).collect();
-    chosen[0] = 0;
-    chosen[count - 1] = moments.len() - 1;
-    // Without duplicates: a jump between outputs may span several intervals.
-    for k in 1..count {
-        chosen[k] = chosen[k].max(chosen[k - 1] + 1);
-    }
-    for k in (0..count).rev() {
-        chosen[k] = chosen[k].min(moments.len() - count + k);
-    }
-    chosen
+    let (last, gaps) = (moments.len() - 1, count - 1);
+    let nearest = |k: usize| (2 * k * last + gaps) / (2 * gaps);
+    (0..count).map(nearest).collect()
 }
 
 /// The first, the last, and others between, such that the sum of the square roots of the
@@ -42,11 +31,8 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
 /// them, as the root is concave. By dynamic programming.
 fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
     let last = moments.len() - 1;
-    let most = CANDIDATES.max(count);
-    let candidates: Vec<usize> = match last < most {
-        true => (0..=last).collect(),
-        false => (0..most).map(|k| k * last / (most - 1)).collect(),
-    };
+    let most = moments.len().min(CANDIDATES.max(count));
+    let candidates: Vec<usize> = (0..most).map(|k| k * last / (most - 1)).collect();
     let n = candidates.len();
     let gain = |i: usize, j: usize| {
         let [from, to] = [i, j].map(|k| moments[candidates[k]].tip);
@@ -75,17 +61,6 @@ fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
     }
     chosen.reverse();
     chosen.into_iter().map(|k| candidates[k]).collect()
-}
-
-/// The index of the number nearest to `wanted` in an ascending list.
-fn nearest(numbers: &[f64], wanted: f64) -> usize {
-    let after = numbers.partition_point(|&number| number < wanted);
-    match after {
-        0 => 0,
-        _ if after == numbers.len() => after - 1,
-        _ if wanted - numbers[after - 1] < numbers[after] - wanted => after - 1,
-        _ => after,
-    }
 }
 
 /// Largest number of shapes of a film, and of nodes of all of them.

@@ -71,7 +71,7 @@ def relax(
     keep_unstable
         Stop at a saddle instead of leaving it.
     full_model
-        Solve for the whole leaf, in space, even if half of it or its plane would do.
+        Solve for the whole leaf, even if half of it would do.
     modes
         How many of the lowest eigenvalues to find, too (the program finds 3); `leafdyn.modes` finds their shapes.
     margin

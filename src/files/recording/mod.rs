@@ -52,7 +52,7 @@ const STILLS: usize = 8;
 /// let mut recording = Recording::begin(folder, &mut simulation, &Selection::default())?;
 /// while !simulation.done() {
 ///     let frame = simulation.next_frame()?;
-///     recording.add(&simulation, &frame)?;
+///     recording.add(&mut simulation, &frame)?;
 /// }
 /// let record = recording.record(&simulation, None)?;
 /// let files = recording.finish(&Document::new(&record, &scenario, None))?;
@@ -179,7 +179,7 @@ impl Recording {
     }
 
     /// Adds an output: the current state of `simulation`.
-    pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), FileError> {
+    pub fn add(&mut self, simulation: &mut Simulation, frame: &Frame) -> Result<(), FileError> {
         self.moments.push(Moment::of(frame, self.joined));
         let Some([motion, energy]) = &mut self.growing else {
             self.last = frame.positions.clone();
@@ -198,7 +198,7 @@ impl Recording {
         Ok(())
     }
 
-    fn update_checkpointer(&self, simulation: &Simulation) {
+    fn update_checkpointer(&self, simulation: &mut Simulation) {
         let Some(files) = &self.growing else {
             return;
         };

@@ -2,8 +2,9 @@
 //! or at a pinned or clamped tip.
 
 use crate::lanes::Four;
-use crate::leaf::chain::{Chain, Increments, first, group_and_lane};
+use crate::leaf::chain::{Chain, Increments, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
+use crate::rod::UNKNOWNS;
 use glam::DVec3;
 
 /// Components of a node's increment (rotation, displacement) that are zero for a node in the
@@ -49,14 +50,11 @@ impl DiscreteLeaf {
 
     /// Replaces rows and columns of the held components of rod `j` in the matrix by those of
     /// the identity, which makes them zero.
-    pub(super) fn hold_components<const B: usize>(&self, j: usize, chain: &mut Chain<B>) {
+    pub(super) fn hold_components(&self, j: usize, chain: &mut Chain) {
         let set = |four: &mut Four, value: f64| four.0[group_and_lane(j).1] = value;
         for i in self.first_held()..self.segments() {
-            for &held in self.held_components(j, i + 1) {
-                let Some(c) = held.checked_sub(first(B)) else {
-                    continue;
-                };
-                for k in 0..B {
+            for &c in self.held_components(j, i + 1) {
+                for k in 0..UNKNOWNS {
                     set(chain.diagonal(i, c.min(k), c.max(k)), 0.0);
                     set(chain.off(i, c, k), 0.0);
                     if i > 0 {

@@ -1,12 +1,12 @@
 //! The loops over the segments of a group of rods.
 
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors};
-use crate::leaf::chain::{Chain, GroupMatrix, Increments, first, turns};
+use crate::leaf::chain::{Increments, TURNS};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
 use crate::leaf::state::State;
 use crate::leaf::system::{Group, Sums, rods_of};
-use crate::rod::{Element, Nodes, PlanarElement, Section, Sections, SpatialElement};
+use crate::rod::{Element, Nodes, Section, Sections, UNKNOWNS, on_nodes};
 use crate::rotation::{Quaternions, exp_each, multiply_each};
 use glam::{DQuat, DVec3};
 use pulp::Simd;
@@ -61,12 +61,7 @@ impl<'a> Rods<'a> {
 
     /// Segment `i` of every rod, and its sections.
     #[inline(always)]
-    fn element<S: Simd, E: Element<S, B>, const B: usize>(
-        &self,
-        simd: S,
-        i: usize,
-        part: usize,
-    ) -> (E, Sections<S>) {
+    fn element<S: Simd>(&self, simd: S, i: usize, part: usize) -> (Element<S>, Sections<S>) {
         let nodes = Nodes {
             x: [
                 gather(simd, self.x, i, part),
@@ -76,7 +71,7 @@ impl<'a> Rods<'a> {
         };
         let sections = self.sections(simd, i, part);
         let n = gather(simd, self.n, i, part);
-        (E::new(&sections, &nodes, n), sections)
+        (Element::new(&sections, &nodes, n), sections)
     }
 }
 
@@ -103,90 +98,68 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
             sums,
             ..
         } = &mut *self.group;
-        let active = Lanes::of(simd, active, part);
-        let of_lanes = match matrix {
-            GroupMatrix::Spatial(chain) => {
-                assemble::<S, SpatialElement<S>, _, MATRIX>(&self.rods, chain, rhs, (active, part))
+        let (rods, active) = (&self.rods, Lanes::of(simd, active, part));
+        let zero = Lanes::splat(simd, 0.0);
+        let loads = RodLoads::of(simd, &rods.loads, part);
+        let stiffness = loads.stiffness().array();
+        let (mut energy, mut squared_turn) = (zero, zero);
+        let (mut own, mut force) = ([[zero; UNKNOWNS]; UNKNOWNS], [zero; UNKNOWNS]);
+        let n = rhs.len();
+        for i in 0..n {
+            let (element, sections) = rods.element(simd, i, part);
+            energy = energy + element.strain_energy(&sections);
+            squared_turn = squared_turn.max(element.squared_turn());
+            let gradient = on_nodes(element.condensed(&sections));
+            if i > 0 {
+                for r in 0..UNKNOWNS {
+                    let force = active * (force[r] - gradient[0][r]);
+                    force.put(&mut rhs[i - 1][r], part);
+                }
             }
-            GroupMatrix::Planar(chain) => {
-                assemble::<S, PlanarElement<S>, _, MATRIX>(&self.rods, chain, rhs, (active, part))
+            if MATRIX {
+                let hessian = element.hessian(&sections);
+                if i > 0 {
+                    for r in 0..UNKNOWNS {
+                        for c in r..UNKNOWNS {
+                            own[r][c] = own[r][c] + hessian.own[0][r][c];
+                        }
+                    }
+                    matrix.put(i - 1, &own, Some(&hessian.across), (active, part));
+                }
+                own = hessian.own[1];
             }
-        };
+            let tip = i + 1 == n;
+            let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
+            let [before, behind] = rods.beside;
+            let x = [
+                gather(simd, before, i + 1, part),
+                gather(simd, rods.x, i + 1, part),
+                gather(simd, behind, i + 1, part),
+            ];
+            let (load, potential) = loads.at(x, weights, tip);
+            energy = energy + potential;
+            let load = load.array();
+            let coupling_weight = Lanes::splat(simd, weights[1]);
+            for r in 0..UNKNOWNS {
+                force[r] = -gradient[1][r];
+                if r >= TURNS {
+                    let c = r - TURNS;
+                    force[r] = force[r] + load[c];
+                    own[r][r] = stiffness[c].times(coupling_weight, own[r][r]);
+                }
+            }
+        }
+        for r in 0..UNKNOWNS {
+            (active * force[r]).put(&mut rhs[n - 1][r], part);
+        }
+        if MATRIX {
+            matrix.put(n - 1, &own, None, (active, part));
+        }
         if part == 0 {
             *sums = Sums::default();
         }
-        sums.energy += of_lanes.energy;
-        sums.turn = sums.turn.max(of_lanes.turn);
-    }
-}
-
-#[inline(always)]
-fn assemble<S: Simd, E: Element<S, B>, const B: usize, const MATRIX: bool>(
-    rods: &Rods,
-    chain: &mut Chain<B>,
-    rhs: &mut [Increments],
-    (active, part): (Lanes<S>, usize),
-) -> Sums {
-    let simd = active.simd;
-    let zero = Lanes::splat(simd, 0.0);
-    let loads = RodLoads::of(simd, &rods.loads, part);
-    let stiffness = loads.stiffness().array();
-    let (mut energy, mut squared_turn) = (zero, zero);
-    let (mut own, mut force) = ([[zero; B]; B], [zero; B]);
-    let n = rhs.len();
-    for i in 0..n {
-        let (element, sections): (E, _) = rods.element(simd, i, part);
-        energy = energy + element.strain_energy(&sections);
-        squared_turn = squared_turn.max(element.squared_turn());
-        let gradient = element.condensed_gradient(&sections);
-        if i > 0 {
-            for r in 0..B {
-                let force = active * (force[r] - gradient[0][r]);
-                force.put(&mut rhs[i - 1][first(B) + r], part);
-            }
-        }
-        if MATRIX {
-            let hessian = element.hessian(&sections);
-            if i > 0 {
-                for r in 0..B {
-                    for c in r..B {
-                        own[r][c] = own[r][c] + hessian.own[0][r][c];
-                    }
-                }
-                chain.put(i - 1, &own, Some(&hessian.across), (active, part));
-            }
-            own = hessian.own[1];
-        }
-        let tip = i + 1 == n;
-        let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
-        let [before, behind] = rods.beside;
-        let x = [
-            gather(simd, before, i + 1, part),
-            gather(simd, rods.x, i + 1, part),
-            gather(simd, behind, i + 1, part),
-        ];
-        let (load, potential) = loads.at(x, weights, tip);
-        energy = energy + potential;
-        let load = load.array();
-        let coupling_weight = Lanes::splat(simd, weights[1]);
-        for r in 0..B {
-            force[r] = -gradient[1][r];
-            if r >= turns(B) {
-                let c = r - turns(B);
-                force[r] = force[r] + load[c];
-                own[r][r] = stiffness[c].times(coupling_weight, own[r][r]);
-            }
-        }
-    }
-    for r in 0..B {
-        (active * force[r]).put(&mut rhs[n - 1][first(B) + r], part);
-    }
-    if MATRIX {
-        chain.put(n - 1, &own, None, (active, part));
-    }
-    Sums {
-        energy: energy.where_positive(active, zero).sum(),
-        turn: squared_turn.largest().sqrt(),
+        sums.energy += energy.where_positive(active, zero).sum();
+        sums.turn = sums.turn.max(squared_turn.largest().sqrt());
     }
 }
 
@@ -202,38 +175,24 @@ impl Kernel for Stiffen<'_> {
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let Group { rhs, active, .. } = &mut *self.group;
         let active = Lanes::of(simd, active, part);
-        let (rods, dropped) = (&self.rods, Vectors::splat(simd, self.dropped.to_array()));
-        match rods.leaf.leaf.planar() {
-            false => stiffen::<S, SpatialElement<S>, 6>(rods, dropped, rhs, (active, part)),
-            true => stiffen::<S, PlanarElement<S>, 3>(rods, dropped, rhs, (active, part)),
-        }
-    }
-}
-
-#[inline(always)]
-fn stiffen<S: Simd, E: Element<S, B>, const B: usize>(
-    rods: &Rods,
-    dropped: Vectors<S>,
-    rhs: &mut [Increments],
-    (active, part): (Lanes<S>, usize),
-) {
-    let simd = active.simd;
-    let mut force = [Lanes::splat(simd, 0.0); B];
-    let n = rhs.len();
-    for i in 0..=n {
-        let gradient = match i < n {
-            true => {
-                let (element, sections): (E, _) = rods.element(simd, i, part);
-                element.stiffening_gradient(&sections, dropped)
+        let dropped = Vectors::splat(simd, self.dropped.to_array());
+        let none = [Lanes::splat(simd, 0.0); UNKNOWNS];
+        let (mut force, n) = (none, rhs.len());
+        for i in 0..=n {
+            let gradient = match i < n {
+                true => {
+                    let (element, sections) = self.rods.element(simd, i, part);
+                    on_nodes(element.stiffening(&sections, dropped))
+                }
+                false => [none; 2],
+            };
+            for r in 0..UNKNOWNS {
+                if i > 0 {
+                    let force = active * (force[r] - gradient[0][r]);
+                    force.put(&mut rhs[i - 1][r], part);
+                }
+                force[r] = -gradient[1][r];
             }
-            false => [[Lanes::splat(simd, 0.0); B]; 2],
-        };
-        for r in 0..B {
-            if i > 0 {
-                let force = active * (force[r] - gradient[0][r]);
-                force.put(&mut rhs[i - 1][first(B) + r], part);
-            }
-            force[r] = -gradient[1][r];
         }
     }
 }
@@ -251,16 +210,6 @@ pub struct Advance<'a> {
 impl Kernel for Advance<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        match self.rods.leaf.leaf.planar() {
-            false => self.advance::<S, SpatialElement<S>, 6>(simd, part),
-            true => self.advance::<S, PlanarElement<S>, 3>(simd, part),
-        }
-    }
-}
-
-impl Advance<'_> {
-    #[inline(always)]
-    fn advance<S: Simd, E: Element<S, B>, const B: usize>(&mut self, simd: S, part: usize) {
         let step = Lanes::splat(simd, self.step);
         let lanes = rods_of(self.rods.group, self.rods.leaf.rods()).len();
         let lanes = part..lanes.min(part + S::F64_LANES);
@@ -278,7 +227,7 @@ impl Advance<'_> {
             };
             let (turn_after, shift_after) = (of(0), of(3));
             let rods = &self.rods;
-            let (element, sections): (E, _) = rods.element(simd, i, part);
+            let (element, sections) = rods.element(simd, i, part);
             let turns = [turn, turn_after];
             let change = element.force_increment(&sections, shift_after - shift, turns);
             let n = change.times(step, gather(simd, rods.n, i, part));

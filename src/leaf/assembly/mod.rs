@@ -7,7 +7,7 @@ mod kernels;
 pub use self::jumps::{Jump, Tangent};
 
 use self::kernels::{Advance, Assemble, Rods, Stiffen};
-use super::chain::{GroupMatrix, group_and_lane};
+use super::chain::group_and_lane;
 use super::discrete::DiscreteLeaf;
 use super::state::State;
 use super::system::{Sums, System, each_group, rods_of};
@@ -35,10 +35,8 @@ impl DiscreteLeaf {
             run(arch, &mut Assemble::<MATRIX> { rods, group });
             for j in rods_of(g, self.rods()) {
                 self.clear_held_components(j, &mut group.rhs);
-                match &mut group.matrix {
-                    _ if !MATRIX => {}
-                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain),
-                    GroupMatrix::Planar(chain) => self.hold_components(j, chain),
+                if MATRIX {
+                    self.hold_components(j, &mut group.matrix);
                 }
             }
         });

@@ -2,15 +2,17 @@
 //! (chain), its factorisation, base to tip, and its triangular solves. Linear in the number of
 //! nodes.
 //!
-//! The B unknowns of a node are (theta, dx): 6, or the 3 within the plane z = 0. The last
-//! node's dx is either the rod's own, or belongs to the joint tip: then it is not eliminated,
-//! and its Schur complement is the rod's contribution to the tip's 3 x 3 matrix.
+//! The unknowns of a node are (theta, dx). The last node's dx is either the rod's own, or belongs
+//! to the joint tip: then it is not eliminated, and its Schur complement is the rod's contribution
+//! to the tip's 3 x 3 matrix.
 
 mod kernels;
 
 use self::kernels::{Backward, Factorize, Forward};
 use super::state::Increment;
 use crate::lanes::{Four, GROUP, Lanes, run};
+use crate::rod::{self, UNKNOWNS};
+use glam::DVec3;
 use pulp::{Arch, Simd};
 
 /// Increments of a node, or the forces dual to them, of all rods of a group.
@@ -29,58 +31,40 @@ pub fn set_lane(increments: &mut Increments, lane: usize, of_rod: &Increment) {
 }
 
 /// A block of a chain, rows first.
-pub type Block<const B: usize> = [[f64; B]; B];
+pub type Block = [[f64; UNKNOWNS]; UNKNOWNS];
 
-/// Unknowns of a node in space.
-pub const SPATIAL: usize = 6;
+/// Number of rotations among the unknowns of a node; they come first.
+pub const TURNS: usize = 3;
 
-/// Unknowns of a node that stays in the plane z = 0: its rotation about z, its displacements
-/// along x and y.
-pub const PLANAR: usize = 3;
+/// Entries of the upper triangle of a block.
+const TRIANGLE: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
 
-/// Number of rotations among the B unknowns of a node; they come first.
-pub const fn turns(b: usize) -> usize {
-    if b == PLANAR { 1 } else { 3 }
-}
-
-/// The component of an [`Increment`] that is the first of B unknowns; the
-/// others follow.
-pub const fn first(b: usize) -> usize {
-    3 - turns(b)
-}
-
-/// Entries of the upper triangle of a b x b block, and of a node: the triangle of
-/// its own block, then the block (i, i + 1), both rows first.
-const fn triangle(b: usize) -> usize {
-    b * (b + 1) / 2
-}
-const fn entries(b: usize) -> usize {
-    triangle(b) + b * b
-}
+/// Those of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
+type Entries = [Four; ENTRIES];
+const ENTRIES: usize = TRIANGLE + UNKNOWNS * UNKNOWNS;
 
 /// Position of the entry (r, c) of a triangle, r <= c.
-const fn upper(b: usize, r: usize, c: usize) -> usize {
-    r * (2 * b - r - 1) / 2 + c
+const fn upper(r: usize, c: usize) -> usize {
+    r * (2 * UNKNOWNS - r - 1) / 2 + c
 }
 
 /// Position of the entry (r, c) of a block (i, i + 1).
-const fn off(b: usize, r: usize, c: usize) -> usize {
-    triangle(b) + r * b + c
+const fn off(r: usize, c: usize) -> usize {
+    TRIANGLE + r * UNKNOWNS + c
 }
 
 /// The 3 x 3 matrix of a tip, rows first.
-pub type Tip = Block<3>;
+pub type Tip = [[f64; 3]; 3];
 
 /// The matrices of a group of rods, nodes 1 to n, without the coupling to others,
 /// and their factorisations.
 #[derive(Clone, Debug)]
-pub struct Chain<const B: usize> {
+pub struct Chain {
     /// Entries of all nodes.
-    matrix: Vec<Four>,
+    matrix: Vec<Entries>,
     /// L D L^T, with unit lower L: of every node L^T of its own block above the
     /// diagonal and 1/d on it, then L^-1 times the block (i, i + 1).
-    factor: Vec<Four>,
-    segments: usize,
+    factor: Vec<Entries>,
     /// Number of eliminated unknowns of the last node: with a joint tip its rotations alone.
     last: usize,
 }
@@ -93,22 +77,23 @@ pub struct Masses<'a> {
     pub weights: &'a [f64],
 }
 
-impl<const B: usize> Chain<B> {
+impl Chain {
     /// Identity matrices, for rods with `segments` segments.
     pub fn new(segments: usize, joined: bool) -> Self {
-        let zeros = vec![Four::default(); segments * entries(B)];
-        let mut chain = Chain {
-            factor: zeros.clone(),
-            matrix: zeros,
-            segments,
-            last: if joined { turns(B) } else { B },
-        };
-        for node in chain.matrix.chunks_exact_mut(entries(B)) {
-            for k in 0..B {
-                node[upper(B, k, k)] = Four::splat(1.0);
-            }
+        let zeros = [Four::default(); ENTRIES];
+        let mut identity = zeros;
+        for k in 0..UNKNOWNS {
+            identity[upper(k, k)] = Four::splat(1.0);
         }
-        chain
+        Chain {
+            matrix: vec![identity; segments],
+            factor: vec![zeros; segments],
+            last: if joined { TURNS } else { UNKNOWNS },
+        }
+    }
+
+    fn segments(&self) -> usize {
+        self.matrix.len()
     }
 
     /// Writes the upper triangle of the block of node `i` (from 0), and the block
@@ -117,24 +102,24 @@ impl<const B: usize> Chain<B> {
     pub fn put<S: Simd>(
         &mut self,
         i: usize,
-        own: &[[Lanes<S>; B]; B],
-        next: Option<&[[Lanes<S>; B]; B]>,
+        own: &rod::Block<S>,
+        next: Option<&rod::Block<S>>,
         (active, part): (Lanes<S>, usize),
     ) {
-        let node = &mut self.matrix[i * entries(B)..][..entries(B)];
+        let node = &mut self.matrix[i];
         let zero = Lanes::splat(active.simd, 0.0);
         let one = Lanes::splat(active.simd, 1.0);
-        for r in 0..B {
+        for r in 0..UNKNOWNS {
             let own_r = own[r][r].where_positive(active, one);
-            own_r.put(&mut node[upper(B, r, r)], part);
-            for c in r + 1..B {
+            own_r.put(&mut node[upper(r, r)], part);
+            for c in r + 1..UNKNOWNS {
                 let own = own[r][c].where_positive(active, zero);
-                own.put(&mut node[upper(B, r, c)], part);
+                own.put(&mut node[upper(r, c)], part);
             }
             if let Some(next) = next {
-                for c in 0..B {
+                for c in 0..UNKNOWNS {
                     let next = next[r][c].where_positive(active, zero);
-                    next.put(&mut node[off(B, r, c)], part);
+                    next.put(&mut node[off(r, c)], part);
                 }
             }
         }
@@ -142,24 +127,24 @@ impl<const B: usize> Chain<B> {
 
     /// Entry (r, c) of the block of node `i` (from 0), r <= c.
     pub fn diagonal(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
-        &mut self.matrix[i * entries(B) + upper(B, r, c)]
+        &mut self.matrix[i][upper(r, c)]
     }
 
     /// Entry (r, c) of the block between nodes `i` (from 0) and `i` + 1.
     pub fn off(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
-        &mut self.matrix[i * entries(B) + off(B, r, c)]
+        &mut self.matrix[i][off(r, c)]
     }
 
     /// The block of node `i` (from 0) of the rod in a lane, its upper triangle, and
     /// the one between it and the next.
-    pub fn blocks(&self, i: usize, lane: usize) -> (Block<B>, Block<B>) {
-        let node = &self.matrix[i * entries(B)..][..entries(B)];
-        let (mut own, mut next) = ([[0.0; B]; B], [[0.0; B]; B]);
-        for r in 0..B {
-            for c in 0..B {
-                next[r][c] = node[off(B, r, c)].0[lane];
+    pub fn blocks(&self, i: usize, lane: usize) -> (Block, Block) {
+        let node = &self.matrix[i];
+        let (mut own, mut next) = ([[0.0; UNKNOWNS]; UNKNOWNS], [[0.0; UNKNOWNS]; UNKNOWNS]);
+        for r in 0..UNKNOWNS {
+            for c in 0..UNKNOWNS {
+                next[r][c] = node[off(r, c)].0[lane];
                 if r <= c {
-                    own[r][c] = node[upper(B, r, c)].0[lane];
+                    own[r][c] = node[upper(r, c)].0[lane];
                 }
             }
         }
@@ -181,17 +166,9 @@ impl<const B: usize> Chain<B> {
 
     /// The contribution of the rod in a lane to the matrix of the joint tip.
     pub fn tip(&self, lane: usize) -> Tip {
-        let node = &self.factor[(self.segments - 1) * entries(B)..];
-        // For a tip that stays in the plane, a one on the diagonal fixes its displacement
-        // across it.
-        let mut tip = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        let turns = turns(B);
-        for r in 0..B - turns {
-            for c in 0..B - turns {
-                tip[r][c] = node[upper(B, turns + r.min(c), turns + r.max(c))].0[lane];
-            }
-        }
-        tip
+        let node = &self.factor[self.segments() - 1];
+        let entry = |r: usize, c: usize| node[upper(TURNS + r.min(c), TURNS + r.max(c))].0[lane];
+        std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
     }
 
     /// Forward substitution L y = b. With a joint tip the last dx slots of y then hold the
@@ -212,72 +189,6 @@ impl<const B: usize> Chain<B> {
         };
         run(arch, &mut kernel);
         kernel.product.sum()
-    }
-}
-
-/// The matrices of a group of rods with their factorisations.
-#[derive(Clone, Debug)]
-pub enum GroupMatrix {
-    /// Of rods in space.
-    Spatial(Chain<SPATIAL>),
-    /// Of rods in the plane z = 0.
-    Planar(Chain<PLANAR>),
-}
-
-impl GroupMatrix {
-    pub fn new(segments: usize, joined: bool, planar: bool) -> Self {
-        match planar {
-            false => GroupMatrix::Spatial(Chain::new(segments, joined)),
-            true => GroupMatrix::Planar(Chain::new(segments, joined)),
-        }
-    }
-
-    /// The chain, of rods in space.
-    pub fn spatial(&self) -> &Chain<SPATIAL> {
-        match self {
-            GroupMatrix::Spatial(chain) => chain,
-            GroupMatrix::Planar(_) => unreachable!("a leaf in its plane is only brought to rest"),
-        }
-    }
-
-    /// The same, mutably.
-    pub fn spatial_mut(&mut self) -> &mut Chain<SPATIAL> {
-        match self {
-            GroupMatrix::Spatial(chain) => chain,
-            GroupMatrix::Planar(_) => unreachable!("a leaf in its plane is only brought to rest"),
-        }
-    }
-
-    /// See [`Chain::factorize`].
-    pub fn factorize(&mut self, arch: Arch, masses: &Masses, any_sign: bool) -> bool {
-        match self {
-            GroupMatrix::Spatial(chain) => chain.factorize(arch, masses, any_sign),
-            GroupMatrix::Planar(chain) => chain.factorize(arch, masses, any_sign),
-        }
-    }
-
-    /// See [`Chain::tip`].
-    pub fn tip(&self, lane: usize) -> Tip {
-        match self {
-            GroupMatrix::Spatial(chain) => chain.tip(lane),
-            GroupMatrix::Planar(chain) => chain.tip(lane),
-        }
-    }
-
-    /// See [`Chain::forward`].
-    pub fn forward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) {
-        match self {
-            GroupMatrix::Spatial(chain) => chain.forward(arch, b, y),
-            GroupMatrix::Planar(chain) => chain.forward(arch, b, y),
-        }
-    }
-
-    /// See [`Chain::backward`].
-    pub fn backward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) -> f64 {
-        match self {
-            GroupMatrix::Spatial(chain) => chain.backward(arch, b, y),
-            GroupMatrix::Planar(chain) => chain.backward(arch, b, y),
-        }
     }
 }
 
@@ -303,14 +214,14 @@ impl TipFactor {
         Some(TipFactor(a))
     }
 
-    pub fn solve(&self, mut b: [f64; 3]) -> [f64; 3] {
+    pub fn solve(&self, mut b: DVec3) -> DVec3 {
         let u = &self.0;
-        b[1] -= u[0][1] * b[0];
-        b[2] -= u[0][2] * b[0] + u[1][2] * b[1];
-        let z = b[2] * u[2][2];
-        let y = b[1] * u[1][1] - u[1][2] * z;
-        let x = b[0] * u[0][0] - u[0][1] * y - u[0][2] * z;
-        [x, y, z]
+        b.y -= u[0][1] * b.x;
+        b.z -= u[0][2] * b.x + u[1][2] * b.y;
+        let z = b.z * u[2][2];
+        let y = b.y * u[1][1] - u[1][2] * z;
+        let x = b.x * u[0][0] - u[0][1] * y - u[0][2] * z;
+        DVec3::new(x, y, z)
     }
 }
 

@@ -10,7 +10,7 @@ mod solve;
 
 pub use solve::Solved;
 
-use super::chain::{GroupMatrix, Increments, Masses, TipFactor, group_and_lane, of_lane, set_lane};
+use super::chain::{Chain, Increments, Masses, TipFactor, group_and_lane, of_lane, set_lane};
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
 use crate::lanes::{Four, GROUP, arch};
@@ -36,7 +36,7 @@ pub struct Sums {
 /// and forces are zero.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
-    pub matrix: GroupMatrix,
+    pub matrix: Chain,
     /// One in lanes with a rod, zero in others.
     pub active: Four,
     /// Right-hand side; with a joint tip, the last displacement slots hold
@@ -161,11 +161,6 @@ impl System {
         self.coupled
     }
 
-    /// Whether its nodes move in space, not only in a plane.
-    pub fn spatial(&self) -> bool {
-        matches!(self.groups[0].matrix, GroupMatrix::Spatial(_))
-    }
-
     /// Coupling of gap `g` at node `i` (from 0), if there is one.
     pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
         Some(*self.gaps.get(g)? * self.coupling_weights[i])
@@ -184,7 +179,7 @@ impl System {
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let (group, lane) = group_and_lane(j);
         let group = &mut self.groups[group];
-        let chain = group.matrix.spatial_mut();
+        let chain = &mut group.matrix;
         let increment = &mut group.rhs[i - 1];
         for c in 0..3 {
             for r in 0..=c {
@@ -235,10 +230,9 @@ impl System {
     /// semidefinite: then no eigenvalue is negative. Overwrites the matrix.
     pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
         for group in &mut self.groups {
-            let chain = group.matrix.spatial_mut();
             for (i, weight) in self.coupling_weights.iter().enumerate() {
                 for c in 0..3 {
-                    let block = chain.diagonal(i, 3 + c, 3 + c);
+                    let block = group.matrix.diagonal(i, 3 + c, 3 + c);
                     for (lane, value) in block.0.iter_mut().enumerate() {
                         let [before, behind] = group.coupling.map(|side| side[c].0[lane]);
                         *value -= (before + behind) * weight;
@@ -316,7 +310,7 @@ impl System {
     pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
         let node = |j: usize, (i, v): (usize, &Increment)| {
             let mass = self.mass(j, i);
-            0.5 * (mass[0] * dot(&v[..3], &v[..3]) + mass[1] * dot(&v[3..], &v[3..]))
+            0.5 * (mass[0] * turn(v).length_squared() + mass[1] * shift(v).length_squared())
         };
         let rods = velocity.iter().enumerate();
         rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
@@ -374,7 +368,7 @@ impl Group {
             }
         }
         Group {
-            matrix: GroupMatrix::new(n, leaf.tips_move_together(), leaf.leaf.planar),
+            matrix: Chain::new(n, leaf.tips_move_together()),
             active,
             rhs: zeros.clone(),
             solution: zeros.clone(),
@@ -387,8 +381,4 @@ impl Group {
             partial: 0.0,
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

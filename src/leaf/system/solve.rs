@@ -4,7 +4,7 @@
 //! one product with the sparse E.
 
 use super::kernels::{Advance, Coupled, Direction, Product};
-use super::{Group, Masses, System, dot, each_group, rods_of};
+use super::{Group, Masses, System, each_group, rods_of};
 use crate::lanes::{Four, run};
 use crate::leaf::chain::{Increments, TipFactor};
 use crate::leaf::state::Increment;
@@ -87,7 +87,7 @@ impl System {
 
         let mut tip_p = tip_z;
         let mut tip_b_p = tip_residual;
-        let mut tip_solution = [0.0; 3];
+        let mut tip_solution = DVec3::ZERO;
         for (group, p) in self.groups.iter_mut().zip(&mut self.p) {
             group.solution.fill(Increments::default());
             p.copy_from_slice(&group.z);
@@ -96,7 +96,7 @@ impl System {
         let target = tolerance * tolerance * rz;
         let mut iterations = 1;
         loop {
-            let p_k_p = self.multiply() + dot(&tip_p, &tip_b_p);
+            let p_k_p = self.multiply() + tip_p.dot(tip_b_p);
             if p_k_p.is_nan() || p_k_p <= 0.0 {
                 return if rz == 0.0 {
                     Solved::Yes(iterations)
@@ -106,10 +106,8 @@ impl System {
             }
             let alpha = rz / p_k_p;
             self.advance(alpha);
-            for c in 0..3 {
-                tip_solution[c] += alpha * tip_p[c];
-                tip_residual[c] -= alpha * tip_b_p[c];
-            }
+            tip_solution += alpha * tip_p;
+            tip_residual -= alpha * tip_b_p;
             let rz_next;
             (tip_z, rz_next) = self.precondition(tip_residual);
             if rz_next <= target {
@@ -121,10 +119,8 @@ impl System {
             iterations += 1;
             let beta = rz_next / rz;
             rz = rz_next;
-            for c in 0..3 {
-                tip_p[c] = tip_z[c] + beta * tip_p[c];
-                tip_b_p[c] = tip_residual[c] + beta * tip_b_p[c];
-            }
+            tip_p = tip_z + beta * tip_p;
+            tip_b_p = tip_residual + beta * tip_b_p;
             self.update_direction(beta);
         }
         if self.joined {
@@ -137,7 +133,7 @@ impl System {
     }
 
     /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
-    fn set_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> [f64; 3] {
+    fn set_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> DVec3 {
         let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
         each_group(self.parallel, &mut self.groups, |g, group| {
             group.residual.copy_from_slice(&group.rhs);
@@ -154,7 +150,7 @@ impl System {
                 }
             }
         });
-        let mut tip_residual = [0.0; 3];
+        let mut tip_residual = DVec3::ZERO;
         if joined {
             for group in &mut self.groups {
                 let last = group.residual.last_mut().expect("a rod has a segment");
@@ -169,7 +165,7 @@ impl System {
 
     /// z = B^-1 residual, including the tip's displacement in every rod's last slot; returns
     /// that displacement and residual . z over all unknowns.
-    fn precondition(&mut self, tip_residual: [f64; 3]) -> ([f64; 3], f64) {
+    fn precondition(&mut self, tip_residual: DVec3) -> (DVec3, f64) {
         let (last, arch) = (self.segments - 1, self.arch);
         each_group(self.parallel, &mut self.groups, |_, group| {
             group.matrix.forward(arch, &group.residual, &mut group.z);
@@ -193,7 +189,7 @@ impl System {
         });
         let tip = tip.unwrap_or_default();
         let product = self.groups.iter().map(|group| group.partial).sum::<f64>();
-        (tip, product + dot(&tip_residual, &tip))
+        (tip, product + tip_residual.dot(tip))
     }
 
     /// p . (B + E) p without the contribution of the tip.
@@ -285,7 +281,7 @@ impl System {
 }
 
 /// Writes the displacement of a joint tip.
-fn set_tip(last: &mut Increments, tip: [f64; 3], active: &Four) {
+fn set_tip(last: &mut Increments, tip: DVec3, active: &Four) {
     for c in 0..3 {
         last[3 + c] = Four(active.0.map(|active| active * tip[c]));
     }

@@ -3,9 +3,9 @@
 use super::Explicit;
 use crate::leaf::State;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::kernel::{Forces, Layout};
-use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
-use crate::motion::nodes::vector;
+use crate::motion::kernel::Forces;
+use crate::motion::method::{Method, Snapshot, Stopped, Velocity, pass_count};
+use crate::motion::nodes::{Pack, vector};
 use glam::DVec3;
 
 /// Part of a step below which differences of time are rounding.
@@ -19,11 +19,10 @@ const BENDING_CHECKED: usize = 200;
 const ENERGY_CHECKED: usize = 2000;
 
 impl Explicit {
-    /// Forces of all segments at the present positions, rod by rod. Strains
-    /// are stored as those of the last step if `remember`.
-    pub(super) fn forces(&mut self, remember: bool) -> Vec<DVec3> {
+    /// Positions, rotations and segment forces.
+    pub fn now(&mut self) -> State {
         let rest = self.physics.rest(self.stepped);
-        let (law, layout) = (self.law(rest, remember), self.layout);
+        let (law, layout) = (self.law(rest, false), self.layout);
         let mut forces = Vec::with_capacity(layout.rods * layout.segments);
         for (p, pack) in self.packs.iter_mut().enumerate() {
             self.arch.dispatch(Forces {
@@ -37,13 +36,8 @@ impl Explicit {
                 forces: &mut forces,
             });
         }
-        forces.into_iter().map(DVec3::from).collect()
-    }
-
-    /// Positions, rotations and segment forces.
-    pub fn now(&mut self) -> State {
         let mut state = self.state();
-        state.n = self.forces(false);
+        state.n = forces.into_iter().map(DVec3::from).collect();
         state
     }
 
@@ -55,12 +49,13 @@ impl Explicit {
         State::new(n, x.collect(), q.collect())
     }
 
-    fn judge(&mut self) -> Result<(), Stopped> {
+    /// The present state, if the motion is reliable in it.
+    fn judged(&mut self) -> Result<Snapshot, Stopped> {
         let now = self.snapshot();
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
-        self.last_snapshot = Some(now);
         // In the balance rotations are at most pi, as in space.
-        resolved(&self.leaf, self.time, self.largest_turn())
+        resolved(&self.leaf, self.time, self.largest_turn())?;
+        Ok(now)
     }
 }
 
@@ -73,7 +68,7 @@ impl Method for Explicit {
         self.steps
     }
 
-    fn advance(&mut self, until: f64) -> Result<(), Stopped> {
+    fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         let h = self.step;
         loop {
             // Times are multiples of the step, so that rounding does not accumulate.
@@ -87,19 +82,14 @@ impl Method for Explicit {
             (self.stepped, self.time) = (next, next);
             let suspect = self.steps.is_multiple_of(BENDING_CHECKED) && !self.trusted();
             if suspect || self.steps.is_multiple_of(ENERGY_CHECKED) {
-                self.judge()?;
+                self.judged()?;
             }
         }
         self.time = until.max(self.time);
-        self.judge()
+        self.judged()
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        if let Some(last) = self.last_snapshot.take()
-            && last.time == self.time
-        {
-            return last;
-        }
         let packs = self.packs.iter();
         let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
         let path = (self.positions.clone(), moving);
@@ -130,55 +120,17 @@ impl Method for Explicit {
         }
     }
 
-    fn save(&self) -> Vec<f64> {
-        // How the arrays are laid out, by which others are recognised.
-        let Layout { stride, pack, .. } = self.layout;
-        let mut numbers = vec![
-            stride as f64,
-            pack as f64,
-            self.stepped,
-            self.time,
-            self.steps as f64,
-            self.begin.0,
-            self.begin.1 as f64,
-            self.widths[0],
-            self.widths[1],
-        ];
-        numbers.extend(self.work.save());
-        numbers.extend(self.balance.save());
-        let moving = self.packs.iter().flat_map(|pack| pack.moving_arrays());
-        numbers.extend(
-            self.positions
-                .iter()
-                .chain(moving)
-                .flat_map(|array| array.iter()),
-        );
-        numbers
-    }
-
-    fn restore(&mut self, numbers: &[f64]) -> bool {
-        let own = self.save();
-        if numbers.len() != own.len() || numbers[..2] != own[..2] {
-            return false;
-        }
-        let mut numbers = numbers[2..].iter().copied();
-        let mut next = || numbers.next().unwrap_or_default();
-        self.stepped = next();
-        self.time = next();
-        self.steps = next() as usize;
-        self.begin = (next(), next() as usize);
-        self.widths = [next(), next()];
-        self.work.restore(&mut next);
-        self.balance.restore(&mut next);
-        self.last_snapshot = None;
-        let moving = self
-            .packs
-            .iter_mut()
-            .flat_map(|pack| pack.moving_arrays_mut());
+    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        each(&mut self.stepped);
+        each(&mut self.time);
+        pass_count(&mut self.steps, each);
+        each(&mut self.begin.0);
+        pass_count(&mut self.begin.1, each);
+        self.widths.iter_mut().for_each(&mut *each);
+        self.work.each_number(each);
+        self.balance.each_number(each);
+        let moving = self.packs.iter_mut().flat_map(Pack::moving_arrays);
         let arrays = self.positions.iter_mut().chain(moving);
-        for value in arrays.flat_map(|array| array.iter_mut()) {
-            *value = next();
-        }
-        true
+        arrays.flat_map(|array| array.iter_mut()).for_each(each);
     }
 }

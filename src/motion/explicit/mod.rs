@@ -26,7 +26,7 @@ use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
 use super::friction::rates;
 use super::kernel::{self, Array, Block, Law, Layout, Step};
-use super::method::{Method, Snapshot};
+use super::method::Method;
 use super::nodes::{self, Pack, vector};
 use super::physics::Physics;
 use super::stable::StableStep;
@@ -78,9 +78,6 @@ pub struct Explicit {
     widths: [f64; 2],
     balance: EnergyBalance,
     work: VaryingWork,
-    /// The last snapshot, until the leaf moves or is changed: after a check
-    /// it is often needed.
-    last_snapshot: Option<Snapshot>,
     parallel: bool,
 }
 
@@ -125,7 +122,6 @@ impl Explicit {
             widths: [0.0; 2],
             balance: EnergyBalance::default(),
             work: VaryingWork::new(&leaf, &physics),
-            last_snapshot: None,
             parallel: layout.packs() > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
@@ -133,11 +129,6 @@ impl Explicit {
             physics,
         };
         explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
-        explicit.forces(true);
-        for pack in &mut explicit.packs {
-            // At rest earlier strains equal the present ones.
-            pack.past.two = pack.past.one.clone();
-        }
         let start = explicit.snapshot();
         explicit.balance.begin(&start);
         Ok(explicit)
@@ -168,7 +159,6 @@ impl Explicit {
 
     /// Sets all velocities to zero.
     pub fn stop(&mut self) {
-        self.last_snapshot = None;
         for pack in &mut self.packs {
             for array in pack.motion.v.iter_mut().chain(&mut pack.motion.p) {
                 array.fill(0.0);
@@ -179,7 +169,6 @@ impl Explicit {
 
     /// Sets the decay rate of all velocities from now on.
     pub fn set_damping(&mut self, rate: f64) {
-        self.last_snapshot = None;
         self.physics.damping = rate;
     }
 
@@ -224,7 +213,6 @@ impl Explicit {
     }
 
     fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
-        self.last_snapshot = None;
         let exchange = self.kick(0.5 * h, h, true);
         self.widths = [h, self.widths[0]];
         self.stepped += h;

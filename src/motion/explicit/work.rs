@@ -57,12 +57,9 @@ impl VaryingWork {
         work
     }
 
-    pub(super) fn save(&self) -> [f64; 2] {
-        [self.half_impulse, self.turned]
-    }
-
-    pub(super) fn restore(&mut self, next: &mut impl FnMut() -> f64) {
-        [self.half_impulse, self.turned] = [next(), next()];
+    pub(super) fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        each(&mut self.half_impulse);
+        each(&mut self.turned);
     }
 }
 

@@ -23,7 +23,7 @@ impl SemiImplicit {
     /// Initialises the forces of the segments and the accelerations of the nodes.
     pub(super) fn initialise(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, INVERSE_STEP_SQUARED);
-        let violation = self.set_segment_forces();
+        let violation = self.leaf.strain_forces(&mut self.state);
         if self.leaf.stiffest() > 0.0 {
             return self.set_accelerations();
         }
@@ -34,12 +34,12 @@ impl SemiImplicit {
                 std::mem::swap(&mut self.state, &mut self.trial);
             }
             let forces = self.state.n.clone();
-            if self.set_segment_forces() < STRAINED {
+            if self.leaf.strain_forces(&mut self.state) < STRAINED {
                 self.state.n = forces;
             } else {
                 self.state = strained;
                 self.close();
-                self.set_segment_forces();
+                self.leaf.strain_forces(&mut self.state);
             }
         }
         match self.first_step() {
@@ -52,23 +52,6 @@ impl SemiImplicit {
             }
             false => self.set_accelerations(),
         }
-    }
-
-    /// Sets the force of every segment to that of its strain, and of a rigid one to
-    /// zero. Returns the largest strain of rigid ones, as a length.
-    fn set_segment_forces(&mut self) -> f64 {
-        let (n, mut violation) = (self.leaf.segments(), 0.0_f64);
-        for (j, i) in self.leaf.each(0..n) {
-            let section = self.leaf.section(j, i);
-            let idle = self.leaf.segment(&self.state, j, i, DVec3::ZERO);
-            let strain = idle.v(section) - section.rest_strain;
-            let rigid = section.compliance.cmpeq(DVec3::ZERO);
-            let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
-            self.state.n[j * n + i] = idle.frame * force;
-            let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
-            violation = violation.max(off.abs().max_element());
-        }
-        violation
     }
 
     /// A first step, into the trial; false if it failed.

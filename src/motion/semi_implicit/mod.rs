@@ -24,7 +24,7 @@ mod lag;
 mod step;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};
-use super::method::{Method, Snapshot, Stopped, Velocity};
+use super::method::{Method, Snapshot, Stopped, Velocity, pass_count};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, Loads, SparsePattern, State, System};
 use crate::newton::Definite;
@@ -262,14 +262,15 @@ impl Method for SemiImplicit {
         self.count
     }
 
-    fn advance(&mut self, until: f64) -> Result<(), Stopped> {
+    fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         while self.time < until {
             // Within a step loads are linear in time: no pulse is stepped over.
             let knot = self.physics.next_knot(self.time);
             self.step_towards(until.min(knot))?;
         }
         let now = self.snapshot();
-        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
+        Ok(now)
     }
 
     fn snapshot(&mut self) -> Snapshot {
@@ -288,54 +289,32 @@ impl Method for SemiImplicit {
         }
     }
 
-    fn save(&self) -> Vec<f64> {
-        let mut numbers = vec![
-            self.time,
-            self.count as f64,
-            self.step,
-            self.past_step,
-            self.friction_power,
-            f64::from(u8::from(self.solver.direct.is_some())),
-        ];
-        numbers.extend(self.balance.save());
-        numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
-        numbers.extend(self.state.q.iter().flat_map(|q| q.to_array()));
-        numbers.extend(self.state.n.iter().flat_map(|n| n.to_array()));
-        let moving = self.moving.iter().flat_map(|m| [m.v, m.a, m.w]);
-        let past = self.past.iter().flatten().copied();
-        numbers.extend(moving.chain(past).flatten().flat_map(|v| v.to_array()));
-        numbers
-    }
-
-    fn restore(&mut self, numbers: &[f64]) -> bool {
-        if numbers.len() != self.save().len() {
-            return false;
-        }
-        let mut numbers = numbers.iter().copied();
-        let mut next = || numbers.next().unwrap_or_default();
-        self.time = next();
-        self.count = next() as usize;
-        self.step = next();
-        self.past_step = next();
-        self.friction_power = next();
-        let direct = next() == 1.0;
-        self.balance.restore(&mut next);
-        let vector = |next: &mut dyn FnMut() -> f64| DVec3::new(next(), next(), next());
-        for x in &mut self.state.x {
-            *x = vector(&mut next);
-        }
-        for q in &mut self.state.q {
-            *q = DQuat::from_xyzw(next(), next(), next(), next());
+    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        each(&mut self.time);
+        pass_count(&mut self.count, each);
+        each(&mut self.step);
+        each(&mut self.past_step);
+        each(&mut self.friction_power);
+        let mut direct = f64::from(u8::from(self.solver.direct.is_some()));
+        each(&mut direct);
+        self.balance.each_number(each);
+        let State { x, q, n, .. } = &mut self.state;
+        x.iter_mut().flat_map(<_>::as_mut).for_each(&mut *each);
+        for q in q {
+            let mut numbers = q.to_array();
+            numbers.iter_mut().for_each(&mut *each);
+            *q = DQuat::from_array(numbers);
         }
         let moving = (self.moving.iter_mut()).flat_map(|m| [&mut m.v, &mut m.a, &mut m.w]);
         let past = self.past.iter_mut().flatten();
-        for v in self.state.n.iter_mut().chain(moving.chain(past).flatten()) {
-            *v = vector(&mut next);
-        }
+        let vectors = n.iter_mut().chain(moving.chain(past).flatten());
+        vectors.flat_map(<_>::as_mut).for_each(each);
         // Results depend on the present solver in the last digits.
-        self.leaf.assemble(&self.state, &mut self.system);
-        let pattern = direct.then(|| SparsePattern::new(&self.system).ok());
-        self.solver.direct = pattern.flatten();
-        true
+        if direct == 0.0 {
+            self.solver.direct = None;
+        } else if self.solver.direct.is_none() {
+            self.leaf.assemble(&self.state, &mut self.system);
+            self.solver.direct = SparsePattern::new(&self.system).ok();
+        }
     }
 }

@@ -13,7 +13,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::limit::Limit;
-use crate::motion::{Explicit, Method, Physics, Stopped};
+use crate::motion::{Explicit, Method, Physics, Snapshot, Stopped};
 use crate::newton::{Stop, Work};
 use crate::relax::options::RelaxError;
 use crate::relax::saddle;
@@ -117,8 +117,7 @@ fn find_valley(
 ) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
-        move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
-        let now = motion.snapshot();
+        let now = move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
         let shift = leaf.neutral_shift();
@@ -138,16 +137,22 @@ fn find_valley(
 
 /// Moves to the time of the next check. On fine grids of stiff rods that takes long: if there
 /// is a time limit, it is checked in between.
-fn move_to_next_check(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Result<(), Stop> {
+fn move_to_next_check(
+    motion: &mut Explicit,
+    nodes: usize,
+    limit: &Limit,
+) -> Result<Snapshot, Stop> {
     let begin = motion.time();
     let steps = STEPS_PER_PIECE.min((NODES_PER_PIECE / nodes as f64).max(1.0));
     let pieces = match limit.is_none() {
         false => (CHECK_INTERVAL / (steps * motion.longest_step())).ceil(),
         true => 1.0,
     };
-    for piece in 1..=pieces as usize {
-        motion
-            .advance(begin + CHECK_INTERVAL * (piece as f64 / pieces))
+    let mut piece = 0.0;
+    loop {
+        piece += 1.0;
+        let now = motion
+            .advance(begin + CHECK_INTERVAL * (piece / pieces))
             .map_err(|stopped| match stopped {
                 Stopped::Unresolved { .. } => Stop::Unresolved,
                 _ => Stop::Stuck,
@@ -155,8 +160,10 @@ fn move_to_next_check(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Res
         if limit.reached() {
             return Err(Stop::StepLimit);
         }
+        if piece >= pieces {
+            return Ok(now);
+        }
     }
-    Ok(())
 }
 
 /// Descends to the minimum; returns the remaining distance.

@@ -163,7 +163,6 @@ impl Relaxation<'_> {
         let mut motion = Motion::new(leaf);
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let mut stalled = Stalled::default();
-        let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
         for step in 0..MAX_STEPS {
@@ -171,7 +170,7 @@ impl Relaxation<'_> {
                 break;
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
-            self.solve_shortening(leaf, space.as_ref(), system, &mut motion, tolerance)?;
+            self.solve_shortening(leaf, system, &mut motion, tolerance)?;
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
             let part = (MAX_TURN / turn)
@@ -243,12 +242,11 @@ impl Relaxation<'_> {
     fn solve_shortening(
         &mut self,
         leaf: &DiscreteLeaf,
-        space: Option<&DiscreteLeaf>,
         system: &mut System,
         motion: &mut Motion,
         tolerance: f64,
     ) -> Result<(), Stop> {
-        while !self.solve(leaf, space, system, motion, tolerance) {
+        while !self.solve(leaf, system, motion, tolerance) {
             if motion.resting {
                 return Err(Stop::Saddle);
             }
@@ -266,7 +264,6 @@ impl Relaxation<'_> {
     fn solve(
         &mut self,
         leaf: &DiscreteLeaf,
-        space: Option<&DiscreteLeaf>,
         system: &mut System,
         motion: &Motion,
         tolerance: f64,
@@ -275,8 +272,6 @@ impl Relaxation<'_> {
             Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
             None => (leaf.neutral_shift(), None),
         };
-        let (solver, work) = (&mut self.solver, &mut *self.work);
-        solver.convex_in_space(space, &self.state, shift, work)
-            && solver.solve(system, shift, inertia, tolerance, work)
+        (self.solver).solve(system, shift, inertia, tolerance, self.work)
     }
 }

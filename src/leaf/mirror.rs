@@ -6,14 +6,23 @@
 //! plane, too. Of the gap across the plane, if N is even, only the coupling along y is ever
 //! stretched.
 
-use crate::leaf::dimensionless::Leaf;
-use crate::leaf::flow::RodFields;
-use crate::leaf::state::State;
+use super::dimensionless::Leaf;
+use super::flow::RodFields;
+use super::state::State;
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
 
+impl Leaf {
+    /// Half of the leaf, if it is its own mirror image and its tip is not held.
+    pub fn half(&self) -> Option<Leaf> {
+        let mut half = self.clone();
+        half.mirrored = self.held.is_none() && is_mirrored(self.scenario());
+        half.mirrored.then_some(half)
+    }
+}
+
 /// Whether every rod, coupling and load is its own mirror image.
-pub fn is_mirrored(scenario: &Scenario) -> bool {
+fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
         coupling,
@@ -111,4 +120,58 @@ fn turned(q: DQuat, image: bool) -> DQuat {
 
 fn reflect(v: DVec3, image: bool) -> DVec3 {
     if image { DVec3::new(v.x, -v.y, v.z) } else { v }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAF: &str = r#"
+        name = "leaf"
+        leaf = { rods = 5, length = [0.9, 1.0, 1.1, 1.0, 0.9], fan = "symmetric" }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+        rest = { twist = [0.1, 0.2, 0.0, -0.2, -0.1], bend_2 = 0.3 }
+        coupling = { y = [1.0, 2.0, 2.0, 1.0] }
+        load = { gravity = [0.1, 0.0, -1.0] }
+    "#;
+
+    /// Whether this leaf has a half, and lies in a plane.
+    fn symmetries(entries: &[&str]) -> (bool, bool) {
+        let entries: Vec<_> = entries.iter().map(|&entry| entry.into()).collect();
+        let scenario = Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap();
+        let leaf = Leaf::new(&scenario);
+        (leaf.half().is_some(), leaf.is_planar())
+    }
+
+    #[test]
+    fn mirrored_leaves_are_known() {
+        for entry in [
+            "name='same'",
+            "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.2]",
+            "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]",
+        ] {
+            assert_eq!(symmetries(&[entry]), (true, false), "{entry}");
+        }
+        let others = "leaf.fan='paper'; leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]; rest.twist=0.1; \
+            stiffness.axial=[1, 2, 3, 2, 2]; rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.0]; \
+            rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]; rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]; \
+            coupling.z=[1.0, 2.0, 2.0, 3.0]; load.gravity=[0.0, 1e-9, -1.0]; \
+            load.tip_force=[0.0, 1.0, 0.0]";
+        for entry in others.split("; ") {
+            assert_eq!(symmetries(&[entry]), (false, false), "{entry}");
+        }
+    }
+
+    #[test]
+    fn planar_leaves_are_known() {
+        for entry in [
+            "load.tip_force=[1.0, -2.0, 0.0]",
+            "rest.bend_3=[1.0, 2.0, -3.0, 0.0, 1.0]",
+            "rest.stretch=[1.0, 1.1, 1.0, 1.0, 1.2]",
+        ] {
+            let load = "load.gravity=[1.0, -2.0, 0.0]";
+            let flat = symmetries(&["rest.twist=0", "rest.bend_2=0", load, entry]);
+            assert_eq!(flat, (false, true), "{entry}");
+        }
+    }
 }
