@@ -195,7 +195,7 @@ impl Grid<'_> {
         };
         let modes = modes.unwrap_or_default();
         // In the scenario's unit of time, as their derivatives are.
-        let squared = |mode: &modes::LoadedMode| mode.eigenvalue / physics.time.powi(2);
+        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
         if forces.len() > MOST_DIRECT && modes.is_empty() && moment == DVec3::ZERO && !held {
