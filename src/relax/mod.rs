@@ -5,7 +5,6 @@ mod correction;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
-mod fields;
 mod follow;
 mod grids;
 mod grip;
