@@ -54,8 +54,7 @@ impl AtRest {
         scenario: &Scenario,
         options: &Options,
     ) -> Result<Result<(AtRest, Equilibrium), Lost>, RelaxError> {
-        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let (leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |_| {})?;
+        let (leaf, levels) = relax_on_grids(scenario, options, false, &mut |_| {})?;
         if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
             let remark = leaf.remark.clone();
             let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
