@@ -36,7 +36,7 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
     }
 }
 
-fn wanted<'a>(count: usize, time: &'a Limit, near: &'a [modes::Eigenpair]) -> modes::Wanted<'a> {
+fn wanted<'a>(count: usize, time: &'a Limit, near: &'a [Vec<[f64; 6]>]) -> modes::Wanted<'a> {
     modes::Wanted {
         count,
         accuracy: 1e-7,
@@ -54,13 +54,13 @@ fn where_the_search_begins_does_not_matter() {
     let leaf = Leaf::new(&veins);
     let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
     let time = Limit::default();
-    let lowest = |count, near: &[_]| {
+    let lowest = |count, near: &[Vec<[f64; 6]>]| {
         modes::lowest(&grid, &physics, &state, wanted(count, &time, near)).unwrap()
     };
     let many = lowest(12, &[]);
-    let highest: Vec<_> = many[8..].to_vec();
-    let alike = vec![many[1].clone(); 4];
-    for near in [&many[..4], &many[2..4], &highest, &alike] {
+    let shapes: Vec<_> = many.iter().map(|pair| pair.shape.clone()).collect();
+    let alike = vec![shapes[1].clone(); 4];
+    for near in [&shapes[..4], &shapes[2..4], &shapes[8..], &alike] {
         for (found, plain) in lowest(4, near).iter().zip(&many) {
             let off = found.eigenvalue / plain.eigenvalue - 1.0;
             assert!(off.abs() < 1e-10, "{off:e}");

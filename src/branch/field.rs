@@ -1,7 +1,7 @@
 //! Linear algebra on fields of nodal increments and forces.
 
 use crate::leaf::{Field, Increment, State};
-use crate::relax::predict::Polynomial;
+use crate::relax::Stencil;
 
 /// The work of forces on increments.
 pub fn dot(forces: &Field, increments: &Field) -> f64 {
@@ -89,7 +89,7 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
         }
         // Four neighbouring nodes; at the ends, the nearest four.
         let mut sum = [0.0; 6];
-        for (i, weight) in Polynomial::<4>::new(0, n + 1, k as f64 / 2.0).terms() {
+        for (i, weight) in Stencil::<4>::new(0, n + 1, k as f64 / 2.0).terms() {
             let value = at(i);
             for c in 0..6 {
                 sum[c] += weight * value[c];

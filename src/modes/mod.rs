@@ -22,11 +22,12 @@ mod quotient;
 use crate::leaf::{DiscreteLeaf, Increment, SparseFactor, SparsePattern, State, System};
 use crate::limit::Limit;
 use crate::motion::Physics;
+use glam::DVec3;
 use lanczos::{Lanczos, Mode};
-pub use loaded::{LoadedMode, eigenvalue, loaded};
+pub use loaded::{eigenvalue, loaded};
 use masses::Masses;
-use quotient::quotient;
 pub use quotient::rounding;
+use quotient::{forces, quotient};
 
 /// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, since a
 /// larger one loses digits. The eigenvalues do not change to first order.
@@ -63,6 +64,8 @@ pub struct Eigenpair {
     pub eigenvalue: f64,
     /// Turns and shifts of all nodes, rod after rod, base to tip.
     pub shape: Vec<Increment>,
+    /// The spatial forces that it causes in the segments, rod by rod.
+    pub forces: Vec<DVec3>,
 }
 
 /// Request for the modes of a leaf.
@@ -72,9 +75,9 @@ pub struct Wanted<'a> {
     pub count: usize,
     /// Accuracy of eigenvectors; the error of an eigenvalue is its square.
     pub accuracy: f64,
-    /// Approximate modes, from the same grid in a shape nearby or interpolated from another grid:
-    /// the search begins with them.
-    pub near: &'a [Eigenpair],
+    /// Shapes of approximate modes, from the same grid in a shape nearby or interpolated from
+    /// another grid: the search begins with them.
+    pub near: &'a [Vec<Increment>],
     /// Time limit, beyond which nothing is returned.
     pub time: &'a Limit,
 }
@@ -117,13 +120,17 @@ fn of_softened(
         wanted,
         near: Vec::new(),
     };
-    let near = wanted.near.iter().map(|near| vibration.vector(&near.shape));
+    let near = wanted.near.iter().map(|near| vibration.vector(near));
     vibration.near = near.collect();
     let found = vibration.lowest(&mut system)?;
     let pair = |vector: &Vec<f64>| {
         let shape = vibration.shape(vector);
-        let eigenvalue = quotient(soft, state, &shape);
-        Eigenpair { eigenvalue, shape }
+        let forces = forces(soft, state, &shape);
+        Eigenpair {
+            eigenvalue: quotient(soft, state, &shape, &forces),
+            shape,
+            forces,
+        }
     };
     let mut pairs: Vec<Eigenpair> = found.iter().map(pair).collect();
     pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));

@@ -11,30 +11,6 @@ pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
     4.0 * f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
 }
 
-/// Rayleigh quotient of a shape of unit mass, in mixed form: with the forces
-/// that the shape causes in the segments as independent variables. Errors of the
-/// shape or of these forces, from rounding or from the stiffness with which the forces were
-/// condensed out, have only a second-order effect; and no large
-/// stiffness enters.
-pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 {
-    let n = leaf.segments();
-    let mut sum = 0.0;
-    for j in 0..leaf.rods() {
-        for i in 0..n {
-            let segment = leaf.segment(state, j, i, state.n[j * n + i]);
-            let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
-            sum += of_segment(segment, leaf.section(j, i), a, b);
-        }
-        for i in 1..=n {
-            if j + 1 < leaf.rods() {
-                let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
-                sum += (b - a).dot(leaf.spring(j, i) * (b - a));
-            }
-        }
-    }
-    sum
-}
-
 /// The spatial forces that a shape causes in the segments.
 pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
     let n = leaf.segments();
@@ -47,14 +23,12 @@ pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DV
     leaf.each(0..n).map(force).collect()
 }
 
-/// The quotient of a shape with given forces, for a leaf and a state near those they belong to:
-/// errors of both have only a second-order effect.
-pub fn with_forces(
-    leaf: &DiscreteLeaf,
-    state: &State,
-    shape: &[Increment],
-    forces: &[DVec3],
-) -> f64 {
+/// Rayleigh quotient of a shape of unit mass, in mixed form: with the [`forces`] that the shape
+/// causes in the segments as independent variables. Errors of the shape or of these forces,
+/// from rounding or from the stiffness with which the forces were condensed out, have only a
+/// second-order effect; and no large stiffness enters. The leaf and the state may be near those
+/// to which both belong.
+pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces: &[DVec3]) -> f64 {
     let n = leaf.segments();
     let mut sum = 0.0;
     for (j, i) in leaf.each(0..n) {
@@ -78,15 +52,4 @@ pub fn with_forces(
 fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
     let k = at_constant_force(segment, section);
     a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b)
-}
-
-/// The part of a segment with the increments `a` and `b` of its nodes.
-fn of_segment(mut segment: Segment, section: &Section, a: &Increment, b: &Increment) -> f64 {
-    let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
-    // The residual strain of the equilibrium is not part of the mode.
-    segment.gap = DVec3::ZERO;
-    let force = segment.force_increment(section, dx, a, b);
-    let force = segment.frame.transpose() * force;
-    let compliance = 2.0 * section.condensing.recip() - section.compliance;
-    section.ds * (compliance * force * force).element_sum() + turns(&segment, section, a, b)
 }

@@ -27,8 +27,8 @@ pub struct Tangents<'a> {
 pub struct Response {
     /// Displacements and rotations of all nodes but the bases.
     solution: Field,
-    at_ends: f64,
-    between: f64,
+    /// The largest displacements at the ends of the parts, and on either side of the midpoints.
+    pub largest: [f64; 2],
 }
 
 impl<'a> Tangents<'a> {
@@ -68,8 +68,7 @@ impl<'a> Tangents<'a> {
         }
         Some(Response {
             solution,
-            at_ends,
-            between,
+            largest: [at_ends, between],
         })
     }
 
@@ -137,11 +136,6 @@ impl<'a> Tangents<'a> {
 }
 
 impl Response {
-    /// The largest displacements at the ends of the parts, and on either side of the midpoints.
-    pub fn largest(&self) -> [f64; 2] {
-        [self.at_ends, self.between]
-    }
-
     /// Displacement and rotation of node `i` of rod `j`.
     fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
         match i {

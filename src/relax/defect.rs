@@ -107,12 +107,7 @@ pub fn estimate(
         let Some(response) = tangents.response(system, &integrated.jumps) else {
             break;
         };
-        let round = Round {
-            known: known.clone(),
-            integrated,
-            largest: response.largest(),
-        };
-        let largest = larger(round.largest[0], round.largest[1]);
+        let largest = larger(response.largest[0], response.largest[1]);
         steps.measure(largest);
         // With halved steps the error includes that of the longer ones: its ratio is no measure
         // of the contraction.
@@ -126,25 +121,29 @@ pub fn estimate(
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
         let out_of_reach = largest * contraction.powi(rounds_left) > enough;
         if corrections == 0 && (largest <= enough || out_of_reach) {
-            return Some(round.estimate(0, 0.0, finest));
+            return Some(integrated.estimate(&known, response.largest, finest));
         }
         if out_of_reach {
             break;
         }
-        let changes = tangents.changes(&response, &round.integrated.jumps);
+        let changes = tangents.changes(&response, &integrated.jumps);
         if corrections == 0 {
-            uncorrected = Some(round);
+            uncorrected = Some(integrated.estimate(&known, response.largest, finest));
         } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
-                return Some(round.estimate(corrections, steps.error, finest));
+                let errors = response.largest.map(|error| error + steps.error);
+                return Some(Estimate {
+                    corrections,
+                    ..integrated.estimate(&known, errors, finest)
+                });
             }
         }
         apply(&changes, &mut known);
         before = largest;
         steps.choose(largest * contraction, enough);
     }
-    uncorrected.map(|round| round.estimate(0, 0.0, finest))
+    uncorrected
 }
 
 /// The steps of the integration from a node to a midpoint.
@@ -187,34 +186,6 @@ impl Steps {
         self.halved = unknown && expected <= enough;
         if self.halved {
             self.count *= 2;
-        }
-    }
-}
-
-/// A leaf given at the nodes between its parts, integrated along its rods, with its largest
-/// errors at these nodes and at the midpoints between them.
-struct Round {
-    known: Vec<Vec<RodFields>>,
-    integrated: Integrated,
-    largest: [f64; 2],
-}
-
-impl Round {
-    /// The leaf on the `finest` grid, or on the refined one that has the ends of all steps;
-    /// `error` is that of the integration.
-    fn estimate(&self, corrections: usize, error: f64, finest: &Grid) -> Estimate {
-        let rods = self.integrated.rods(&self.known);
-        let mut grid = finest.clone();
-        while grid.segments() + 1 < rods[0].len() {
-            grid = grid.refined();
-        }
-        Estimate {
-            at_nodes: self.largest[0] + error,
-            between: self.largest[1] + error,
-            rods,
-            energy: self.integrated.energy,
-            grid,
-            corrections,
         }
     }
 }
@@ -284,6 +255,29 @@ fn at_midpoint(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
 }
 
 impl Integrated {
+    /// An uncorrected leaf with its largest errors at the nodes from which it was integrated and
+    /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
+    fn estimate(
+        &self,
+        known: &[Vec<RodFields>],
+        [at_nodes, between]: [f64; 2],
+        finest: &Grid,
+    ) -> Estimate {
+        let rods = self.rods(known);
+        let mut grid = finest.clone();
+        while grid.segments() + 1 < rods[0].len() {
+            grid = grid.refined();
+        }
+        Estimate {
+            at_nodes,
+            between,
+            rods,
+            energy: self.energy,
+            grid,
+            corrections: 0,
+        }
+    }
+
     /// All rods at the ends of all steps from `known`; at midpoints the mean of the two sides.
     fn rods(&self, known: &[Vec<RodFields>]) -> Vec<Vec<RodFields>> {
         let rod = |(j, known): (usize, &Vec<RodFields>)| {
@@ -370,8 +364,11 @@ mod tests {
     fn every_round_leaves_a_small_part() {
         for axial in ["inf", "100.0"] {
             let leaf = Scenario::from_toml(&LEAF.replace("AXIAL", axial)).unwrap();
-            let (_, levels) =
-                relax_on_grids(&leaf, &Options::default(), 1e-3, &mut |_| {}).unwrap();
+            let options = Options {
+                tolerance: Some(1e-3),
+                ..Options::default()
+            };
+            let (_, levels) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
             let (mut linear, mut work) = (None, Work::default());
             let mut estimated = |enough, most| {
                 let systems = (&mut linear, &mut None);

@@ -5,6 +5,7 @@ use crate::leaf::{Leaf, Response, State};
 use crate::newton::{Stop, Work};
 use crate::relax::level::{Level, positions};
 use crate::relax::options::{Options, Progress, RelaxError};
+use crate::relax::predict::weights;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
 use crate::relax::solve::relax_on_grids;
@@ -53,8 +54,7 @@ impl AtRest {
         scenario: &Scenario,
         options: &Options,
     ) -> Result<Result<(AtRest, Equilibrium), Lost>, RelaxError> {
-        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let (leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |_| {})?;
+        let (leaf, levels) = relax_on_grids(scenario, options, false, &mut |_| {})?;
         if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
             let remark = leaf.remark.clone();
             let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
@@ -70,8 +70,11 @@ impl AtRest {
             (own, positions(level, (own / segments[0]).max(1)))
         };
         let table: Richardson = levels.iter().map(on).collect();
+        let first = segments.len() - 1 - table.columns();
+        let mut extrapolation = vec![0.0; first];
+        extrapolation.extend(weights(&segments[first..], f64::INFINITY));
         AtRest {
-            weights: extrapolation(&segments, table.columns()),
+            weights: extrapolation,
             levels,
             work,
         }
@@ -139,27 +142,12 @@ impl AtRest {
             .sum()
     }
 
-    /// Interpolation stencils of each grid at the fraction `sigma`, with the derivatives of
-    /// their weights; extrapolation beyond the ends is linear.
-    pub fn stencils(&self, sigma: f64) -> Vec<Stencil> {
-        let on = |level: &Level| Stencil::new(&level.leaf, sigma);
+    /// Interpolation stencils of each grid at the fraction `sigma`, of values and of their
+    /// derivatives; extrapolation beyond the ends is linear.
+    pub fn stencils(&self, sigma: f64) -> Vec<[Stencil; 2]> {
+        let on = |level: &Level| Stencil::at(&level.leaf, sigma);
         self.levels.iter().map(on).collect()
     }
-}
-
-/// The weights of the grids in Richardson extrapolation that removes `columns` terms of the
-/// series in ds^2.
-pub(crate) fn extrapolation(segments: &[usize], columns: usize) -> Vec<f64> {
-    let first = segments.len().saturating_sub(columns + 1);
-    let squares: Vec<f64> = segments.iter().map(|&n| (n as f64).powi(2)).collect();
-    let weight = |k: usize| match k < first {
-        true => 0.0,
-        false => (first..segments.len())
-            .filter(|&other| other != k)
-            .map(|other| squares[k] / (squares[k] - squares[other]))
-            .product(),
-    };
-    (0..segments.len()).map(weight).collect()
 }
 
 /// A state of a level in the units of another leaf, with the base rotations of that leaf.

@@ -7,7 +7,7 @@
 
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::newton::{Definite, Stop};
-use crate::relax::methods::semi_implicit::Relaxation;
+use crate::relax::methods::Relaxation;
 use crate::relax::run::Run;
 use crate::relax::saddle;
 use crate::rotation;
@@ -24,75 +24,52 @@ const ACCURACY: f64 = 1e-2;
 /// Saddles that are left in a step.
 const PUSHES: i32 = 3;
 
-/// The result of moving the grips.
-pub struct GripEnd {
-    pub state: State,
-    /// Whether the leaf rests there.
-    pub at_rest: bool,
-    /// Whether its energy was not convex along the path.
-    pub moved: bool,
-}
-
 impl Run<'_, '_> {
-    /// Moves the tips from their positions in `state` to those where they are held.
-    pub fn move_grips(&mut self, leaf: &DiscreteLeaf, state: State) -> GripEnd {
-        let mut end = GripEnd {
-            state,
-            at_rest: false,
-            moved: false,
-        };
-        let Some(paths) = paths(leaf, &end.state) else {
-            return end;
+    /// Moves the tips from their positions in `state` to those where they are held. Returns the
+    /// state there, whether the leaf rests in it, and whether its energy was not convex along
+    /// the path.
+    pub fn move_grips(&mut self, leaf: &DiscreteLeaf, state: State) -> (State, bool, bool) {
+        let Some(paths) = paths(leaf, &state) else {
+            return (state, false, false);
         };
         let steps = paths.iter().map(Path::steps).fold(1.0, f64::max);
+        let keeps_unstable = self.keeps_unstable();
+        let (limit, begun) = (&self.options.limit, self.work.force_evaluations);
         let mut system = System::new(leaf);
+        let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
+        let mut held = Relaxation::new(state, ACCURACY, (&mut self.work, ignored), limit);
         for step in 1..=steps as usize {
-            if self.out_of_time() {
+            if limit.reached() {
                 break;
             }
             for (j, path) in paths.iter().enumerate() {
-                path.move_tip(leaf, j, step as f64 / steps, &mut end.state);
+                path.move_tip(leaf, j, step as f64 / steps, &mut held.state);
             }
-            end.at_rest = self.settle_held(leaf, &mut system, &mut end);
+            held.near_rest = settle_held(leaf, &mut system, &mut held, keeps_unstable);
         }
-        leaf.leaf.hold_tips(&mut end.state);
-        end
+        let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
+        self.spent += leaf.rods() * leaf.segments() * (self.work.force_evaluations - begun);
+        leaf.leaf.hold_tips(&mut state);
+        (state, near_rest, moved)
     }
+}
 
-    /// Brings the leaf roughly to rest with its tips fixed.
-    fn settle_held(&mut self, leaf: &DiscreteLeaf, system: &mut System, end: &mut GripEnd) -> bool {
-        for pushes in 0..PUSHES {
-            let mut relaxation = Relaxation {
-                state: end.state.clone(),
-                accuracy: ACCURACY,
-                work: &mut self.work,
-                progress: &mut |_, _| {},
-                near_rest: end.at_rest,
-                cg_tolerance: ACCURACY,
-                pushes,
-                solver: Definite::default(),
-                most_evaluations: usize::MAX,
-                limit: &self.options.limit,
-                convex_only: false,
-                moved: false,
-                in_time: false,
-                by_steps: false,
-                moved_softened: false,
-                load_part: 0.0,
-            };
-            let before = relaxation.work.force_evaluations;
-            let rest = relaxation.settle(leaf, system);
-            end.state = relaxation.state;
-            end.moved |= relaxation.moved;
-            let spent = relaxation.work.force_evaluations - before;
-            self.spent += leaf.rods() * leaf.segments() * spent;
-            if rest != Err(Stop::Saddle) || self.keeps_unstable() {
-                return rest.is_ok();
-            }
-            saddle::push_off(leaf, &mut end.state, system, &mut self.work);
+/// Brings the leaf roughly to rest with its tips fixed, if possible.
+fn settle_held(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    held: &mut Relaxation,
+    keeps_unstable: bool,
+) -> bool {
+    for pushes in 0..PUSHES {
+        (held.pushes, held.solver) = (pushes, Definite::default());
+        let rest = held.settle(leaf, system);
+        if rest != Err(Stop::Saddle) || keeps_unstable {
+            return rest.is_ok();
         }
-        false
+        saddle::push_off(leaf, &mut held.state, system, held.work);
     }
+    false
 }
 
 /// The path of the tip of a rod from a free start to its holder.

@@ -5,7 +5,6 @@ mod correction;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
-mod fields;
 mod follow;
 mod grids;
 mod grip;
@@ -47,7 +46,7 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
 };
-pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
+pub(crate) use follow::{AtRest, Grids, Lost};
 pub(crate) use index::{index_near, project};
 pub(crate) use level::Level;
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};

@@ -92,7 +92,7 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
         0 => SIGN_TOLERANCE,
         _ => run.tolerance,
     };
-    let on = |level: &Level, near: &[Eigenpair]| {
+    let on = |level: &Level, near: &[Vec<Increment>]| {
         let wanted = Wanted {
             count,
             accuracy: (ACCURACY * tolerance.sqrt()).max(LEAST_ACCURACY),
@@ -185,7 +185,7 @@ fn refine(
     run: &Run,
     series: &mut Series,
     mut pairs: Vec<Eigenpair>,
-    on: impl Fn(&Level, &[Eigenpair]) -> Option<Vec<Eigenpair>>,
+    on: impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
 ) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
     while finer.len() < MORE_GRIDS && !series.accurate() && !run.out_of_time() {
@@ -203,25 +203,25 @@ fn refine(
     Some(())
 }
 
-/// Modes interpolated to a finer grid.
-fn interpolated(coarse: &DiscreteLeaf, pairs: &[Eigenpair], fine: &DiscreteLeaf) -> Vec<Eigenpair> {
+/// Shapes of modes interpolated to a finer grid.
+fn interpolated(
+    coarse: &DiscreteLeaf,
+    pairs: &[Eigenpair],
+    fine: &DiscreteLeaf,
+) -> Vec<Vec<Increment>> {
     let nodes = fine.grid.sigma().iter();
-    let stencils: Vec<Stencil> = nodes.map(|&sigma| Stencil::new(coarse, sigma)).collect();
+    let stencils: Vec<_> = nodes.map(|&sigma| <Stencil>::at(coarse, sigma)).collect();
     let on_grid = |pair: &Eigenpair| {
         let rods = pair.shape.chunks(coarse.segments() + 1);
-        let node = |(rod, stencil): (&[Increment], &Stencil)| -> Increment {
+        let node = |(rod, [stencil, _]): (&[Increment], &[Stencil; 2])| -> Increment {
             let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
             let mut both = [0.0; 6];
             turn.write_to_slice(&mut both[..3]);
             shift.write_to_slice(&mut both[3..]);
             both
         };
-        Eigenpair {
-            eigenvalue: pair.eigenvalue,
-            shape: rods
-                .flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
-                .collect(),
-        }
+        rods.flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
+            .collect()
     };
     pairs.iter().map(on_grid).collect()
 }

@@ -2,12 +2,9 @@
 
 use crate::leaf::{Grid, State};
 use crate::relax::level::Level;
-use crate::relax::prolong::lagrange;
+use crate::relax::stencil::Stencil;
 use crate::rotation;
-use glam::{DQuat, DVec3};
-
-/// Largest number of points of a polynomial along a panel.
-const POINTS: usize = 7;
+use glam::DQuat;
 
 /// Segments of a panel from which on such polynomials are better than cubic Hermite
 /// interpolants.
@@ -35,20 +32,24 @@ pub fn predict(levels: &[&Level], state: &mut State) {
         }
     }
     let segments: Vec<usize> = levels.iter().map(|it| it.leaf.segments()).collect();
-    for (level, weight) in coarser.iter().zip(weights(&segments, state.segments())) {
+    for (level, weight) in coarser
+        .iter()
+        .zip(weights(&segments, state.segments() as f64))
+    {
         for panel in &panels {
             panel.add_change(weight, &level.state, &finest.state, state);
         }
     }
 }
 
-/// Weights of values on grids of the given segments in the value on another, by the polynomial
-/// in ds^2 through all of them.
-pub fn weights(segments: &[usize], target: usize) -> Vec<f64> {
+/// Weights of values on grids of the given segments in the value on another or, with infinitely
+/// many segments, in their limit, by the polynomial in ds^2 through all of them.
+pub fn weights(segments: &[usize], target: f64) -> Vec<f64> {
+    let target = target.powi(-2);
     let square = |segments: usize| (segments as f64).powi(-2);
     let weight = |own: &usize| {
         let others = segments.iter().filter(|other| *other != own);
-        let parts = others.map(|it| (square(target) - square(*it)) / (square(*own) - square(*it)));
+        let parts = others.map(|it| (target - square(*it)) / (square(*own) - square(*it)));
         parts.product()
     };
     segments.iter().map(weight).collect()
@@ -84,18 +85,18 @@ impl Panel {
     }
 
     /// Interpolation from its nodes on one grid to those on another.
-    fn nodes(&self, from: &State, to: &State) -> Vec<Polynomial<POINTS>> {
+    fn nodes(&self, from: &State, to: &State) -> Vec<Stencil> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |k: usize| (k * have) as f64 / want as f64;
-        let through = |k: usize| Polynomial::new(self.first(from), have + 1, place(k));
+        let through = |k: usize| Stencil::new(self.first(from), have + 1, place(k));
         (0..=want).map(through).collect()
     }
 
     /// The same for midpoints of segments.
-    fn middles(&self, from: &State, to: &State) -> Vec<Polynomial<POINTS>> {
+    fn middles(&self, from: &State, to: &State) -> Vec<Stencil> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |i: usize| (i as f64 + 0.5) * have as f64 / want as f64 - 0.5;
-        let through = |i: usize| Polynomial::new(self.first(from), have, place(i));
+        let through = |i: usize| Stencil::new(self.first(from), have, place(i));
         (0..want).map(through).collect()
     }
 
@@ -157,40 +158,5 @@ impl Panel {
                 to.n[first + i] += middle.value(|i| changes[i - start]);
             }
         }
-    }
-}
-
-/// The weights of a value of the polynomial through adjacent points.
-pub struct Polynomial<const MOST: usize> {
-    first: usize,
-    count: usize,
-    weights: [f64; MOST],
-}
-
-impl<const MOST: usize> Polynomial<MOST> {
-    /// At `place` among `points` equally spaced points, of which `first` is the
-    /// first: through at most `MOST` of the nearest of them.
-    pub fn new(first: usize, points: usize, place: f64) -> Self {
-        let count = MOST.min(points);
-        let centred = (place - 0.5 * (count - 1) as f64).round().max(0.0);
-        let skipped = (centred as usize).min(points - count);
-        let mut weights = [0.0; MOST];
-        for (a, weight) in weights[..count].iter_mut().enumerate() {
-            *weight = lagrange(count, a, place - skipped as f64);
-        }
-        Polynomial {
-            first: first + skipped,
-            count,
-            weights,
-        }
-    }
-
-    /// Points and their weights.
-    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
-        (self.first..).zip(self.weights[..self.count].iter().copied())
-    }
-
-    fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        self.terms().map(|(i, weight)| weight * at(i)).sum()
     }
 }

@@ -72,12 +72,3 @@ pub fn restrict(fine: &State) -> State {
     coarse.n = fine.n.chunks(2).map(|n| 0.5 * (n[0] + n[1])).collect();
     coarse
 }
-
-/// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
-/// the polynomial through all of them.
-pub fn lagrange(count: usize, a: usize, t: f64) -> f64 {
-    (0..count)
-        .filter(|&b| b != a)
-        .map(|b| (t - b as f64) / (a as f64 - b as f64))
-        .product()
-}

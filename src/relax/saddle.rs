@@ -48,8 +48,24 @@ pub fn index(
     shift: f64,
     work: &mut Work,
 ) -> Option<usize> {
+    count(leaf, state, system, (0.0, shift), work)
+}
+
+/// Negative eigenvalues of the Hessian minus `excess` times the excess stiffness of the elements
+/// plus `shift` times the mass matrix. With an excess any number of them without coupling is
+/// `None`, too.
+fn count(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    (excess, shift): (f64, f64),
+    work: &mut Work,
+) -> Option<usize> {
     let mut assemble = |system: &mut System| {
         leaf.assemble(state, system);
+        if excess > 0.0 {
+            leaf.subtract_excess_stiffness(state, system, excess);
+        }
         work.force_evaluations += 1;
         work.factorizations += 1;
     };
@@ -58,8 +74,12 @@ pub fn index(
     if system.stable_without_coupling(shift) {
         return Some(0);
     }
+    if excess > 0.0 && !system.coupled() {
+        return None;
+    }
     assemble(system);
-    negative(system, shift)
+    let pattern = SparsePattern::new(system).ok()?;
+    Some(pattern.factorize(system, shift).ok()?.negative())
 }
 
 /// The least and the largest [`index`] on a grid so fine that rounding may change the sign of
@@ -75,12 +95,6 @@ pub fn index_within_rounding(
     Some([least, index(leaf, state, system, -noise, work)?])
 }
 
-/// Negative eigenvalues of an assembled matrix plus `shift` times its mass matrix.
-fn negative(system: &System, shift: f64) -> Option<usize> {
-    let pattern = SparsePattern::new(system).ok()?;
-    Some(pattern.factorize(system, shift).ok()?.negative())
-}
-
 /// Whether a state at rest on a grid may be expected to be stable on finer ones as well: its
 /// Hessian minus [`EXCESS_SAFETY`] times the excess stiffness of the elements over the rods
 /// and minus [`CLEARLY_POSITIVE`], or more where rounding is more, times the mass matrix is
@@ -91,22 +105,8 @@ pub fn clearly_stable(
     system: &mut System,
     work: &mut Work,
 ) -> bool {
-    let mut assemble = |system: &mut System| {
-        leaf.assemble(state, system);
-        leaf.subtract_excess_stiffness(state, system, EXCESS_SAFETY);
-        work.force_evaluations += 1;
-        work.factorizations += 1;
-    };
     let least = CLEARLY_POSITIVE.max(leaf.neutral_shift());
-    assemble(system);
-    if system.stable_without_coupling(-least) {
-        return true;
-    }
-    if !system.coupled() {
-        return false;
-    }
-    assemble(system);
-    negative(system, -least) == Some(0)
+    count(leaf, state, system, (EXCESS_SAFETY, -least), work) == Some(0)
 }
 
 /// Newton's equations with pivots of any sign, and steps of bounded size.

@@ -4,8 +4,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::newton::{Definite, Newton, Stop};
 use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit};
-use crate::relax::methods::semi_implicit::Relaxation;
-use crate::relax::methods::{explicit, moment};
+use crate::relax::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
 use crate::relax::options::Progress;
 use crate::relax::run::{BUDGET, Run, is_large};
 use crate::relax::saddle::{self, saddle_of};
@@ -21,9 +20,6 @@ const ITERATION_PART_ALONE: f64 = 5e-2;
 
 /// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
 const FIXED_ACCURACY: f64 = 1e-12;
-
-/// Accuracy of the first solutions with conjugate gradients far from rest.
-const FAR_FROM_REST: f64 = 1e-2;
 
 /// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
 /// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
@@ -84,8 +80,7 @@ impl Run<'_, '_> {
         };
         let mut moved = false;
         if grip {
-            let end = self.move_grips(&leaf, state);
-            (state, near_rest, moved) = (end.state, end.at_rest, end.moved);
+            (state, near_rest, moved) = self.move_grips(&leaf, state);
         }
         let explicit = matches!(self.options.method, Method::Explicit { .. });
         let dead_moment = leaf.tip_moment() != DVec3::ZERO;
@@ -104,36 +99,30 @@ impl Run<'_, '_> {
         let accuracy = self.accuracy(&leaf);
         let mut system = System::new(&leaf);
         let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
-        let work = &mut self.work;
-        let rest = if explicit {
-            let mut request = explicit::Request {
-                accuracy,
-                near_rest,
-                work,
-                progress,
-                moved,
-                limit: &self.options.limit,
-            };
-            let rest = explicit::settle(&leaf, &mut state, &mut system, &mut request);
-            moved |= request.moved;
-            self.remaining = self.remaining.max(rest.unwrap_or(0.0));
-            rest
-        } else {
-            let newton = Newton {
-                accuracy,
-                iterations: MAX_ITERATIONS,
-                work,
-                progress,
-            };
-            match dead_moment {
-                true => {
-                    let limit = &self.options.limit;
-                    moment::settle(&mut leaf, &mut state, &mut system, near_rest, limit, newton)
-                }
-                // To the next equilibrium, stable or not.
-                false => newton.solve(&leaf, &mut state, &mut system, saddle::ANY_SIGN),
+        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
+        let mut relaxation = Relaxation {
+            near_rest,
+            moved,
+            ..Relaxation::new(state, accuracy, out, &self.options.limit)
+        };
+        let rest = match (explicit, dead_moment) {
+            (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
+            (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
+            // To the next equilibrium, stable or not.
+            _ => {
+                let newton = Newton {
+                    accuracy,
+                    iterations: MAX_ITERATIONS,
+                    work: relaxation.work,
+                    progress: relaxation.progress,
+                };
+                newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
             }
         };
+        let Relaxation { state, moved, .. } = relaxation;
+        if explicit {
+            self.remaining = self.remaining.max(rest.unwrap_or(0.0));
+        }
         let level = Level { leaf, state };
         Settled { level, rest, moved }
     }
@@ -172,9 +161,9 @@ impl Run<'_, '_> {
     fn settle_semi_implicit(
         &mut self,
         leaf: DiscreteLeaf,
-        mut state: State,
+        state: State,
         system: &mut System,
-        (mut near_rest, mut by_steps, mut cg_tolerance): (bool, bool, f64),
+        (near_rest, by_steps, cg_tolerance): (bool, bool, f64),
     ) -> Settled {
         let accuracy = self.accuracy(&leaf);
         let convex_only = self.whole.is_some() || self.too_coarse(leaf.segments());
@@ -182,63 +171,57 @@ impl Run<'_, '_> {
         let (most, least) = LEAST_EVALUATIONS;
         let granted = (most * COARSE / leaf.segments()).clamp(least, most);
         let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
-        let begun = self.work.force_evaluations;
-        let mut moved = false;
+        let most_evaluations = self.work.force_evaluations + allowed;
+        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
+        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
+        let mut relaxation = Relaxation {
+            near_rest,
+            cg_tolerance,
+            solver: Definite {
+                contraction: self.contraction,
+                direct: None,
+            },
+            most_evaluations,
+            convex_only,
+            by_steps,
+            ..Relaxation::new(state, accuracy, out, &self.options.limit)
+        };
+        let mut rest = Err(Stop::StepLimit);
         // After earlier pushes off saddles at rest, the softened leaf returned to one.
         for pushes in self.pushes..self.pushes + MAX_SADDLES {
-            let mut relaxation = Relaxation {
-                state,
-                accuracy,
-                work: &mut self.work,
-                progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
-                near_rest,
-                cg_tolerance,
-                pushes,
-                solver: Definite {
-                    contraction: self.contraction,
-                    direct: None,
-                },
-                most_evaluations: begun + allowed,
-                limit: &self.options.limit,
-                convex_only,
-                moved: false,
-                in_time: false,
-                by_steps,
-                moved_softened: false,
-                load_part: 0.0,
-            };
+            relaxation.pushes = pushes;
             let before = relaxation.work.force_evaluations;
-            let rest = relaxation.settle(&leaf, system);
-            let spent = relaxation.work.force_evaluations - before;
-            moved |= relaxation.moved;
-            let direct = relaxation.solver.direct.is_some();
-            self.contraction = relaxation.solver.contraction;
-            self.load_part = relaxation.load_part.max(self.load_part);
-            self.moved_softened |= relaxation.moved_softened;
-            state = relaxation.state;
-            self.spent += nodes * spent;
-            if let Ok(remaining) = rest {
+            let settled = relaxation.settle(&leaf, system);
+            self.spent += nodes * (relaxation.work.force_evaluations - before);
+            if let Ok(remaining) = settled {
                 self.remaining = self.remaining.max(remaining);
-                if self.levels.is_empty() && !direct {
-                    self.effects = effects(&leaf, &state, system);
+                if self.levels.is_empty() && relaxation.solver.direct.is_none() {
+                    self.effects = effects(&leaf, &relaxation.state, system);
                 }
             }
-            if rest != Err(Stop::Saddle) || convex_only {
-                let level = Level { leaf, state };
-                return Settled { level, rest, moved };
+            if settled != Err(Stop::Saddle) || convex_only {
+                rest = settled;
+                break;
             }
-            match saddle::polish(&leaf, &mut state, system, &mut self.work) {
+            let state = &mut relaxation.state;
+            match saddle::polish(&leaf, state, system, relaxation.work) {
                 Some(0) => {
-                    let (level, rest) = (Level { leaf, state }, Ok(accuracy));
-                    return Settled { level, rest, moved };
+                    rest = Ok(accuracy);
+                    break;
                 }
-                Some(index) => self.saddle = Some(saddle_of(&leaf, &state, index)),
+                Some(index) => self.saddle = Some(saddle_of(&leaf, state, index)),
                 None => {}
             }
-            saddle::push_off(&leaf, &mut state, system, &mut self.work);
-            (near_rest, cg_tolerance, by_steps) = (false, FAR_FROM_REST, false);
+            saddle::push_off(&leaf, state, system, relaxation.work);
+            (relaxation.near_rest, relaxation.by_steps) = (false, false);
+            relaxation.cg_tolerance = FAR_FROM_REST;
+            relaxation.solver.direct = None;
         }
-        let (level, rest) = (Level { leaf, state }, Err(Stop::StepLimit));
+        let Relaxation { state, moved, .. } = relaxation;
+        self.contraction = relaxation.solver.contraction;
+        self.load_part = relaxation.load_part.max(self.load_part);
+        self.moved_softened |= relaxation.moved_softened;
+        let level = Level { leaf, state };
         Settled { level, rest, moved }
     }
 }

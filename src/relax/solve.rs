@@ -82,7 +82,7 @@ fn relax_once(
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
             let shape_alone = options.modes == 0;
-            let found = on_grids(scenario, options, (tolerance, shape_alone), progress);
+            let found = relax_on_grids(scenario, options, shape_alone, progress);
             return found.map(|(found, _)| found);
         }
         Method::SingleShooting => Some(1),
@@ -116,24 +116,16 @@ fn relax_once(
 const COARSEST_BY_STEPS: usize = 32;
 const FINEST_BY_STEPS: usize = 1024;
 
-/// Relaxes on nested grids, fine enough for forces and eigenvalues too; also returns the leaf
-/// on each grid that was extrapolated, from coarse to fine.
+/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
+/// also returns the leaf on each grid that was extrapolated, from coarse to fine.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
-    tolerance: f64,
+    shape_alone: bool,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
-    on_grids(scenario, options, (tolerance, false), progress)
-}
-
-/// The same, or on grids fine enough for the shape alone.
-fn on_grids(
-    scenario: &Scenario,
-    options: &Options,
-    (tolerance, shape_alone): (f64, bool),
-    progress: &mut dyn FnMut(&Progress),
-) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {

@@ -56,7 +56,7 @@ impl Run<'_, '_> {
             };
         }
         let before = self.index;
-        let level = self.levels.pop().expect("the leaf has settled");
+        let mut level = self.levels.pop().expect("the leaf has settled");
         let mut spare = self.spare_system.take();
         if spare.is_none() && self.levels.is_empty() {
             // Further grids have equations of their own.
@@ -64,33 +64,31 @@ impl Run<'_, '_> {
         }
         let mut system = System::reused(spare, &level.leaf);
         let counted = self.count_negative(&level, &mut system, compared);
-        self.levels.push(level);
-        if !counted {
-            return Ok(false);
+        if counted && matches!(self.index, Some(1..)) && !self.keeps_unstable() {
+            let Level { leaf, state } = &mut level;
+            let exact = saddle::polish(leaf, state, &mut system, &mut self.work);
+            self.index = exact.or(self.index);
         }
-        if !matches!(self.index, Some(1..)) {
-            return Ok(true);
-        }
+        let index = match self.index {
+            Some(index @ 1..) if counted => index,
+            _ => {
+                self.levels.push(level);
+                return Ok(counted);
+            }
+        };
         if self.keeps_unstable() {
+            self.levels.push(level);
             return Ok(before == self.index || self.segments().is_some());
         }
-        let mut level = self.levels.pop().expect("the leaf has settled");
-        let exact = saddle::polish(&level.leaf, &mut level.state, &mut system, &mut self.work);
-        self.index = exact.or(self.index);
-        let Some(index @ 1..) = self.index else {
-            self.levels.push(level);
-            return Ok(true);
-        };
         self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
         self.pushes += 1;
         if self.pushes > MAX_SADDLES {
             self.levels.push(level);
             return Err(Stop::StepLimit);
         }
-        let mut state = level.state;
-        saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
-        let grid = level.leaf.grid.clone();
-        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Pushed(state));
+        let Level { leaf, mut state } = level;
+        saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+        let Settled { level, rest, .. } = self.settle(leaf.grid, InitialGuess::Pushed(state));
         self.levels.clear();
         self.push(level);
         rest?;

@@ -1,24 +1,50 @@
-//! Interpolation between the nodes of a grid.
+//! Polynomials through the nodes of a grid that are nearest to a point.
 
 use crate::leaf::DiscreteLeaf;
 use glam::DVec3;
 
-/// Largest number of nodes of a stencil.
+/// Largest number of nodes of a polynomial along a rod.
 const NODES: usize = 7;
 
-/// Nodes of a grid with their weights in an interpolated value.
-pub(crate) struct Stencil {
-    first: usize,
+/// Adjacent points with their weights in a value that is interpolated between them, or in its
+/// derivative.
+pub(crate) struct Stencil<const MOST: usize = NODES> {
+    pub first: usize,
     count: usize,
-    weights: [f64; NODES],
-    /// Derivatives of the weights with sigma.
-    slopes: [f64; NODES],
+    weights: [f64; MOST],
 }
 
-impl Stencil {
-    /// Of the polynomial through the nodes around a fraction of the length; linear
-    /// extrapolation beyond the ends of the rod.
-    pub fn new(leaf: &DiscreteLeaf, sigma: f64) -> Stencil {
+impl<const MOST: usize> Stencil<MOST> {
+    /// Of the value at `place` among `points` equally spaced points, of which `first` is the
+    /// first: through at most `MOST` of the nearest of them.
+    pub fn new(first: usize, points: usize, place: f64) -> Self {
+        let count = MOST.min(points);
+        let centred = (place - 0.5 * (count - 1) as f64).round().max(0.0);
+        let skipped = (centred as usize).min(points - count);
+        let mut weights = [0.0; MOST];
+        for (a, weight) in weights[..count].iter_mut().enumerate() {
+            *weight = lagrange(count, a, place - skipped as f64);
+        }
+        Stencil {
+            first: first + skipped,
+            count,
+            weights,
+        }
+    }
+
+    /// Points and their weights.
+    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
+        (self.first..).zip(self.weights[..self.count].iter().copied())
+    }
+
+    /// The interpolated value, or its derivative.
+    pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.terms().map(|(i, weight)| weight * at(i)).sum()
+    }
+
+    /// Of the value at a fraction of the length, and of its derivative with sigma, of values at
+    /// nodes numbered from 0; linear extrapolation beyond the ends of the rod.
+    pub fn at(leaf: &DiscreteLeaf, sigma: f64) -> [Self; 2] {
         let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
         let nodes = leaf.grid.sigma();
         // A polynomial does not reach across a kink.
@@ -27,69 +53,44 @@ impl Stencil {
         let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
         let high = kinks.get(panel).copied().unwrap_or(1.0);
         // A node at a kink agrees with it up to rounding.
-        let node = |kink: f64| nodes.partition_point(|&node| node < kink - 1e-12);
-        let (low, high) = (node(low), node(high));
-        let count = NODES.min(high - low + 1);
+        let [low, high] = [low, high].map(|at| nodes.partition_point(|&node| node < at - 1e-12));
+        let count = MOST.min(high - low + 1);
         let right = nodes.partition_point(|&node| node < sigma);
         let first = (right.saturating_sub(count / 2)).clamp(low, high + 1 - count);
         // Nodes of a panel are equally spaced.
         let width = nodes[first + 1] - nodes[first];
-        let (mut weights, mut slopes) = lagrange(count, (sigma - nodes[first]) / width);
-        for (weight, slope) in weights.iter_mut().zip(&mut slopes) {
-            *slope /= width;
-            *weight += beyond * *slope;
+        let place = (sigma - nodes[first]) / width;
+        let (mut weights, mut slopes) = ([0.0; MOST], [0.0; MOST]);
+        for (a, (weight, slope)) in weights.iter_mut().zip(&mut slopes).take(count).enumerate() {
+            *slope = lagrange_slope(count, a, place) / width;
+            *weight = lagrange(count, a, place) + beyond * *slope;
         }
-        Stencil {
+        [weights, slopes].map(|weights| Stencil {
             first,
             count,
             weights,
-            slopes,
-        }
-    }
-
-    /// The interpolated value, of values at nodes numbered from 0.
-    pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        self.sum(&self.weights, at)
-    }
-
-    /// Its derivative with respect to sigma.
-    pub fn slope(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        self.sum(&self.slopes, at)
-    }
-
-    fn sum(&self, weights: &[f64; NODES], at: impl Fn(usize) -> DVec3) -> DVec3 {
-        let weights = weights[..self.count].iter().enumerate();
-        weights
-            .map(|(a, weight)| *weight * at(self.first + a))
-            .sum()
+        })
     }
 }
 
-/// Weights of the polynomial through values at 0, 1, ..., `count` - 1 in its value at
-/// `t`, and their derivatives: products from both ends, each with its derivative.
-fn lagrange(count: usize, t: f64) -> ([f64; NODES], [f64; NODES]) {
-    let (mut weights, mut slopes) = ([0.0; NODES], [0.0; NODES]);
-    let mut left = (1.0, 0.0);
-    let mut below = 1.0;
-    for a in 0..count {
-        (weights[a], slopes[a]) = left;
-        // The denominator is a! (-1)^(count - 1 - a) (count - 1 - a)!.
-        let factorial: f64 = (1..count - a).map(|k| -(k as f64)).product();
-        below *= if a > 0 { a as f64 } else { 1.0 };
-        weights[a] /= below * factorial;
-        slopes[a] /= below * factorial;
-        let step = t - a as f64;
-        left = (left.0 * step, left.1 * step + left.0);
-    }
-    let mut right = (1.0, 0.0);
-    for a in (0..count).rev() {
-        let (weight, slope) = (weights[a], slopes[a]);
-        weights[a] = weight * right.0;
-        slopes[a] = slope * right.0 + weight * right.1;
-        let step = t - a as f64;
-        right = (right.0 * step, right.1 * step + right.0);
-    }
-    (weights, slopes)
+/// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
+/// the polynomial through all of them.
+fn lagrange(count: usize, a: usize, t: f64) -> f64 {
+    (0..count)
+        .filter(|&b| b != a)
+        .map(|b| (t - b as f64) / (a as f64 - b as f64))
+        .product()
+}
+
+/// Its derivative with `t`.
+fn lagrange_slope(count: usize, a: usize, t: f64) -> f64 {
+    let others = || (0..count).filter(|&b| b != a);
+    let without = |b: usize| {
+        let rest = others().filter(|&c| c != b);
+        let factors = rest.map(|c| (t - c as f64) / (a as f64 - c as f64));
+        factors.product::<f64>() / (a as f64 - b as f64)
+    };
+    others().map(without).sum()
 }
 
 #[cfg(test)]
@@ -101,19 +102,18 @@ mod tests {
     fn polynomials_are_met() {
         for count in 2..=NODES {
             let t = 0.37 * count as f64;
-            let (weights, slopes) = lagrange(count, t);
             for degree in 0..count as i32 {
-                let term = |(a, weight): (usize, &f64)| weight * (a as f64).powi(degree);
-                let sum = |weights: &[f64; NODES]| -> f64 {
-                    weights[..count].iter().enumerate().map(term).sum()
+                let sum = |weight: fn(usize, usize, f64) -> f64| -> f64 {
+                    let term = |a| weight(count, a, t) * (a as f64).powi(degree);
+                    (0..count).map(term).sum()
                 };
                 let slope = match degree {
                     0 => 0.0,
                     _ => f64::from(degree) * t.powi(degree - 1),
                 };
                 let size = (count as f64).powi(degree);
-                assert!((sum(&weights) - t.powi(degree)).abs() < 1e-13 * size);
-                assert!((sum(&slopes) - slope).abs() < 1e-12 * size);
+                assert!((sum(lagrange) - t.powi(degree)).abs() < 1e-13 * size);
+                assert!((sum(lagrange_slope) - slope).abs() < 1e-12 * size);
             }
         }
     }

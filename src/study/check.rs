@@ -229,10 +229,8 @@ pub fn check(
         limit: options.limit.clone(),
         ..Options::default()
     };
-    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    relax::check_tolerance(tolerance)?;
-    // Forces are compared as well.
-    let (relaxed, _) = relax::relax_on_grids(scenario, &asked, tolerance, progress)?;
+    // Forces are compared as well: not the shape alone.
+    let (relaxed, _) = relax::relax_on_grids(scenario, &asked, false, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| shoot(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))

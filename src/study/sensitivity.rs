@@ -2,8 +2,7 @@
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
-    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, relax_on_grids,
-    sensitivities,
+    Equilibrium, Number, Options, Progress, RelaxError, relax_on_grids, sensitivities,
 };
 use crate::scenario::Scenario;
 
@@ -34,8 +33,6 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    check_tolerance(tolerance)?;
     let values = keys.iter().map(|keys| base.value(keys));
     let values = values.collect::<Result<Vec<f64>, _>>()?;
     let made: Vec<_> = (keys.iter().zip(&values))
@@ -59,10 +56,10 @@ pub fn relax_with_sensitivities(
             (keys.to_string(), number)
         })
         .collect();
-    let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, progress)?;
+    let (mut leaf, levels) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     leaf.sensitivities = Some(match at_rest {
-        true => sensitivities(&levels, &numbers, tolerance, options.modes),
+        true => sensitivities(&levels, &numbers, leaf.accuracy.tolerance, options.modes),
         false => Vec::new(),
     });
     Ok(leaf)

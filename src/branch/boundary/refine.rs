@@ -218,7 +218,7 @@ fn predict_spot(levels: &[Level], params: &[[f64; 2]], believed: usize, solution
     let (levels, params) = (&levels[skipped..], &params[skipped..]);
     predict(&levels.iter().collect::<Vec<_>>(), &mut solution.state);
     let segments: Vec<usize> = levels.iter().map(|it| it.leaf.segments()).collect();
-    let weights = weights(&segments, solution.state.segments());
+    let weights = weights(&segments, solution.state.segments() as f64);
     solution.params =
         [0, 1].map(|i| (params.iter().zip(&weights).map(|(at, part)| part * at[i])).sum());
 }

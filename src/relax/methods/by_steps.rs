@@ -10,8 +10,9 @@
 
 use crate::leaf::{DiscreteLeaf, System};
 use crate::newton::{Equations, Newton, Stop, at_saddle};
+use crate::relax::methods::Relaxation;
 use crate::relax::methods::semi_implicit::{
-    MOVING_COMPLIANCE, MOVING_STRETCH, Relaxation, SMALLEST_MOVING_COMPLIANCE, SOFT_ACCURACY,
+    MOVING_COMPLIANCE, MOVING_STRETCH, SMALLEST_MOVING_COMPLIANCE, SOFT_ACCURACY,
 };
 use crate::relax::saddle;
 
@@ -41,33 +42,10 @@ const ITERATIONS: usize = 12;
 const STEP_ACCURACY: f64 = 1e-3;
 const LARGEST_STEP: f64 = 1.5;
 
-/// The leaves of the continuation, by the logarithm of the growth of loads and stiffness.
-struct Continuation<'a> {
-    leaf: &'a DiscreteLeaf,
-    /// Up to here loads and stiffness grow, beyond it the stiffness alone.
-    loaded: f64,
-    end: f64,
-}
-
-impl Continuation<'_> {
-    /// Part of the loads that acts at a point of the continuation.
-    fn load_part(&self, at: f64) -> f64 {
-        (at - self.loaded).min(0.0).exp()
-    }
-
-    fn leaf(&self, at: f64) -> DiscreteLeaf {
-        if at == self.end {
-            return self.leaf.clone();
-        }
-        let mut leaf = self.leaf.softened(MOVING_COMPLIANCE * (-at).exp());
-        leaf.load_factor = self.load_part(at);
-        leaf
-    }
-}
-
 impl Relaxation<'_> {
     /// Brings the softened leaf to rest under a part of the loads, and continues it to the
-    /// full loads and its own stiffness.
+    /// full loads and its own stiffness. Its points are the logarithms of the growth of both: up
+    /// to `loaded` loads and stiffness grow, beyond it the stiffness alone.
     pub(super) fn settle_by_steps(
         &mut self,
         leaf: &DiscreteLeaf,
@@ -78,30 +56,28 @@ impl Relaxation<'_> {
         let part = (MOVING_STRETCH / (MOVING_COMPLIANCE * load)).min(1.0);
         let stiffest = leaf.stiffest().max(SMALLEST_MOVING_COMPLIANCE);
         let loaded = -part.ln();
-        let continuation = Continuation {
-            leaf,
-            loaded,
-            end: loaded + (MOVING_COMPLIANCE * part / stiffest).ln().max(0.0),
+        let end = loaded + (MOVING_COMPLIANCE * part / stiffest).ln().max(0.0);
+        let load_part = |at: f64| (at - loaded).min(0.0).exp();
+        let softened = |at: f64| {
+            let mut leaf = leaf.softened(MOVING_COMPLIANCE * (-at).exp());
+            leaf.load_factor = load_part(at);
+            leaf
         };
         let (mut reached, mut step) = (0.0, LONGEST);
-        let mut first = leaf.softened(MOVING_COMPLIANCE);
-        first.load_factor = part;
-        self.move_from(&first, system)?;
+        self.move_from(&softened(0.0), system)?;
         loop {
-            self.load_part = continuation.load_part(reached);
-            let next = match reached + step {
-                next if next < continuation.end - SHORTEST => next,
-                _ => continuation.end,
-            };
-            let next_leaf = continuation.leaf(next);
-            let wanted = match next == continuation.end {
-                true => self.accuracy,
-                false => SOFT_ACCURACY,
-            };
+            self.load_part = load_part(reached);
             let before = self.state.clone();
-            let found = self.newton(&next_leaf, system, wanted);
+            let next = match reached + step {
+                next if next < end - SHORTEST => next,
+                _ => end,
+            };
+            let found = match next < end {
+                true => self.newton(&softened(next), system, SOFT_ACCURACY),
+                false => self.newton(leaf, system, self.accuracy),
+            };
             match found {
-                Ok(remaining) if next == continuation.end => return Ok(remaining),
+                Ok(remaining) if next == end => return Ok(remaining),
                 Ok(_) => {
                     reached = next;
                     step = (2.0 * step).min(LONGEST);
@@ -112,7 +88,7 @@ impl Relaxation<'_> {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 return Err(Stop::StepLimit);
             }
-            let shortest = match reached < continuation.loaded {
+            let shortest = match reached < loaded {
                 true => SHORTEST_LOADING,
                 false => SHORTEST,
             };
@@ -121,10 +97,8 @@ impl Relaxation<'_> {
                 continue;
             }
             // The end point itself is reached by Newton's method only.
-            reached = (reached + 2.0 * shortest)
-                .min(continuation.end - SHORTEST)
-                .max(reached);
-            self.move_from(&continuation.leaf(reached), system)?;
+            reached = (reached + 2.0 * shortest).min(end - SHORTEST).max(reached);
+            self.move_from(&softened(reached), system)?;
             step = LONGEST / 2.0;
         }
     }

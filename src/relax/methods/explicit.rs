@@ -15,6 +15,7 @@ use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Snapshot, Stopped};
 use crate::newton::{Stop, Work};
+use crate::relax::methods::Relaxation;
 use crate::relax::options::RelaxError;
 use crate::relax::saddle;
 use crate::scenario::Rod;
@@ -57,20 +58,6 @@ const LONGEST_REMAINING: f64 = 1e-6;
 /// Limit on nodes times steps: some ten seconds.
 const BUDGET: usize = 600_000_000;
 
-/// Requirements and counters of a run.
-pub struct Request<'a> {
-    /// Of positions and rotations.
-    pub accuracy: f64,
-    /// Whether the state is close to equilibrium already.
-    pub near_rest: bool,
-    pub work: &'a mut Work,
-    /// Receives steps and the largest unbalanced force or moment.
-    pub progress: &'a mut dyn FnMut(usize, f64),
-    /// Set if the leaf moved through states of non-convex energy.
-    pub moved: bool,
-    pub limit: &'a Limit,
-}
-
 /// Refuses leaves that the explicit method cannot treat.
 pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     let rigid = |rod: &Rod| {
@@ -89,11 +76,11 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
 /// Lets the leaf come to rest.
 pub fn settle(
     leaf: &DiscreteLeaf,
-    state: &mut State,
     system: &mut System,
-    request: &mut Request,
+    request: &mut Relaxation,
 ) -> Result<f64, Stop> {
-    let motion = Explicit::new(leaf.clone(), Physics::at_rest(&leaf.leaf), state, None);
+    let physics = Physics::at_rest(&leaf.leaf);
+    let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
     let mut motion = motion.map_err(|_| Stop::Stuck)?;
     let most_steps = BUDGET / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
@@ -103,7 +90,7 @@ pub fn settle(
     let settled = settled.and_then(|()| descend(leaf, &mut motion, system, most_steps, request));
     request.work.steps += motion.steps();
     request.work.force_evaluations += motion.steps();
-    *state = motion.now();
+    request.state = motion.now();
     settled
 }
 
@@ -113,7 +100,7 @@ fn find_valley(
     motion: &mut Explicit,
     system: &mut System,
     most_steps: usize,
-    request: &mut Request,
+    request: &mut Relaxation,
 ) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
@@ -172,7 +159,7 @@ fn descend(
     motion: &mut Explicit,
     system: &mut System,
     most_steps: usize,
-    request: &mut Request,
+    request: &mut Relaxation,
 ) -> Result<f64, Stop> {
     let accuracy = request.accuracy.max(LEAST_ACCURACY);
     let large = (leaf.rods() * leaf.segments()) as f64 > NODES_PER_PIECE / STEPS_PER_PIECE;

@@ -11,8 +11,8 @@
 //! segment by segment from the clamp.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
-use crate::limit::Limit;
 use crate::newton::{Equations, Newton, Stop};
+use crate::relax::methods::Relaxation;
 use crate::rod::{RESOLVED_TURN, Section};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
@@ -43,26 +43,23 @@ const DIFFERENCE: f64 = 1e-7;
 /// Squared half rotation below which series replace quotients that tend to 0/0.
 const SMALL: f64 = 1e-5;
 
-/// Loads the rod from its rest shape, or corrects a state `near_rest`.
+/// Loads the rod from its rest shape, or corrects a state near rest.
 pub fn settle(
     leaf: &mut DiscreteLeaf,
-    state: &mut State,
     system: &mut System,
-    near_rest: bool,
-    limit: &Limit,
-    how: Newton,
+    rod: &mut Relaxation,
 ) -> Result<f64, Stop> {
-    let mut newton = |leaf: &DiscreteLeaf, state: &mut State, accuracy| {
+    let mut newton = |leaf: &DiscreteLeaf, rod: &mut Relaxation, accuracy| {
         let newton = Newton {
             accuracy,
             iterations: MAX_ITERATIONS,
-            work: how.work,
-            progress: how.progress,
+            work: rod.work,
+            progress: rod.progress,
         };
-        newton.solve(leaf, state, system, Equations::Unsymmetric)
+        newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
     };
-    if near_rest {
-        return newton(leaf, state, how.accuracy);
+    if rod.near_rest {
+        return newton(leaf, rod, rod.accuracy);
     }
     let moment_first = largest_turn(&leaf.leaf) > LARGEST_BY_STEPS;
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
@@ -72,12 +69,12 @@ pub fn settle(
     let mut steps = usize::MAX;
     let loads = leaf.loads;
     if moment_first {
-        shape_by_moment(leaf, state)?;
+        shape_by_moment(leaf, &mut rod.state)?;
         (step, steps) = (1.0, MAX_STEPS);
     }
-    let (mut reached, mut before) = (0.0, state.clone());
+    let (mut reached, mut before) = (0.0, rod.state.clone());
     while reached < 1.0 {
-        if steps == 0 || limit.reached() {
+        if steps == 0 || rod.limit.reached() {
             return Err(Stop::StepLimit);
         }
         steps -= 1;
@@ -90,20 +87,20 @@ pub fn settle(
         }
         let wanted = match part < 1.0 {
             true => STEP_ACCURACY,
-            false => how.accuracy,
+            false => rod.accuracy,
         };
-        match newton(leaf, state, wanted) {
+        match newton(leaf, rod, wanted) {
             Ok(remaining) if part == 1.0 => return Ok(remaining),
             Ok(_) => {
                 reached = part;
-                before.clone_from(state);
+                before.clone_from(&rod.state);
             }
             Err(stop) if stop == Stop::Unresolved && !moment_first || step < SMALLEST_STEP => {
                 return Err(stop);
             }
             Err(_) => {
                 step /= 2.0;
-                state.clone_from(&before);
+                rod.state.clone_from(&before);
             }
         }
     }

@@ -11,12 +11,11 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{DiscreteLeaf, State, System};
-use crate::limit::Limit;
+use crate::leaf::{DiscreteLeaf, System};
 use crate::newton::{
-    Definite, Equations, Newton, Stalled, Stop, Work, at_saddle, cg_tolerance, converged,
-    satisfies_lengths,
+    Equations, Newton, Stalled, Stop, at_saddle, cg_tolerance, converged, satisfies_lengths,
 };
+use crate::relax::methods::Relaxation;
 use crate::relax::methods::damped_motion::Motion;
 use crate::rod::RESOLVED_TURN;
 
@@ -52,40 +51,6 @@ pub(super) const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 /// Newton iterations of a stiff leaf before it is stiffened in steps.
 const STIFF_ITERATIONS: usize = 12;
 
-/// A relaxation on one grid: its state and its parameters.
-pub struct Relaxation<'a> {
-    pub state: State,
-    /// Of positions and rotations.
-    pub accuracy: f64,
-    pub work: &'a mut Work,
-    /// Receives the size of every step.
-    pub progress: &'a mut dyn FnMut(usize, f64),
-    /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
-    pub near_rest: bool,
-    /// Relative accuracy of the conjugate gradients in the first step.
-    pub cg_tolerance: f64,
-    /// How often it was pushed off saddles before: each time it is softened less, since a
-    /// softened leaf may return to the saddle.
-    pub pushes: i32,
-    pub solver: Definite,
-    /// Count of force evaluations at which the iteration ends without success.
-    pub most_evaluations: usize,
-    pub limit: &'a Limit,
-    /// Whether to fail at once where the energy is not convex.
-    pub convex_only: bool,
-    /// Whether the leaf moved through states of non-convex energy.
-    pub moved: bool,
-    /// Whether it took time steps: Newton's did not lead to rest.
-    pub in_time: bool,
-    /// Whether this is a second attempt, by continuation in loads and stiffness.
-    pub by_steps: bool,
-    /// Whether it took time steps while softened: its inertia, and that of the leaf with its
-    /// own stiffness, may decide where it comes to rest.
-    pub moved_softened: bool,
-    /// Part of the loads under which the leaf came to rest, in such an attempt.
-    pub load_part: f64,
-}
-
 impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
@@ -108,6 +73,7 @@ impl Relaxation<'_> {
                     // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
+                self.in_time = false;
                 let rest = self.move_to_rest(&soft, system, SOFT_ACCURACY);
                 self.moved_softened |= self.in_time;
                 rest?;

@@ -9,7 +9,7 @@ mod series;
 pub(crate) use self::nearby::Nearby;
 pub(crate) use self::response::Linearized;
 use self::series::Series;
-use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
+use crate::leaf::{DiscreteLeaf, Forces, Leaf, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::equilibrium::{Reaction, Sensitivity};
@@ -36,15 +36,9 @@ type Known<'n, 'a> = (
     Vec<(f64, f64, Arc<Scenario>)>,
 );
 
-/// Derivatives on one grid, in the leaf's units.
-struct Changes {
-    tips: Vec<DVec3>,
-    energy: f64,
-    eigenvalues: Vec<f64>,
-    /// Force, then moments.
-    reaction: Vec<DVec3>,
-    positions: Vec<DVec3>,
-}
+/// Derivatives on one grid, in the leaf's units: of the tips, the energy, the eigenvalues (numbers
+/// as x), the reaction (force, then moments), and the positions.
+type Changes = [Vec<DVec3>; 5];
 
 /// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
 /// are its grids from coarse to fine. Left out are numbers for which the scenario has no
@@ -59,8 +53,7 @@ pub(crate) fn sensitivities(
         return Vec::new();
     };
     let leaf = &finest.leaf.leaf;
-    let clamped = (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some());
-    let differences = modes > 0 || clamped;
+    let differences = modes > 0 || is_clamped(leaf);
     let known: Vec<Known> = (numbers.iter())
         .filter_map(|(key, number)| {
             let near = if differences { number.nearby() } else { None };
@@ -89,86 +82,66 @@ pub(crate) fn sensitivities(
         }
         let segments = level.leaf.segments();
         for (series, changes) in found.iter_mut().zip(changes) {
-            let eigenvalues = changes.eigenvalues.into_iter();
-            let eigenvalues = eigenvalues.map(|value| DVec3::X * value).collect();
-            let all = [
-                changes.tips,
-                vec![DVec3::X * changes.energy],
-                eigenvalues,
-                changes.reaction,
-                changes.positions,
-            ];
-            for (series, values) in series.iter_mut().zip(all) {
+            for (series, values) in series.iter_mut().zip(changes) {
                 series.push(segments, values);
             }
         }
     }
-    let context = Context {
-        levels: [coarsest, finest],
-        tolerance,
-        eigenvalues,
-    };
+    let stations = coarsest.leaf.grid.sigma();
     (known.iter().zip(found))
-        .map(|(known, series)| context.sensitivity(known, series))
+        .map(|((key, number, ..), series)| {
+            let all = series.map(|series| series.extrapolated(tolerance));
+            sensitivity((key, number.value), (leaf, stations), all, &eigenvalues)
+        })
         .collect()
 }
 
-/// What all sensitivities are assembled with.
-struct Context<'l> {
-    /// The coarsest and the finest grid.
-    levels: [&'l Level; 2],
-    tolerance: f64,
-    eigenvalues: Vec<f64>,
+/// Extrapolated derivatives with respect to a number, at these stations, in the scenario's units;
+/// the eigenvalues themselves are `squared` frequencies.
+fn sensitivity(
+    (key, value): (&str, f64),
+    (leaf, stations): (&Leaf, &[f64]),
+    [tips, energy, eigenvalues, reaction, positions]: [(Vec<DVec3>, Option<f64>); 5],
+    squared: &[f64],
+) -> Sensitivity {
+    let scale = leaf.scale;
+    let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
+        values.iter().map(|value| *value * unit).collect()
+    };
+    let lowest = eigenvalues.0.first().map(|value| value.x);
+    let lowest = lowest.filter(|it| it.is_finite());
+    // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
+    let frequency = |(change, squared): (&DVec3, &f64)| {
+        let known = *squared > 0.0 && change.x.is_finite();
+        known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
+    };
+    let places = positions.0.chunks(stations.len());
+    let held = reaction.0.split_first().map(|(force, moments)| Reaction {
+        force: *force * scale.force(),
+        moments: is_clamped(leaf).then(|| of(moments, scale.moment())),
+    });
+    Sensitivity {
+        key: key.to_owned(),
+        value,
+        tips: of(&tips.0, scale.length),
+        tip_error: tips.1.map(|error| error * scale.length),
+        energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
+        energy_error: energy.1.map(|error| error * scale.moment()),
+        lowest_eigenvalue: lowest,
+        lowest_eigenvalue_error: lowest.and(eigenvalues.1),
+        frequencies: eigenvalues.0.iter().zip(squared).map(frequency).collect(),
+        tip_reaction_error: (reaction.1)
+            .filter(|_| held.is_some())
+            .map(|error| error * scale.force()),
+        reaction: held,
+        positions: places.map(|rod| of(rod, scale.length)).collect(),
+        positions_error: positions.1.map(|error| error * scale.length),
+        stations: stations.to_vec(),
+    }
 }
 
-impl Context<'_> {
-    fn sensitivity(&self, (key, number, ..): &Known, series: [Series; 5]) -> Sensitivity {
-        let leaf = &self.levels[1].leaf.leaf;
-        let scale = leaf.scale;
-        let [tips, energy, eigenvalues, reaction, positions] =
-            series.map(|series| series.extrapolated(self.tolerance));
-        let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
-            values.iter().map(|value| *value * unit).collect()
-        };
-        let lowest = eigenvalues
-            .0
-            .first()
-            .map(|value| value.x)
-            .filter(|it| it.is_finite());
-        // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
-        let frequency = |(change, squared): (&DVec3, &f64)| {
-            let known = *squared > 0.0 && change.x.is_finite();
-            known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
-        };
-        let frequencies = eigenvalues.0.iter().zip(&self.eigenvalues);
-        let frequencies = frequencies.map(frequency);
-        let stations = self.levels[0].leaf.grid.sigma().to_vec();
-        let places = positions.0.chunks(stations.len().max(1));
-        let held = reaction.0.split_first().map(|(force, moments)| Reaction {
-            force: *force * scale.force(),
-            moments: (leaf.held.as_ref())
-                .is_some_and(|held| held.clamps.is_some())
-                .then(|| of(moments, scale.moment())),
-        });
-        Sensitivity {
-            key: (*key).clone(),
-            value: number.value,
-            tips: of(&tips.0, scale.length),
-            tip_error: tips.1.map(|error| error * scale.length),
-            energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
-            energy_error: energy.1.map(|error| error * scale.moment()),
-            lowest_eigenvalue: lowest,
-            lowest_eigenvalue_error: lowest.and(eigenvalues.1),
-            frequencies: frequencies.collect(),
-            tip_reaction_error: (reaction.1)
-                .filter(|_| held.is_some())
-                .map(|error| error * scale.force()),
-            reaction: held,
-            positions: places.map(|rod| of(rod, scale.length)).collect(),
-            positions_error: positions.1.map(|error| error * scale.length),
-            stations,
-        }
-    }
+fn is_clamped(leaf: &Leaf) -> bool {
+    (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some())
 }
 
 /// A grid on which derivatives are computed.
@@ -195,7 +168,7 @@ impl Grid<'_> {
         };
         let modes = modes.unwrap_or_default();
         // In the scenario's unit of time, as their derivatives are.
-        let squared = |mode: &modes::LoadedMode| mode.eigenvalue / physics.time.powi(2);
+        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
         if forces.len() > MOST_DIRECT && modes.is_empty() && moment == DVec3::ZERO && !held {
@@ -210,22 +183,20 @@ impl Grid<'_> {
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moment())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
-            // The work of a dead moment is not part of the energy.
             let n = leaf.segments();
+            let tip = |j: usize| shift(&response.nodes[j][n - 1]);
+            // The work of a dead moment is not part of the energy.
             let work = moment.dot(turn(&response.nodes[0][n - 1]));
-            Changes {
-                tips: self
-                    .tips()
-                    .map(|j| shift(&response.nodes[j][n - 1]))
-                    .collect(),
-                energy: forces.energy + work,
-                eigenvalues: of_modes.collect(),
-                reaction: match held {
+            [
+                self.tips().map(tip).collect(),
+                vec![DVec3::X * (forces.energy + work)],
+                of_modes.map(|value| DVec3::X * value).collect(),
+                match held {
                     true => self.reaction(near.as_ref(), change),
                     false => Vec::new(),
                 },
-                positions: self.positions(response),
-            }
+                self.positions(response),
+            ]
         });
         Some((eigenvalues, changes.collect()))
     }
@@ -238,8 +209,7 @@ impl Grid<'_> {
     fn reaction(&self, near: Option<&Nearby>, change: (&LeafRate, &Response)) -> Vec<DVec3> {
         let leaf = &self.level.leaf;
         let mut all = vec![leaf.reaction_rate(change.0, change.1)];
-        let clamped = (leaf.leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some());
-        if clamped {
+        if is_clamped(&leaf.leaf) {
             all.extend(
                 near.iter()
                     .flat_map(|near| near.clamp_moment_rates(self.level)),
@@ -268,12 +238,10 @@ impl Grid<'_> {
         let tip = |forces: &Forces, tip: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
         };
-        let changes = |forces: &Forces| Changes {
-            tips: self.tips().map(|k| tip(forces, k)).collect(),
-            energy: forces.energy,
-            eigenvalues: Vec::new(),
-            reaction: Vec::new(),
-            positions: Vec::new(),
+        let changes = |forces: &Forces| -> Changes {
+            let tips = self.tips().map(|k| tip(forces, k)).collect();
+            let energy = vec![DVec3::X * forces.energy];
+            [tips, energy, Vec::new(), Vec::new(), Vec::new()]
         };
         Some(forces.iter().map(changes).collect())
     }

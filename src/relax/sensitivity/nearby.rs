@@ -2,7 +2,7 @@
 //! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
-use crate::modes::{self, LoadedMode};
+use crate::modes::{self, Eigenpair};
 use crate::relax::level::Level;
 use crate::relax::sensitivity::response::moved;
 use crate::scenario::Scenario;
@@ -49,14 +49,14 @@ impl Nearby {
 
     /// The derivative of the eigenvalue of a mode: that of its Rayleigh quotient between
     /// neighbouring equilibria, as changes of its shape enter in second order only.
-    pub fn eigenvalue_rate(&self, mode: &LoadedMode) -> f64 {
+    pub fn eigenvalue_rate(&self, mode: &Eigenpair) -> f64 {
         let term = |near: &Near| near.weight * modes::eigenvalue(&near.leaf, &near.state, mode);
         self.0.iter().map(term).sum()
     }
 
     /// The same for several modes. NaN where a multiple eigenvalue splits: its modes change
     /// differently, and the lower one is another mode on either side.
-    pub fn eigenvalue_rates(&self, modes: &[LoadedMode]) -> Vec<f64> {
+    pub fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
         let mut rates: Vec<f64> = modes
             .iter()
             .map(|mode| self.eigenvalue_rate(mode))
@@ -64,7 +64,7 @@ impl Nearby {
         let offsets = self.0.iter().map(|near| near.offset.abs());
         let farthest = offsets.fold(0.0, f64::max);
         let pairs = modes.windows(2).enumerate();
-        let equal = |pair: &[LoadedMode]| {
+        let equal = |pair: &[Eigenpair]| {
             let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
             (a - b).abs() <= EQUAL * a.abs().max(b.abs())
         };

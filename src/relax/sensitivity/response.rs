@@ -176,8 +176,8 @@ mod tests {
     fn a_number_costs_one_solution_on_a_grid() {
         let text = include_str!("../../../scenarios/paper/fig04.toml");
         let scenario = Scenario::from_toml(text).unwrap();
-        let (_, levels) =
-            relax_on_grids(&scenario, &Options::default(), 1e-6, &mut |_| {}).unwrap();
+        let options = Options::default();
+        let (_, levels) = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
         for level in &levels {
             let mut linear = Linearized::new(level, 1e-6);
             let units = super::super::unit_forces(&level.leaf, 1);

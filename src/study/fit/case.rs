@@ -11,7 +11,8 @@ use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
+use crate::relax::predict::weights;
+use crate::relax::{AtRest, Level, Lost, Nearby, Number, unit_forces};
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
@@ -72,7 +73,7 @@ impl Compared {
 pub(super) struct CaseAt {
     pub at: AtRest,
     /// Modes on the first grids.
-    pub modes: Vec<Vec<modes::LoadedMode>>,
+    pub modes: Vec<Vec<modes::Eigenpair>>,
     pub components: Vec<Component>,
     /// Its response to the numbers, once computed.
     pub responses: Option<Responses>,
@@ -258,7 +259,7 @@ impl CaseAt {
     fn over_modes(&self, value: impl Fn(usize) -> f64) -> f64 {
         let segments = self.at.levels.iter().map(|level| level.leaf.segments());
         let segments: Vec<usize> = segments.take(self.modes.len()).collect();
-        let weights = extrapolation(&segments, segments.len() - 1);
+        let weights = weights(&segments, f64::INFINITY);
         weights
             .iter()
             .enumerate()
@@ -316,14 +317,14 @@ impl CaseAt {
         if point.iter().any(|component| component.free) {
             let slope = self.at.best(|k, level| {
                 let base = level.state.base(rod);
-                stencils[k].slope(|i| level.state.x[base + i])
+                stencils[k][1].value(|i| level.state.x[base + i])
             });
             axes.iter().for_each(|&axis| along[axis] = slope[axis]);
             along = along.normalize_or_zero();
         }
         let change = |responses: &Vec<Response>| {
             let change = self.at.best(|k, _| {
-                stencils[k].value(|i| match i {
+                stencils[k][0].value(|i| match i {
                     0 => DVec3::ZERO,
                     _ => shift(&responses[k].nodes[rod][i - 1]),
                 })

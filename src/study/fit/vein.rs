@@ -35,11 +35,11 @@ impl<'a> Vein<'a> {
         let (mut x, mut slope) = (DVec3::ZERO, DVec3::ZERO);
         for (level, weight) in self.at.levels.iter().zip(&self.at.weights) {
             if *weight != 0.0 {
-                let stencil = Stencil::new(&level.leaf, sigma);
+                let [value, derivative] = <Stencil>::at(&level.leaf, sigma);
                 let base = level.state.base(self.rod);
                 let node = |i: usize| level.state.x[base + i];
-                x += *weight * stencil.value(node);
-                slope += *weight * stencil.slope(node);
+                x += *weight * value.value(node);
+                slope += *weight * derivative.value(node);
             }
         }
         (x * length, slope * length)

@@ -15,8 +15,7 @@ use crate::leaf::{Field, Grid, State};
 use crate::limit::Limit;
 use crate::memory::Request;
 use crate::relax::{
-    Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, check_tolerance,
-    relax_on_grids,
+    Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, relax_on_grids,
 };
 use crate::scenario::Scenario;
 
@@ -83,9 +82,7 @@ pub fn relax_with_margin(
     if scenario.tip_moment != [0.0; 3] {
         return Err(MarginError::Moment);
     }
-    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    check_tolerance(tolerance)?;
-    let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |step| {
+    let (mut leaf, levels) = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
