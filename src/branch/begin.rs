@@ -2,11 +2,11 @@
 //! branch point.
 
 use super::critical::Critical;
-use super::equations::{Equations, Stuck, reversed};
+use super::equations::{Equations, Stuck};
 use super::family::Family;
 use super::follow::Grids;
 use super::refine::refine;
-use super::{Point, Tangent, prolonged};
+use super::{Point, prolonged};
 use crate::leaf::{DiscreteLeaf, Grid, System};
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
@@ -46,7 +46,7 @@ pub fn begin<'a>(
             method: options.method.on_grid(finest),
             ..options.clone()
         };
-        let alone = relax(&family.scenario(0.0)?, &options, &mut |_| {});
+        let alone = relax(&family.scenario([0.0])?, &options, &mut |_| {});
         let Ok(alone) = alone else {
             return Err(stuck);
         };
@@ -74,7 +74,7 @@ fn search<'a>(
     let mut found = Err(Stuck::NotConverged);
     loop {
         if grid.segments() >= least {
-            let mut grids = Grids::new(family, grid.clone())?;
+            let mut grids = Grids::new(family, grid.clone());
             let point = grids.of(&state).correct(&state, 0.0, None).or_else(|_| {
                 let mut system = System::new(&discrete);
                 polish(&discrete, &mut state, &mut system, &mut Work::default());
@@ -107,12 +107,12 @@ fn search<'a>(
 pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
     let across = critical.across(equations);
     let (family, grid) = (equations.leaves.family, equations.grid().clone());
-    [across.clone(), reversed(across)]
+    [across.clone(), across.reversed()]
         .iter()
         .filter_map(|direction| {
             let mut nearest = None;
             for away in AWAY {
-                let Ok(point) = first_point(equations, critical, direction, away) else {
+                let Ok(point) = critical.beside(equations, direction, away) else {
                     continue;
                 };
                 if refine(family, &grid, &point, accuracy).is_ok() {
@@ -123,16 +123,4 @@ pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> 
             nearest
         })
         .collect()
-}
-
-fn first_point(
-    equations: &mut Equations,
-    critical: &Critical,
-    direction: &Tangent,
-    away: f64,
-) -> Result<Point, Stuck> {
-    let increments = &direction.increments;
-    let fraction = critical.fraction + away * direction.fraction;
-    let state = equations.moved(&critical.state, fraction, increments, away)?;
-    equations.correct(&state, fraction, Some(direction))
 }

@@ -1,11 +1,11 @@
 //! Regular points of a branch on finer and finer grids.
 
-use super::equations::{Equations, Plane, Stuck, reversed};
+use super::equations::{Equations, Plane, Stuck};
 use super::family::{Family, OutOfRange};
-use super::field::{at_same_nodes, every_second, prolong as prolong_field};
+use super::field::{at_same_nodes, every_second};
 use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::both_sides;
-use super::{Point, Tangent};
+use super::{Direction, Point};
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::relax::prolong::{prolong, restrict};
 use glam::DVec3;
@@ -51,9 +51,9 @@ enum Condition {
 
 impl Condition {
     fn plane(equations: &Equations, point: &Point) -> Self {
-        let direction = equations.normalised(Tangent {
+        let direction = equations.normalised(Direction {
             increments: point.tangent.increments.clone(),
-            fraction: 0.0,
+            params: [0.0],
         });
         Condition::Plane(Plane {
             dual: equations.momentum(&direction.increments),
@@ -81,7 +81,7 @@ impl Condition {
 /// Whether the branch goes along the parameter alone, or the point is at an end of its range.
 fn along_parameter(point: &Point) -> bool {
     let inside = point.fraction != 0.0 && point.fraction != 1.0;
-    !inside || point.tangent.fraction.abs() >= ALONG
+    !inside || point.tangent.params[0].abs() >= ALONG
 }
 
 /// A point on the grid with all segments halved, with the equations there: in the same
@@ -103,7 +103,7 @@ struct Finer<'a> {
     equations: Equations<'a>,
     point: Point,
     /// The tangent of the previous grid, interpolated to this one.
-    tangent: Tangent,
+    tangent: Direction,
     /// Displacement from the interpolated state.
     moved: f64,
     /// Displacement by the last iteration: its error is not larger.
@@ -136,19 +136,14 @@ fn on_next_grid<'a>(
     point: &Point,
     condition: &mut Condition,
 ) -> Result<Finer<'a>, Stuck> {
-    let leaf = equations.leaves.at(point.fraction)?;
+    let leaf = equations.leaves.at([point.fraction])?;
     let guess = prolong(leaf, &point.state);
     condition.refine(leaf);
-    let mut equations = equations.refined()?;
-    let tangent = equations.normalised(Tangent {
-        increments: prolong_field(&point.tangent.increments),
-        ..point.tangent
-    });
+    let mut equations = equations.refined();
+    let tangent = equations.prolonged(&point.tangent);
     let plane = condition.as_plane();
     let (mut found, unfinished) = finished(&mut equations, (&guess, point.fraction), plane)?;
-    if equations.inner(&found.tangent, &tangent) < 0.0 {
-        found.tangent = reversed(found.tangent);
-    }
+    found.tangent = equations.oriented(found.tangent, &tangent);
     Ok(Finer {
         moved: guess.shift_to(&found.state),
         unfinished,
@@ -219,10 +214,10 @@ fn on_coarser(
     point: &Point,
     in_plane: bool,
 ) -> Option<(usize, Values, Condition)> {
-    let mut equations = Equations::new(family, grid.coarsened()?).ok()?;
+    let mut equations = Equations::new(family, grid.coarsened()?);
     let near = Point {
         state: restrict(&point.state),
-        tangent: equations.normalised(Tangent {
+        tangent: equations.normalised(Direction {
             increments: every_second(&point.tangent.increments),
             ..point.tangent
         }),
@@ -241,7 +236,7 @@ fn on_coarser(
     }
     let values = Values::of(&mut equations, &found.state, found.fraction).ok()?;
     let segments = equations.grid().segments();
-    condition.refine(equations.leaves.at(point.fraction).ok()?);
+    condition.refine(equations.leaves.at([point.fraction]).ok()?);
     Some((segments, values, condition))
 }
 
@@ -253,7 +248,7 @@ fn refine_in(
     in_plane: bool,
 ) -> Result<Refined, Doubt> {
     let mut table = Table::of_regular_point();
-    let mut equations = Equations::new(family, grid.clone())?;
+    let mut equations = Equations::new(family, grid.clone());
     let mut condition = match on_coarser(family, grid, point, in_plane) {
         Some((segments, values, condition)) => {
             table.push(segments, values);
@@ -264,9 +259,7 @@ fn refine_in(
     };
     let start = (&point.state, point.fraction);
     let (mut now, unfinished) = finished(&mut equations, start, condition.as_plane())?;
-    if equations.inner(&now.tangent, &point.tangent) < 0.0 {
-        now.tangent = reversed(now.tangent);
-    }
+    now.tangent = equations.oriented(now.tangent, &point.tangent);
     table.noise = unfinished;
     let values = Values::of(&mut equations, &now.state, now.fraction)?;
     table.push(grid.segments(), values);
@@ -304,16 +297,16 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
     let [after, before] = both_sides(|step| {
         let at = point.fraction + step;
-        let leaf = equations.leaves.at(at)?;
+        let leaf = equations.leaves.at([at])?;
         Ok::<_, OutOfRange>((at, leaf.energy(&point.state)))
     })?;
     let reaction = reaction_rate(equations, point)?;
-    let leaf = equations.leaves.at(point.fraction)?;
+    let leaf = equations.leaves.at([point.fraction])?;
     let nodes = observed_nodes(leaf, leaf.segments());
     let displacements = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
     Ok(Values {
         points: displacements
-            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.fraction))
+            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.params[0]))
             .collect(),
         fraction: 1.0,
         energy: (after.1 - before.1) / (after.0 - before.0),
@@ -323,15 +316,15 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
 
 /// Derivative of the reaction at held tips with respect to the parameter.
 fn reaction_rate(equations: &mut Equations, point: &Point) -> Result<DVec3, Stuck> {
-    if equations.leaves.at(point.fraction)?.leaf.held.is_none() {
+    if equations.leaves.at([point.fraction])?.leaf.held.is_none() {
         return Ok(DVec3::ZERO);
     }
     let tangent = &point.tangent;
     let [(after, force), (before, force_before)] = both_sides(|step| {
         let at = point.fraction + step;
-        let length = step / tangent.fraction;
-        let state = equations.moved(&point.state, at, &tangent.increments, length)?;
-        Ok::<_, OutOfRange>((at, equations.leaves.at(at)?.reaction(&state).0))
+        let length = step / tangent.params[0];
+        let state = equations.advanced(&point.state, [at], &tangent.increments, length)?;
+        Ok::<_, OutOfRange>((at, equations.leaves.at([at])?.reaction(&state).0))
     })?;
     Ok((force - force_before) / (after - before))
 }

@@ -1,7 +1,7 @@
 //! A point of a branch, extrapolated over finer and finer grids.
 
 use super::equations::{Equations, Stuck};
-use super::family::{Family, OutOfRange};
+use super::family::{Family, Leaves, OutOfRange};
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::relax::richardson::Richardson;
 use crate::relax::shape_of;
@@ -51,9 +51,8 @@ impl Refined {
     /// # Errors
     /// If the extrapolated parameter is one that no leaf can have.
     pub fn shapes(&self, family: &Family) -> Result<Vec<RodShape>, OutOfRange> {
-        family.with(self.fraction, &self.grid, |leaf| {
-            shape_of(leaf, &self.state)
-        })
+        let mut leaves = Leaves::new(family, self.grid.clone());
+        Ok(shape_of(leaves.at([self.fraction])?, &self.state))
     }
 }
 
@@ -110,7 +109,7 @@ pub(super) fn observed_nodes(leaf: &DiscreteLeaf, segments: usize) -> impl Itera
 
 impl Values {
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
-        let leaf = equations.leaves.at(fraction)?;
+        let leaf = equations.leaves.at([fraction])?;
         let nodes = observed_nodes(leaf, state.segments());
         let reaction = match leaf.leaf.held {
             Some(_) => leaf.reaction(state).0,

@@ -4,9 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use super::halt::Halt;
-use super::manifold::Manifold;
-use super::plane::Plane;
-use super::search::NotFound;
+use super::manifold::{Manifold, Plane};
 use super::singular_point::{Seed, SingularPoint};
 use super::table::Verified;
 use super::walk::{Walk, WalkOptions};
@@ -31,7 +29,7 @@ type Progress<'p> = dyn FnMut(usize, [f64; 2]) + Send + 'p;
 
 /// Follows the boundary through a critical point of a branch in both directions, in parallel.
 pub fn follow(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     seed: &Seed,
     how: &WalkOptions,
@@ -44,12 +42,9 @@ pub fn follow(
         ends: [Halt::Stuck; 2],
         factorizations: 0,
     };
-    let begun = Manifold::new(plane, grid.clone()).map_err(NotFound::from);
-    let begun = begun.and_then(|mut manifold| {
-        let begun = SingularPoint::begin(&mut manifold, seed);
-        boundary.factorizations += manifold.equations.factorizations;
-        begun
-    });
+    let mut manifold = Manifold::new(plane, grid.clone());
+    let begun = SingularPoint::begin(&mut manifold, seed);
+    boundary.factorizations += manifold.factorizations;
     let first = match begun {
         Ok(first) => first,
         Err(lost) => {

@@ -33,7 +33,6 @@ mod grids;
 mod halt;
 mod manifold;
 mod neighbours;
-mod plane;
 mod refine;
 mod search;
 mod singular_point;
@@ -47,9 +46,8 @@ pub use grids::coarsened;
 pub use halt::Halt;
 #[cfg(test)]
 pub use manifold::Direction;
-pub use manifold::Solution;
+pub use manifold::{Plane, Solution};
 pub use neighbours::{Neighbour, beside};
-pub use plane::Plane;
 pub use refine::Accuracy;
 pub use singular_point::Seed;
 pub use special::Special;

@@ -1,8 +1,7 @@
 //! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
 use super::grids::{on_coarser, on_finer};
-use super::manifold::{Manifold, Solution};
-use super::plane::Plane;
+use super::manifold::{Manifold, Plane, Solution};
 use super::search::{NotFound, Search};
 use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
@@ -70,13 +69,14 @@ pub struct Step {
 /// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
 /// coarser ones if possible.
 pub fn refine(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let rigid = Manifold::new(plane, grid.clone())?
-        .leaf(step.point.solution.params)?
+    let rigid = Manifold::new(plane, grid.clone())
+        .leaves
+        .at(step.point.solution.params)?
         .stiffest();
     if rigid * NEARLY_RIGID < 1.0
         && let Some((grid, point)) = on_coarser(plane, grid, &step.point)
@@ -94,12 +94,12 @@ pub fn refine(
 
 /// The same, starting from this grid.
 fn refine_from(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let mut manifold = Manifold::new(plane, grid.clone())?;
+    let mut manifold = Manifold::new(plane, grid.clone());
     let mut near = step.point.clone();
     let given = step.given.or_else(|| given_at(&manifold, &near));
     let given = given.filter(|_| step.special.is_none());
@@ -116,7 +116,7 @@ fn refine_from(
         let mut start = near.solution.clone();
         let believed = table.tips.best().map_or(0, |best| best.columns + 1);
         predict_spot(&levels, &params, believed, &mut start);
-        let rigid = manifold.leaf(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
+        let rigid = manifold.leaves.at(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
         let (point, along) = match (step.special, rigid) {
             (None, false) => {
                 let left = LEFT * enough;
@@ -127,7 +127,7 @@ fn refine_from(
             }
             _ => relocated(&mut manifold, &near, step.special, given)?,
         };
-        factorizations += manifold.equations.factorizations;
+        factorizations += manifold.factorizations;
         let shift = near.solution.state.shift_to(&point.solution.state);
         if shift > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
@@ -140,7 +140,7 @@ fn refine_from(
         }
         near = point;
         levels.push(Level {
-            leaf: manifold.leaf(near.solution.params)?.clone(),
+            leaf: manifold.leaves.at(near.solution.params)?.clone(),
             state: near.solution.state.clone(),
         });
         params.push(near.solution.params);
@@ -284,7 +284,7 @@ fn unsoftened(
     let mut values_by_softening = [[0.0; 2]; 4];
     let mut search = sought(manifold, near, given);
     for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
-        let mut soft = Manifold::new(manifold.plane, grid.clone())?;
+        let mut soft = Manifold::new(manifold.leaves.family, grid.clone());
         soft.soften(softening * (k + 1) as f64);
         search.solution = match special {
             Some(special) => {

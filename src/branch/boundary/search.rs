@@ -104,18 +104,18 @@ impl Search {
         frozen: bool,
         contraction: &mut Contraction,
     ) -> Result<(Found, f64), NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
-        let along = manifold.equations.momentum(&self.along.increments);
+        let border = manifold.momenta(&self.soft);
+        let along = manifold.momentum(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let rates = manifold.rates(&solution)?;
-            let (mut sample, noise) = manifold.sample(solution, &border, rates, false)?;
+            let rates = manifold.rates(&solution, false)?;
+            let mut sample = manifold.sample(solution, &border, rates, false)?;
             let eigen = eigen(&sample, self.neutral);
             let forces = &sample.solved.forces.multipliers;
             let excited = |mode: &Vec<f64>| {
                 let force: f64 = mode.iter().zip(forces).map(|(part, f)| part * f).sum();
-                force.abs() > noise
+                force.abs() > sample.noise
             };
             if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
                 break;
@@ -126,10 +126,8 @@ impl Search {
                 (&along, self.along.params.as_slice(), 0.0),
                 (&slope, numbers.as_slice(), value),
             ];
-            let (increments, changes, size) = sample.solved.step(&functions, noise)?;
-            let params = [0, 1].map(|i| sample.solution.params[i] + changes[i]);
-            let state = manifold.advanced(&sample.solution.state, params, &increments, 1.0)?;
-            solution = Solution { state, params };
+            let (next, size) = manifold.newton_step(&sample, &functions)?;
+            solution = next;
             contraction.update(size, previous);
             let first = contraction.error_after_first(size, 0.0);
             let accuracy = (self.accuracy, ROUNDED);
@@ -184,13 +182,13 @@ impl Search {
 
     /// The zero of the eigenvalue by a secant method.
     pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
-        let rates = manifold.rates(&self.solution)?;
+        let border = manifold.momenta(&self.soft);
+        let rates = manifold.rates(&self.solution, false)?;
         // From the previous solution, to which the next is close.
         let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, NotFound> {
             let solution = manifold.moved(from, &self.across, step)?;
             let normals = [&self.along, &self.across];
-            let sample = manifold.correct(&solution, normals, &border, &rates)?;
+            let sample = manifold.deflated(solution, normals, &border, Some(&rates), false)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,

@@ -86,7 +86,7 @@ impl SingularPoint {
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),
-            params: direction.map(|part| part * critical.tangent.fraction),
+            params: direction.map(|part| part * critical.tangent.params[0]),
         };
         let slope = critical.slope / manifold.inner(&across, &across).sqrt();
         let across = manifold.normalised(across);
@@ -159,10 +159,10 @@ impl SingularPoint {
         manifold: &mut Manifold,
         found: Found,
     ) -> Result<SingularPoint, NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
+        let border = manifold.momenta(&self.soft);
         let solution = found.sample.solution;
-        let rates = manifold.rates(&solution)?;
-        let (sample, _) = manifold.sample(solution, &border, rates, true)?;
+        let rates = manifold.rates(&solution, false)?;
+        let sample = manifold.sample(solution, &border, rates, true)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(manifold, &sample, &eigen)?;
         let soft = soft(manifold, &sample, &eigen);
@@ -215,17 +215,16 @@ impl SingularPoint {
         soft: &[Field],
     ) -> Result<[f64; 2], NotFound> {
         let modes = &soft[..self.neutral.min(soft.len())];
-        let border = manifold.equations.momenta(soft);
-        let stiff = manifold.leaf(sample.solution.params)?.stiffest() * STIFF <= 1.0;
+        let border = manifold.momenta(soft);
+        let stiff = manifold.leaves.at(sample.solution.params)?.stiffest() * STIFF <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
             let mut at = |step: f64| {
                 let mut solution = manifold.beside(&sample.solution, direction, step)?;
                 if stiff {
-                    let normals = [&basis[0], &basis[1]];
-                    solution = manifold
-                        .correct(&solution, normals, &border, &sample.rates)?
-                        .solution;
+                    let (normals, rates) = ([&basis[0], &basis[1]], Some(&sample.rates[..]));
+                    let corrected = manifold.deflated(solution, normals, &border, rates, false)?;
+                    solution = corrected.solution;
                 }
                 Ok::<_, Stuck>((step, manifold.curvature(solution, modes)?))
             };
@@ -370,18 +369,17 @@ fn independent<'m>(
     modes: impl Iterator<Item = &'m Field>,
     count: usize,
 ) -> Vec<Field> {
-    let equations = &manifold.equations;
     let mut kept: Vec<Field> = Vec::new();
     for mode in modes {
-        let size = equations.product(mode, mode).sqrt();
+        let size = manifold.product(mode, mode).sqrt();
         let mut mode = times(mode, 1.0 / size);
         for _ in 0..2 {
             for other in &kept {
-                let part = equations.product(other, &mode);
+                let part = manifold.product(other, &mode);
                 add(&mut mode, -part, other);
             }
         }
-        let size = equations.product(&mode, &mode).sqrt();
+        let size = manifold.product(&mode, &mode).sqrt();
         if size > 1e-6 && kept.len() < count {
             kept.push(times(&mode, 1.0 / size));
         }

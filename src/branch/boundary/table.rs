@@ -101,7 +101,7 @@ impl Table {
             Some((which, _)) => point.across_at(manifold, which),
             None => (point.normal.clone(), point.slope),
         };
-        let leaf = manifold.leaf(point.solution.params)?;
+        let leaf = manifold.leaves.at(point.solution.params)?;
         let stiffest = stiffest_condensed(leaf).min(1.0 / softening);
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {

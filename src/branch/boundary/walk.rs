@@ -4,8 +4,7 @@ use rayon::prelude::*;
 
 use super::grids::on_finer;
 use super::halt::Halt;
-use super::manifold::Manifold;
-use super::plane::Plane;
+use super::manifold::{Manifold, Plane};
 use super::refine::{Accuracy, Step, refine};
 use super::search::NotFound;
 use super::singular_point::SingularPoint;
@@ -55,7 +54,7 @@ pub struct WalkOptions {
 
 /// A boundary followed in one direction.
 pub struct Walk<'a, 'h> {
-    plane: Plane<'a>,
+    plane: &'a Plane<'a>,
     how: &'h WalkOptions,
     /// The second parameter at the starting point.
     second: f64,
@@ -72,7 +71,7 @@ pub struct Walk<'a, 'h> {
 impl<'a, 'h> Walk<'a, 'h> {
     /// From its first point, at which one of the parameters may be given.
     pub fn new(
-        plane: Plane<'a>,
+        plane: &'a Plane<'a>,
         how: &'h WalkOptions,
         first: SingularPoint,
         given: Option<usize>,
@@ -101,10 +100,7 @@ impl<'a, 'h> Walk<'a, 'h> {
         cancelled: &dyn Fn() -> bool,
         progress: &mut dyn FnMut(usize, [f64; 2]),
     ) -> Halt {
-        let mut manifold = match Manifold::new(self.plane, grid) {
-            Ok(manifold) => manifold,
-            Err(_) => return Halt::OutOfRange,
-        };
+        let mut manifold = Manifold::new(self.plane, grid);
         let mut counted = 0;
         loop {
             if cancelled() {
@@ -121,8 +117,8 @@ impl<'a, 'h> Walk<'a, 'h> {
                 });
                 self.extend(&mut manifold, AHEAD, progress);
             });
-            self.factorizations += manifold.equations.factorizations - counted;
-            counted = manifold.equations.factorizations;
+            self.factorizations += manifold.factorizations - counted;
+            counted = manifold.factorizations;
             let all = new.len() + self.verified.len() == self.steps.len();
             let end = match (self.accept(found), self.end) {
                 (None, Some(end)) if all => match end {

@@ -42,14 +42,14 @@ pub fn trace_observed(
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
     let ends = vary.ends();
-    let make = |value: f64| -> Result<Scenario, String> {
+    let make = |[value]: [f64; 1]| -> Result<Scenario, String> {
         let at = request.base.at(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
     for value in ends {
         request.base.at(&[(keys, value)])?;
     }
-    let family = Family::new(&make, (ends[0], ends[1]), vary.log);
+    let family = Family::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let scenario = request.base.at(&[(keys, ends[0])])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
@@ -171,7 +171,7 @@ impl Run<'_, '_> {
     /// cross it, breadth first.
     fn follow_all(&mut self, mut first: Point, trace: &mut Trace) {
         trace.segments = first.state.segments();
-        first.tangent = first.tangent.towards(true);
+        first.tangent = first.tangent.growing();
         let values = self.request.vary.values.len();
         let longest = (1.0 / (values - 1) as f64).min(LONGEST);
         let how = Walk::new(longest, self.request.most_points);
@@ -249,7 +249,7 @@ impl Run<'_, '_> {
 
     /// Waves and twist of the leaf at a point, on its finest grid.
     fn undulation(&self, refined: &Refined) -> Option<Undulation> {
-        let scenario = self.family.scenario(refined.fraction).ok()?;
+        let scenario = self.family.scenario([refined.fraction]).ok()?;
         let rods = refined.shapes(self.family).ok()?;
         let error = Some(refined.error * self.family.scale().length);
         Some(Undulation::at_stations(
