@@ -97,7 +97,7 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
             last = state.shift_to(&next);
             state = next;
         }
-        let pushed = Leaf::new(&make(1.02).unwrap());
+        let pushed = Leaf::new(&make([1.02]).unwrap());
         let beyond = settle_from(&pushed, &grid, state.clone(), &Limit::default());
         let jump = beyond.map_or(f64::INFINITY, |beyond| state.shift_to(&beyond));
         // As far as eight more such steps would lead at most, if it only bends aside.

@@ -1,13 +1,14 @@
 //! The first points of branches: the equilibrium that a relaxation found, and those beside a
 //! branch point.
 
+use super::Point;
 use super::critical::Critical;
 use super::equations::{Equations, Stuck};
 use super::family::Family;
 use super::follow::Grids;
 use super::refine::refine;
-use super::{Point, prolonged};
 use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::relax::prolong::prolong;
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
 /// The finest grid on which the first point is sought.
@@ -95,7 +96,7 @@ fn search<'a>(
                 return found.and(Err(Stuck::BesideBifurcation));
             }
         }
-        state = prolonged(&discrete, &state);
+        state = prolong(&discrete, &state);
         grid = grid.refined();
         discrete = DiscreteLeaf::new(leaf, grid.clone());
     }

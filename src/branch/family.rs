@@ -70,7 +70,7 @@ impl Range {
 }
 
 /// A value of the parameter that no leaf can have, with the message of the scenario.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct OutOfRange(pub String);
 

@@ -28,6 +28,7 @@ mod begin;
 pub mod boundary;
 mod cache;
 mod climb;
+mod correct;
 mod critical;
 mod deflation;
 mod equations;
@@ -52,8 +53,6 @@ pub(crate) use refine::{on_finer, refine_at};
 pub(crate) use refine_critical::NEARLY_RIGID;
 pub use refined::{Doubt, Refined};
 pub use walk::{End, Walk, walk};
-
-use crate::relax::prolong::prolong as prolonged;
 
 use crate::leaf::{Field, State};
 

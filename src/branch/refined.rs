@@ -78,8 +78,11 @@ pub enum Doubt {
 }
 
 impl From<Stuck> for Doubt {
-    fn from(_: Stuck) -> Self {
-        Doubt::Unsolved
+    fn from(stuck: Stuck) -> Self {
+        match stuck {
+            Stuck::Separated | Stuck::Unfolded => Doubt::OtherBranch,
+            _ => Doubt::Unsolved,
+        }
     }
 }
 
@@ -223,16 +226,11 @@ impl Table {
         let Some(best) = self.of(|values| vec![values.fraction]).best() else {
             return f64::INFINITY;
         };
-        let fraction = |back: usize| {
-            Some(
-                self.rows
-                    .get(self.rows.len().checked_sub(back)?)?
-                    .1
-                    .fraction,
-            )
-        };
-        match (best.columns, fraction(2), fraction(3)) {
-            (0, Some(last), Some(before)) => best.error.max(LEAST_FALL * (last - before).abs()),
+        match self.rows.as_slice() {
+            [.., (_, before), (_, last), _] if best.columns == 0 => {
+                let fall = LEAST_FALL * (last.fraction - before.fraction).abs();
+                best.error.max(fall)
+            }
             _ => best.error,
         }
     }

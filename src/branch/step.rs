@@ -39,7 +39,7 @@ impl Found {
             _ => return Ok(None),
         };
         let part = (edge - now.fraction) / (self.point.fraction - now.fraction);
-        self.point = at_edge(equations, now, edge, part * step)?;
+        (self.point, _) = at_edge(equations, now, edge, part * step)?;
         self.step = part * step;
         Ok(Some(edge))
     }
@@ -69,21 +69,26 @@ fn advance_to_edge(
     if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let point = at_edge(equations, now, edge, length)?;
+    let (point, drift) = at_edge(equations, now, edge, length)?;
     let part = length / step;
-    let state = equations.advanced(&now.state, [edge], &now.tangent.increments, length)?;
     Ok(Found {
-        drift: state.shift_to(&point.state) / part,
+        drift: drift / part,
         point,
         step: length,
     })
 }
 
-/// The point at an end of the range, predicted `length` along the tangent.
-fn at_edge(equations: &mut Equations, now: &Point, edge: f64, length: f64) -> Result<Point, Stuck> {
-    let increments = &now.tangent.increments;
-    let state = equations.advanced(&now.state, [edge], increments, length)?;
+/// The point at an end of the range, predicted `length` along the tangent, and its distance from
+/// the prediction.
+fn at_edge(
+    equations: &mut Equations,
+    now: &Point,
+    edge: f64,
+    length: f64,
+) -> Result<(Point, f64), Stuck> {
+    let state = equations.advanced(&now.state, [edge], &now.tangent.increments, length)?;
     let mut point = equations.correct(&state, edge, None)?;
     point.tangent = equations.oriented(point.tangent, &now.tangent);
-    Ok(point)
+    let drift = state.shift_to(&point.state);
+    Ok((point, drift))
 }

@@ -78,15 +78,17 @@ impl Walk<'_> {
     }
 }
 
-/// How a branch ended.
-#[derive(Clone, Debug)]
+/// How a branch ended, or a boundary on one of its sides.
+#[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// At the end of the range.
+    /// At the end of the range; of a boundary, at an end of one of the ranges.
     Reached,
     /// Back at the start of the range.
     Returned,
     /// Where it began.
     Closed,
+    /// On a boundary that was followed before.
+    Met,
     /// After as many points as were allowed.
     MostPoints,
     /// Where the stopping criterion was met.

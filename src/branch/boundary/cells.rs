@@ -37,10 +37,9 @@ pub struct AtRest {
 }
 
 /// What was found on the straight path from an equilibrium to another point of the plane.
-#[derive(Default)]
 pub struct Path {
-    /// The grid on which it was followed, if that could be begun.
-    pub grid: Option<Grid>,
+    /// The grid on which it was followed.
+    pub grid: Grid,
     /// Tips of all rods along it, in the family's units.
     pub tips: Vec<Vec<DVec3>>,
     /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
@@ -72,7 +71,14 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
     let make = between(plane, [from.solution.params, to]);
     let family = plane.along_path(&*make);
-    let mut path = Path::default();
+    let mut path = Path {
+        grid: from.grid.clone(),
+        tips: Vec::new(),
+        critical: Vec::new(),
+        turned: false,
+        end: None,
+        factorizations: 0,
+    };
     let Ok(family) = family else { return path };
     let mut equations = Equations::new(&family, from.grid.clone());
     let Ok(mut first) = equations.correct(&from.solution.state, 0.0, None) else {
@@ -129,7 +135,7 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
     let before = equations.factorizations;
     let branch = walk(equations, first, &how, &mut |_, _| {});
     path.factorizations += equations.factorizations - before;
-    path.grid = Some(equations.grid().clone());
+    path.grid.clone_from(equations.grid());
     let tips = |point: &Point| point.state.tips().collect();
     path.tips = branch.points.iter().map(tips).collect();
     path.critical = branch.critical.into_iter().map(|(_, it)| it).collect();

@@ -1,8 +1,8 @@
 //! Transfer of boundary points to finer and coarser grids.
 
 use super::manifold::{Direction, Manifold, Plane, Solution};
-use super::search::NotFound;
 use super::singular_point::SingularPoint;
+use crate::branch::equations::Stuck;
 use crate::branch::field::{every_second, prolong as prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::{prolong, restrict};
@@ -15,7 +15,7 @@ const COARSEST: usize = 8;
 pub fn on_finer<'a>(
     manifold: &mut Manifold<'a>,
     point: &SingularPoint,
-) -> Result<(Manifold<'a>, SingularPoint), NotFound> {
+) -> Result<(Manifold<'a>, SingularPoint), Stuck> {
     let state = prolong(
         manifold.leaves.at(point.solution.params)?,
         &point.solution.state,

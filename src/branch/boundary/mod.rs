@@ -30,7 +30,6 @@
 mod cells;
 mod follow;
 mod grids;
-mod halt;
 mod manifold;
 mod neighbours;
 mod refine;
@@ -43,7 +42,6 @@ mod walk;
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
 pub use follow::{Boundary, follow};
 pub use grids::coarsened;
-pub use halt::Halt;
 #[cfg(test)]
 pub use manifold::Direction;
 pub use manifold::{Plane, Solution};

@@ -4,7 +4,6 @@ use std::ops::RangeInclusive;
 
 use super::grids::state_on_coarser;
 use super::manifold::{Direction, Manifold, Plane, Solution};
-use super::search::NotFound;
 use super::table::Verified;
 use crate::branch::critical::Kind;
 use crate::branch::field::every_second;
@@ -72,28 +71,26 @@ fn on_sheet(
     along: [f64; 2],
     (away, indices): (f64, &RangeInclusive<usize>),
 ) -> Option<Neighbour> {
-    let found = || -> Result<Neighbour, NotFound> {
-        let mut manifold = Manifold::new(plane, grid.clone());
-        let along = Direction {
-            params: along,
-            ..manifold.unit_parameter(0)
-        };
-        let start = Solution {
-            state: point.state.clone(),
-            params: point.params,
-        };
-        let start = manifold.beside(&start, &point.across, away)?;
-        let rates = manifold.rates(&start, false)?;
-        let normals = [&along, &point.across];
-        let sample = manifold.deflated(start, normals, &[], Some(&rates), false)?;
-        Ok(Neighbour {
-            solution: sample.solution,
-            index: sample.solved.negative,
-            fallen_from: None,
-        })
+    let mut manifold = Manifold::new(plane, grid.clone());
+    let along = Direction {
+        params: along,
+        ..manifold.unit_parameter(0)
     };
-    let found = found().ok()?;
-    (indices.contains(&found.index) && inside(found.solution.params)).then_some(found)
+    let start = Solution {
+        state: point.state.clone(),
+        params: point.params,
+    };
+    let start = manifold.beside(&start, &point.across, away).ok()?;
+    let rates = manifold.rates(&start, false).ok()?;
+    let normals = [&along, &point.across];
+    let found = manifold.deflated(start, normals, &[], Some(&rates), false);
+    let found = found.ok()?;
+    let index = found.solved.negative;
+    (indices.contains(&index) && inside(found.solution.params)).then_some(Neighbour {
+        solution: found.solution,
+        index,
+        fallen_from: None,
+    })
 }
 
 /// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with

@@ -2,11 +2,12 @@
 
 use super::grids::{on_coarser, on_finer};
 use super::manifold::{Manifold, Plane, Solution};
-use super::search::{NotFound, Search};
+use super::search::Search;
 use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
 use super::table::{Parameters, Table, Verified};
 use crate::branch::critical::Kind;
+use crate::branch::equations::Stuck;
 use crate::branch::refine_critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
@@ -199,7 +200,7 @@ fn relocated(
     near: &SingularPoint,
     special: Option<Special>,
     given: Option<usize>,
-) -> Result<(SingularPoint, Option<f64>), NotFound> {
+) -> Result<(SingularPoint, Option<f64>), Stuck> {
     if let Some(special) = special {
         let (point, slope) = locate_near(manifold, near, special)?;
         return Ok((point, (special == Special::Crossing).then_some(slope)));
@@ -231,7 +232,7 @@ fn newton_or_secant(
     given: Option<usize>,
     accuracy: f64,
     contraction: &mut Contraction,
-) -> Result<(SingularPoint, f64), NotFound> {
+) -> Result<(SingularPoint, f64), Stuck> {
     let search = near.search(manifold, given, start.clone(), (accuracy, NEAR));
     let frozen = near.kind == Kind::Branching;
     let found = search.newton(manifold, frozen, contraction);
@@ -254,7 +255,7 @@ fn least_softened(
     near: &SingularPoint,
     sought: (Option<Special>, Option<usize>),
     (table, along): (&Table, Option<f64>),
-) -> Result<Parameters, NotFound> {
+) -> Result<Parameters, Stuck> {
     let largest = |[a, b]: [f64; 2]| a.max(b);
     let mut numbers = unsoftened(manifold, near, sought, FIRST_SOFTENING)?;
     let finest = FINER * manifold.grid().segments() as f64;
@@ -279,7 +280,7 @@ fn unsoftened(
     near: &SingularPoint,
     (special, given): (Option<Special>, Option<usize>),
     softening: f64,
-) -> Result<Parameters, NotFound> {
+) -> Result<Parameters, Stuck> {
     let grid = manifold.grid().clone();
     let mut values_by_softening = [[0.0; 2]; 4];
     let mut search = sought(manifold, near, given);
@@ -315,13 +316,4 @@ fn unsoftened(
         softening,
         errors: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
     })
-}
-
-impl From<NotFound> for Doubt {
-    fn from(lost: NotFound) -> Self {
-        match lost {
-            NotFound::Stuck(stuck) => stuck.into(),
-            NotFound::Separated | NotFound::Unfolded => Doubt::OtherBranch,
-        }
-    }
 }

@@ -27,22 +27,6 @@ pub struct Eigen {
     pub others: Vec<f64>,
 }
 
-/// Why no point of a boundary is found.
-#[derive(Clone, Debug)]
-pub enum NotFound {
-    Stuck(Stuck),
-    /// The modes do not become neutral together.
-    Separated,
-    /// The parameter does work on the mode, so that there is no branch point.
-    Unfolded,
-}
-
-impl<E: Into<Stuck>> From<E> for NotFound {
-    fn from(stuck: E) -> Self {
-        NotFound::Stuck(stuck.into())
-    }
-}
-
 /// A search for a point of a boundary.
 pub struct Search {
     /// From here,
@@ -103,7 +87,7 @@ impl Search {
         manifold: &mut Manifold,
         frozen: bool,
         contraction: &mut Contraction,
-    ) -> Result<(Found, f64), NotFound> {
+    ) -> Result<(Found, f64), Stuck> {
         let border = manifold.momenta(&self.soft);
         let along = manifold.momentum(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
@@ -146,7 +130,7 @@ impl Search {
             }
             previous = size;
         }
-        Err(NotFound::Stuck(Stuck::NotConverged))
+        Err(Stuck::NotConverged)
     }
 
     /// Derivatives of the eigenvalue with respect to increments and parameters, over its slope.
@@ -157,7 +141,7 @@ impl Search {
         eigen: &Eigen,
         border: &[Field],
         frozen: bool,
-    ) -> Result<(Field, [f64; 2]), NotFound> {
+    ) -> Result<(Field, [f64; 2]), Stuck> {
         let own = &eigen.vectors[..self.neutral];
         let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
         let modes: Vec<Field> = modes.collect();
@@ -181,11 +165,11 @@ impl Search {
     }
 
     /// The zero of the eigenvalue by a secant method.
-    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
+    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, Stuck> {
         let border = manifold.momenta(&self.soft);
         let rates = manifold.rates(&self.solution, false)?;
         // From the previous solution, to which the next is close.
-        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, NotFound> {
+        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, Stuck> {
             let solution = manifold.moved(from, &self.across, step)?;
             let normals = [&self.along, &self.across];
             let sample = manifold.deflated(solution, normals, &border, Some(&rates), false)?;
@@ -203,7 +187,7 @@ impl Search {
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || (distance + step).abs() > self.furthest {
-                return Err(NotFound::Stuck(Stuck::NotConverged));
+                return Err(Stuck::NotConverged);
             }
             if step.abs() < self.accuracy {
                 return Ok(best);
@@ -223,6 +207,6 @@ impl Search {
                 return Ok(best);
             }
         }
-        Err(NotFound::Stuck(Stuck::NotConverged))
+        Err(Stuck::NotConverged)
     }
 }

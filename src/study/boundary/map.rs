@@ -186,7 +186,7 @@ impl<'p> Cells<'p> {
         };
         let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
             ends: edge.ends,
-            grid: path.grid.unwrap_or_else(|| from.grid.clone()),
+            grid: path.grid,
             critical: path.critical,
         });
         self.edges[cell].push(edge);

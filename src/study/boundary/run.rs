@@ -4,17 +4,17 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::known::{Start, remove_known, traced};
+use super::known::remove_known;
 use super::map::Cells;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside, word};
 use super::{BoundaryRequest, MOST_CURVES};
-use crate::branch::Range;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Halt, Neighbour, Plane, Seed, Solution, Verified,
-    WalkOptions, beside, coarsened, refine_on_path,
+    self as curves, Accuracy, AtRest, Neighbour, Plane, Seed, Solution, Verified, WalkOptions,
+    beside, coarsened, refine_on_path,
 };
+use crate::branch::{End, Range};
 use crate::scenario::Scenario;
-use crate::study::trace::{Trace, TraceError, TraceRequest};
+use crate::study::trace::{Trace, TraceError, TraceRequest, traced};
 use crate::study::vary::Vary;
 
 /// Longest step along a curve if few values are asked for.
@@ -57,7 +57,7 @@ pub fn boundary(
         base: base.with(&across.keys, start)?,
         ..request.trace.clone()
     };
-    let begun = traced(&along, &mut |points, value| {
+    let begun = traced(&along, &mut |_, points, value| {
         progress(None, points, [value, start]);
     })?;
     let ranges = [vary, across].map(|it| Range {
@@ -78,10 +78,11 @@ pub fn boundary(
     for (critical, refined) in &begun.critical {
         let seed = Seed {
             critical,
+            refined,
             from,
             direction: [1.0, 0.0],
         };
-        run.follow_new(&Start { seed, refined }, &mut boundary);
+        run.follow_new(&seed, &mut boundary);
     }
     if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
         let kinks = plane.first().kinks();
@@ -147,7 +148,7 @@ fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
 /// of the first trace are.
 fn conclude(boundary: &mut Boundary, traced: bool) {
     let curves = &boundary.curves;
-    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(Halt::complete);
+    let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(End::complete);
     if curves.is_empty() && boundary.remark.is_none() {
         let [vary, across] = &boundary.keys;
         let at = across.text(boundary.start);
@@ -176,8 +177,8 @@ struct Run<'r, 'p> {
 
 impl Run<'_, '_> {
     /// Follows the curve through a critical point, unless it lies on a known one.
-    fn follow_new(&mut self, start: &Start, boundary: &mut Boundary) {
-        if self.known.iter().any(|known| start.is_on(known)) {
+    fn follow_new(&mut self, seed: &Seed, boundary: &mut Boundary) {
+        if self.known.iter().any(|known| seed.is_on(known)) {
             return;
         }
         if self.tried == MOST_CURVES {
@@ -188,8 +189,8 @@ impl Run<'_, '_> {
         let (plane, progress) = (self.plane, &mut *self.progress);
         let number = boundary.curves.len();
         let mut report = |points, params| progress(Some(number), points, plane.values(params));
-        let grid = start.grid(plane.first().kinks());
-        let mut curve = curves::follow(plane, &grid, &start.seed, &self.how, &mut report);
+        let grid = seed.grid(plane.first().kinks());
+        let mut curve = curves::follow(plane, &grid, seed, &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
             remove_known(&mut curve, &self.known);
@@ -220,10 +221,11 @@ impl Run<'_, '_> {
                     if let Ok(refined) = &refined {
                         let seed = Seed {
                             critical,
+                            refined,
                             from,
                             direction,
                         };
-                        self.follow_new(&Start { seed, refined }, boundary);
+                        self.follow_new(&seed, boundary);
                     }
                 }
             }
@@ -238,7 +240,7 @@ fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
         multiplicity: curve.neutral,
-        ends: curve.ends,
+        ends: curve.ends.clone(),
         points: (curve.points.iter().enumerate())
             .map(|(k, point)| point_in_units(plane, k + 1, point))
             .collect(),
