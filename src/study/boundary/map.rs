@@ -184,7 +184,7 @@ impl<'p> Cells<'p> {
             tips: path.tips,
             found: end.map(|end| end.index),
         };
-        let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
+        let unexplained = (!edge.is_explained(curves)).then_some(Unexplained {
             ends: edge.ends,
             grid: path.grid,
             critical: path.critical,
