@@ -160,7 +160,10 @@ fn a_round_column_buckles_in_two_directions_all_along() {
     let (load, one) = ("load.tip_force[0]=0..-5.5", "stiffness.bending_3=0.5..2");
     let found = follow(ROD, round, load, one);
     assert!(!found.complete);
-    assert_eq!(found.curves[0].ends.map(|end| end.word()), ["parts"; 2]);
+    assert_eq!(
+        found.curves[0].ends.each_ref().map(|end| end.word()),
+        ["parts"; 2]
+    );
 }
 
 /// Lateral buckling under a tip load at P/sqrt(EI GJ), prebuckling bend included.

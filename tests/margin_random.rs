@@ -70,12 +70,12 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
         };
         let force = push.force.unwrap();
         assert!(push.error.unwrap() < 1e-3 * force, "{push:?}");
-        let make = |part: f64| {
+        let make = |[part]: [f64; 1]| {
             let mut pushed = scenario.clone();
             pushed.tip_force[push.direction.axis] += push.direction.sign() * part * force;
             Ok(pushed)
         };
-        let family = Family::new(&make, (0.0, 2.0), false).unwrap();
+        let family = Family::new(&make, [0.0, 2.0], false).unwrap();
         let leaf = Leaf::new(&scenario);
         // On one grid, fine enough for its folds.
         let mut options = on(64);
@@ -87,7 +87,7 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
         let grid = Grid::new(alone.shape.stations.len() - 1, leaf.kinks());
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let mut state = project(&leaf, &discrete, &alone.shape.rods);
-        let mut equations = Equations::new(&family, grid.clone()).unwrap();
+        let mut equations = Equations::new(&family, grid.clone());
         let mut last = 0.0;
         for step in 0..=196 {
             let part = 0.005 * f64::from(step);
@@ -97,7 +97,7 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
             last = state.shift_to(&next);
             state = next;
         }
-        let pushed = Leaf::new(&make(1.02).unwrap());
+        let pushed = Leaf::new(&make([1.02]).unwrap());
         let beyond = settle_from(&pushed, &grid, state.clone(), &Limit::default());
         let jump = beyond.map_or(f64::INFINITY, |beyond| state.shift_to(&beyond));
         // As far as eight more such steps would lead at most, if it only bends aside.

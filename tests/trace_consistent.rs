@@ -27,13 +27,14 @@ fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
     let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
     let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
     let mut point = equations.correct(&state, 0.0, None).ok()?;
-    point.tangent = point.tangent.towards(true);
+    point.tangent = point.tangent.growing();
     Some(point)
 }
 
 /// Energy of a state under the loads at a fraction of their range.
 fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
-    let energy = family.with(fraction, grid, |leaf| leaf.energy(state));
+    let mut equations = Equations::new(family, grid.clone());
+    let energy = (equations.leaves.at([fraction])).map(|leaf| leaf.energy(state));
     energy.unwrap()
 }
 
@@ -41,11 +42,11 @@ fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
 fn random_branches() {
     let (mut points, mut folds, mut crossings, mut missed, mut lost) = (0, 0, 0, 0, 0);
     for (case, scenario) in drawn(leaves(), 60).into_iter().enumerate() {
-        let make = |part: f64| Ok(loaded(&scenario, part));
-        let family = Family::new(&make, (1.0, MOST), false).unwrap();
+        let make = |[part]: [f64; 1]| Ok(loaded(&scenario, part));
+        let family = Family::new(&make, [1.0, MOST], false).unwrap();
         let leaf = Leaf::new(&scenario);
         let grid = Grid::new(8.max(leaf.kinks().len() + 1), leaf.kinks());
-        let mut equations = Equations::new(&family, grid.clone()).unwrap();
+        let mut equations = Equations::new(&family, grid.clone());
         let Some(first) = begin(&scenario, &mut equations) else {
             lost += 1;
             continue;
@@ -87,7 +88,7 @@ fn random_branches() {
         }
         // It turns round as often as there are folds.
         for (k, pair) in branch.points.windows(2).enumerate() {
-            let turned = pair[0].tangent.fraction * pair[1].tangent.fraction < 0.0;
+            let turned = pair[0].tangent.params[0] * pair[1].tangent.params[0] < 0.0;
             let here = branch.critical.iter().filter(|(after, _)| *after == k);
             let found = here.filter(|(_, point)| point.kind == Kind::Fold).count();
             if !branch.missed.contains(&k) {

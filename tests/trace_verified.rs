@@ -60,8 +60,8 @@ struct Found {
 }
 
 fn follow(case: usize, leaf: &Scenario) -> Found {
-    let make = |part: f64| Ok(varied(leaf, case % 5, part));
-    let family = Family::new(&make, (0.0, 1.0), false).unwrap();
+    let make = |[part]: [f64; 1]| Ok(varied(leaf, case % 5, part));
+    let family = Family::new(&make, [0.0, 1.0], false).unwrap();
     let options = to(TOLERANCE);
     let rest = relaxed(leaf, &options);
     let mut found = Found::default();
@@ -77,7 +77,7 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
             return found;
         }
     };
-    first.tangent = first.tangent.towards(true);
+    first.tangent = first.tangent.growing();
     let how = Walk::new(0.1, 200);
     let branch = grids.follow(first, &how, TOLERANCE, &mut |_, _| {});
     match &branch.end {
@@ -130,7 +130,7 @@ fn index_is_explained(case: usize, branch: &Followed) -> Vec<usize> {
 /// index. None if shooting finds none: next to a singular point it may not.
 fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize) -> Option<usize> {
     let point = &branch.points[number];
-    let scenario = family.scenario(point.fraction).unwrap();
+    let scenario = family.scenario([point.fraction]).unwrap();
     let (stations, rods) = (point.grid.sigma(), &point.shapes(family).unwrap()[..]);
     let start = Start::Leaf { stations, rods };
     let options = bvp::Options::new(start, stations, LocalError(SHARP));

@@ -1,13 +1,14 @@
 //! The first points of branches: the equilibrium that a relaxation found, and those beside a
 //! branch point.
 
+use super::Point;
 use super::critical::Critical;
-use super::equations::{Equations, Stuck, reversed};
+use super::equations::{Equations, Stuck};
 use super::family::Family;
 use super::follow::Grids;
 use super::refine::refine;
-use super::{Point, Tangent, prolonged};
 use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::relax::prolong::prolong;
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
 /// The finest grid on which the first point is sought.
@@ -46,7 +47,7 @@ pub fn begin<'a>(
             method: options.method.on_grid(finest),
             ..options.clone()
         };
-        let alone = relax(&family.scenario(0.0)?, &options, &mut |_| {});
+        let alone = relax(&family.scenario([0.0])?, &options, &mut |_| {});
         let Ok(alone) = alone else {
             return Err(stuck);
         };
@@ -74,7 +75,7 @@ fn search<'a>(
     let mut found = Err(Stuck::NotConverged);
     loop {
         if grid.segments() >= least {
-            let mut grids = Grids::new(family, grid.clone())?;
+            let mut grids = Grids::new(family, grid.clone());
             let point = grids.of(&state).correct(&state, 0.0, None).or_else(|_| {
                 let mut system = System::new(&discrete);
                 polish(&discrete, &mut state, &mut system, &mut Work::default());
@@ -95,7 +96,7 @@ fn search<'a>(
                 return found.and(Err(Stuck::BesideBifurcation));
             }
         }
-        state = prolonged(&discrete, &state);
+        state = prolong(&discrete, &state);
         grid = grid.refined();
         discrete = DiscreteLeaf::new(leaf, grid.clone());
     }
@@ -107,12 +108,12 @@ fn search<'a>(
 pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
     let across = critical.across(equations);
     let (family, grid) = (equations.leaves.family, equations.grid().clone());
-    [across.clone(), reversed(across)]
+    [across.clone(), across.reversed()]
         .iter()
         .filter_map(|direction| {
             let mut nearest = None;
             for away in AWAY {
-                let Ok(point) = first_point(equations, critical, direction, away) else {
+                let Ok(point) = critical.beside(equations, direction, away) else {
                     continue;
                 };
                 if refine(family, &grid, &point, accuracy).is_ok() {
@@ -123,16 +124,4 @@ pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> 
             nearest
         })
         .collect()
-}
-
-fn first_point(
-    equations: &mut Equations,
-    critical: &Critical,
-    direction: &Tangent,
-    away: f64,
-) -> Result<Point, Stuck> {
-    let increments = &direction.increments;
-    let fraction = critical.fraction + away * direction.fraction;
-    let state = equations.moved(&critical.state, fraction, increments, away)?;
-    equations.correct(&state, fraction, Some(direction))
 }

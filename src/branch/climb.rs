@@ -11,9 +11,9 @@
 //! The descent follows the same floor, and takes Newton's steps once it is convex. The stiffness
 //! of the leaf is not reduced meanwhile, which near a fold would lead elsewhere.
 
-use super::Point;
 use super::equations::{Equations, Linear, Stuck, factorized};
 use super::field::{add, largest, plus, times};
+use super::{Point, Solution};
 use crate::leaf::{Field, State};
 
 /// Largest number of steps of a climb, and the longest step (radians, lengths).
@@ -84,14 +84,18 @@ impl Equations<'_> {
         direction: &Field,
         stop: &dyn Fn() -> bool,
     ) -> Option<Point> {
-        let (mut state, mut direction) = (state.clone(), self.unit(direction));
+        let mut direction = self.unit(direction);
+        let mut now = Solution {
+            state: state.clone(),
+            params: [fraction],
+        };
         // The last step along the floor, and the curvature before it.
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..STEPS {
             if stop() {
                 return None;
             }
-            let linear = self.linearise(&mut state, fraction).ok()?;
+            let linear = self.assemble(&mut now, false).ok()?;
             let mut valley = self.valley(&direction, &linear)?;
             if valley.curvature < 0.0 || valley.shift > linear.shift {
                 // Beyond the inflection follow the mode of the lowest eigenvalue.
@@ -116,9 +120,9 @@ impl Equations<'_> {
                 add(&mut step, length, &valley.along);
                 direction = self.unit(&valley.along);
             }
-            state = self.moved(&state, fraction, &step, 1.0).ok()?;
+            now.state = self.advanced(&now.state, now.params, &step, 1.0).ok()?;
             if newton && size < NEAR {
-                let point = self.correct(&state, fraction, None).ok()?;
+                let point = self.correct(&now.state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
         }
@@ -128,7 +132,7 @@ impl Equations<'_> {
     /// The eigenvalue nearest to zero at a point, with respect to the mass matrix.
     pub fn softest(&mut self, point: &Point) -> Result<f64, Stuck> {
         let modes = self.soft_modes(point, SOFT)?;
-        let linear = self.linearise(&mut point.state.clone(), point.fraction)?;
+        let linear = self.assemble(&mut point.solution(), false)?;
         let border = [self.momentum(&modes[0])];
         let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
         Ok(-solved.h[(0, 0)] / self.mass)
@@ -142,7 +146,7 @@ impl Equations<'_> {
         direction: &Field,
         stop: &dyn Fn() -> bool,
     ) -> Result<[Result<Point, State>; 2], Stuck> {
-        self.linearise(&mut saddle.state.clone(), saddle.fraction)?;
+        self.assemble(&mut saddle.solution(), false)?;
         let mode = self.lowest_mode(direction).ok_or(Stuck::NotConverged)?;
         Ok([1.0, -1.0].map(|sign| {
             let direction = times(&mode, sign);
@@ -161,33 +165,35 @@ impl Equations<'_> {
     ) -> Result<Point, State> {
         let (mut direction, mut length) = (self.unit(direction), PUSH);
         let push = times(&direction, PUSH / largest(&direction));
-        let mut state = (self.moved(state, fraction, &push, 1.0)).map_err(|_| state.clone())?;
+        let params = [fraction];
+        let pushed = self.advanced(state, params, &push, 1.0);
+        let state = pushed.map_err(|_| state.clone())?;
+        let mut now = Solution { state, params };
         for _ in 0..DOWN {
             let next = match stop() {
                 true => None,
-                false => self.descend_step(&mut state, fraction, &mut direction, &mut length),
+                false => self.descend_step(&mut now, &mut direction, &mut length),
             };
             let Some((next, near)) = next else {
-                return Err(state);
+                return Err(now.state);
             };
-            state = next;
+            now.state = next;
             if near {
-                let rest = self.correct(&state, fraction, None).ok();
-                return rest.filter(|point| point.index == 0).ok_or(state);
+                let rest = self.correct(&now.state, fraction, None).ok();
+                return rest.filter(|point| point.index == 0).ok_or(now.state);
             }
         }
-        Err(state)
+        Err(now.state)
     }
 
     /// A step down the valley floor; the flag says whether it was a short Newton step.
     fn descend_step(
         &mut self,
-        state: &mut State,
-        fraction: f64,
+        now: &mut Solution,
         direction: &mut Field,
         length: &mut f64,
     ) -> Option<(State, bool)> {
-        let linear = self.linearise(state, fraction).ok()?;
+        let linear = self.assemble(now, false).ok()?;
         let valley = self.valley(direction, &linear)?;
         let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
         let increments = if newton {
@@ -202,7 +208,7 @@ impl Equations<'_> {
         *direction = self.unit(&valley.along);
         let size = largest(&increments);
         let step = times(&increments, (LONGEST / size).min(1.0));
-        let next = self.moved(state, fraction, &step, 1.0).ok()?;
+        let next = self.advanced(&now.state, now.params, &step, 1.0).ok()?;
         Some((next, newton && size < NEAR))
     }
 

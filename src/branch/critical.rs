@@ -1,10 +1,10 @@
 //! Critical points, at which the index changes: folds and branch points.
 
-use super::deflation::Deflated;
+use super::deflation::Sample;
 use super::equations::{Equations, Stuck};
 use super::field::{combined, dot, plus, times};
-use super::states::{eigenvalue_rounding, stiffest_condensed};
-use super::{Point, Tangent};
+use super::states::eigenvalue_rounding;
+use super::{Direction, Point};
 use crate::leaf::{Field, State};
 
 /// Additional modes in the border: others may be nearly neutral.
@@ -44,7 +44,7 @@ pub struct Critical {
     pub state: State,
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    pub tangent: Tangent,
+    pub tangent: Direction,
     pub kind: Kind,
     /// Morse index before and after.
     pub indices: [usize; 2],
@@ -78,7 +78,7 @@ pub fn locate(
         exactly: false,
     };
     let ends = [search.at(0.0)?, search.at(step)?];
-    if ends[1].deflated.state.shift_to(&b.state) > ARRIVES * step {
+    if ends[1].sample.solution.state.shift_to(&b.state) > ARRIVES * step {
         return Err(Stuck::NotConverged);
     }
     let mut found: Vec<(f64, Critical)> = Vec::new();
@@ -120,8 +120,8 @@ struct Search<'s, 'a> {
     exactly: bool,
 }
 
-struct Sample {
-    deflated: Deflated,
+struct Evaluated {
+    sample: Sample,
     eigenvalues: Vec<f64>,
     /// Eigenvectors of H, in the order of the eigenvalues.
     vectors: Vec<Vec<f64>>,
@@ -131,20 +131,19 @@ struct Sample {
 const FORCED: f64 = 1e-6;
 
 impl Search<'_, '_> {
-    fn at(&mut self, distance: f64) -> Result<Sample, Stuck> {
-        let t = &self.from.tangent;
-        let (state, fraction) = (&self.from.state, self.from.fraction);
-        let fraction = fraction + distance * t.fraction;
-        let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
-        let deflated = (self.equations).deflated(&moved, fraction, t, self.soft, self.exactly)?;
-        let eigen = deflated.h.clone().symmetric_eigen();
+    fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
+        let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
+        let moved = equations.moved(&self.from.solution(), tangent, distance)?;
+        let border = equations.momenta(self.soft);
+        let sample = equations.deflated(moved, [tangent], &border, None, self.exactly)?;
+        let eigen = sample.solved.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let vector = |&k: &usize| eigen.eigenvectors.column(k).iter().copied().collect();
-        Ok(Sample {
+        Ok(Evaluated {
             eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
             vectors: order.iter().map(vector).collect(),
-            deflated,
+            sample,
         })
     }
 
@@ -157,19 +156,19 @@ impl Search<'_, '_> {
     ) -> Result<(f64, Critical), Stuck> {
         let whole = distance[1] - distance[0];
         let mut slope = (value[1] - value[0]) / whole;
-        let mut best: Option<(f64, Sample)> = None;
+        let mut best: Option<(f64, Evaluated)> = None;
         let (mut last, mut last_value) = (distance[1], value[1]);
         for _ in 0..EVALUATIONS {
             let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
-            let sample = self.at(at)?;
-            let now = sample.eigenvalues[which];
+            let next = self.at(at)?;
+            let now = next.eigenvalues[which];
             let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
             if (at - last).abs() > LOCAL * whole {
                 slope = (now - last_value) / (at - last);
             }
             let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
             if least.is_none_or(|least| now.abs() <= least) {
-                best = Some((at, sample));
+                best = Some((at, next));
             }
             if done {
                 break;
@@ -184,28 +183,29 @@ impl Search<'_, '_> {
             }
             (distance[1], value[1]) = (at, now);
         }
-        let (at, sample) = best.ok_or(Stuck::NotConverged)?;
-        Ok((at, self.critical(sample, which, slope)))
+        let (at, best) = best.ok_or(Stuck::NotConverged)?;
+        Ok((at, self.critical(best, which, slope)))
     }
 
-    /// The critical point from a sample at a zero.
-    fn critical(&self, sample: Sample, which: usize, slope: f64) -> Critical {
-        let (vector, deflated) = (&sample.vectors[which], sample.deflated);
-        let mode = combined(vector, &deflated.modes);
+    /// The critical point from what was evaluated at a zero.
+    fn critical(&self, zero: Evaluated, which: usize, slope: f64) -> Critical {
+        let (vector, sample) = (&zero.vectors[which], zero.sample);
+        let mode = combined(vector, &sample.solved.modes);
         let norm = self.equations.product(&mode, &mode).sqrt();
-        let parts = vector.iter().zip(deflated.forcing.iter());
+        let parts = vector.iter().zip(&sample.solved.rates[0].multipliers);
         let forcing: f64 = parts.map(|(v, d)| v * d).sum();
-        let most = (dot(&deflated.rate, &deflated.rate) * dot(&mode, &mode)).sqrt();
+        let rate = &sample.rates[0];
+        let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
         let fold = forcing.abs() > FORCED * most.max(slope.abs());
         Critical {
             kind: if fold { Kind::Fold } else { Kind::Branching },
             rounding: if fold {
-                deflated.noise / forcing.abs()
+                sample.noise / forcing.abs()
             } else {
                 0.0
             },
-            state: deflated.state,
-            fraction: deflated.fraction,
+            state: sample.solution.state,
+            fraction: sample.solution.params[0],
             tangent: self.from.tangent.clone(),
             indices: [self.from.index; 2],
             modes: vec![times(&mode, 1.0 / norm)],
@@ -214,14 +214,6 @@ impl Search<'_, '_> {
             slope,
         }
     }
-}
-
-/// Rounding error of the eigenvalues of the matrix, softened if there is such a one.
-fn rounding(equations: &mut Equations, fraction: f64) -> Result<f64, Stuck> {
-    let softened = equations.softened.as_mut();
-    let leaf = softened.unwrap_or(&mut equations.leaves).at(fraction)?;
-    let stiffest = stiffest_condensed(leaf);
-    Ok(eigenvalue_rounding(stiffest, leaf.segments()))
 }
 
 impl Critical {
@@ -245,7 +237,8 @@ impl Critical {
             // Shorter steps follow the rounding of the eigenvalue, and the parameter of a fold
             // depends on their squares.
             Kind::Fold => {
-                let rounding = rounding(search.equations, self.fraction)?;
+                let stiffest = search.equations.stiffest_condensed([self.fraction])?;
+                let rounding = eigenvalue_rounding(stiffest, self.state.segments());
                 (rounding / self.slope.abs()).max(ACCURACY)
             }
             Kind::Branching => ACCURACY,
@@ -280,23 +273,35 @@ impl Critical {
         })
     }
 
+    /// The equilibrium at a distance from it along a direction, in the plane normal to that.
+    pub fn beside(
+        &self,
+        equations: &mut Equations,
+        to: &Direction,
+        distance: f64,
+    ) -> Result<Point, Stuck> {
+        let [fraction] = to.further([self.fraction], distance);
+        let state = equations.advanced(&self.state, [fraction], &to.increments, distance)?;
+        equations.correct(&state, fraction, Some(to))
+    }
+
     /// Derivative of the eigenvalue with respect to the parameter; infinite at a fold, where the
     /// parameter has no first-order error.
     pub fn steepness(&self) -> f64 {
         match self.kind {
             Kind::Fold => f64::INFINITY,
-            Kind::Branching => (self.slope / self.tangent.fraction).abs(),
+            Kind::Branching => (self.slope / self.tangent.params[0]).abs(),
         }
     }
 
     /// A direction along which another branch may leave: the first neutral mode
     /// orthogonalised against this branch.
-    pub fn across(&self, equations: &Equations) -> Tangent {
+    pub fn across(&self, equations: &Equations) -> Direction {
         let mode = &self.modes[0];
         let part = equations.product(&self.tangent.increments, mode);
-        equations.normalised(Tangent {
+        equations.normalised(Direction {
             increments: plus(mode, -part, &self.tangent.increments),
-            fraction: -part * self.tangent.fraction,
+            params: [-part * self.tangent.params[0]],
         })
     }
 }

@@ -1,11 +1,13 @@
 //! Bordered equations of a branch: where the matrix is singular, or nearly so.
 
+use std::array::from_fn;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized};
 use super::field::{add, combined, dot, is_finite, largest, times};
-use super::{Point, Tangent};
-use crate::leaf::{Bordered, Field, State, System};
+use super::{Direction, Point, Solution};
+use crate::leaf::{Bordered, Field, System};
 
 /// Singular values below this, relative to the largest, count as zero.
 const NEUTRAL: f64 = 1e-7;
@@ -20,64 +22,47 @@ const SUBSPACE_ITERATIONS: usize = 8;
 /// pivots away from zero.
 const SHIFT: f64 = 1e-9;
 
-/// A point computed with nearly neutral modes in the border.
-pub struct Deflated {
-    pub state: State,
-    pub fraction: f64,
-    /// H of the border: its eigenvalues tend to minus those of the matrix.
-    pub h: DMatrix<f64>,
-    /// X of the border: the modes.
-    pub modes: Vec<Field>,
-    /// Work of the parameter's force rates on the modes: zero at a bifurcation, not at a fold.
-    pub forcing: DVector<f64>,
-    /// Derivative of the forces with respect to the parameter.
-    pub rate: Field,
-    /// Forces along the modes below this are ignored as rounding.
+/// Solutions of the bordered equations at a state and parameters.
+pub struct Sample<const N: usize = 1> {
+    pub solution: Solution<N>,
+    pub solved: Solved,
+    /// Derivatives of the forces with respect to the parameters.
+    pub rates: Vec<Field>,
+    /// Rounding error of the forces.
     pub noise: f64,
 }
 
-impl Equations<'_> {
-    /// The point of the branch in a plane, where the matrix may be singular:
-    /// it is bordered by the mass matrix times `modes`; components that remain
-    /// undetermined are left unchanged. `exactly`: once converged, it is corrected once more.
+impl<const N: usize> Equations<'_, N> {
+    /// Newton's method to the equilibria within the planes normal to directions through a state.
+    /// The matrix may be singular: it is bordered by `border`, and components that remain
+    /// undetermined are left unchanged. The rates, if given, may be those of a nearby state: they
+    /// only affect the rate of convergence, and leaves at other parameters cost more than an
+    /// iteration. Unless `exactly`, a converged leaf with stiff segments is corrected once more:
+    /// an error in the length of such a segment causes a large force.
     pub fn deflated(
         &mut self,
-        state: &State,
-        fraction: f64,
-        normal: &Tangent,
-        modes: &[Field],
+        mut solution: Solution<N>,
+        normals: [&Direction<N>; N],
+        border: &[Field],
+        rates: Option<&[Field]>,
         exactly: bool,
-    ) -> Result<Deflated, Stuck> {
-        let (mut state, mut fraction) = (state.clone(), fraction);
-        let border = self.momenta(modes);
-        let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
+    ) -> Result<Sample<N>, Stuck> {
+        let duals = normals.map(|normal| self.momentum(&normal.increments));
+        let normals: [_; N] = from_fn(|k| (&duals[k], normals[k].params.as_slice(), 0.0));
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        // An error in the length of a stiff segment causes a large force: a converged
-        // state with such segments is corrected once more.
-        let mut corrected = !exactly && self.leaves.at(fraction)?.stiffest() * STIFF > 1.0;
+        let mut corrected = !exactly && self.leaves.at(solution.params)?.stiffest() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
-            let linear = match finished {
-                true => self.linearise_softened(&mut state, fraction)?,
-                false => self.linearise(&mut state, fraction)?,
+            let rates = match rates {
+                Some(rates) => rates.to_vec(),
+                None => self.rates(&solution, finished)?,
             };
-            let solved = self.solve_bordered(&border, &linear.forces, &[&linear.rate], 0.0)?;
+            let sample = self.sample(solution, border, rates, finished)?;
             if finished {
-                let [rate] = solved.rates.try_into().map_err(|_| Stuck::NotConverged)?;
-                return Ok(Deflated {
-                    state,
-                    fraction,
-                    h: solved.h,
-                    forcing: DVector::from_vec(rate.multipliers),
-                    rate: linear.rate,
-                    noise: linear.noise,
-                    modes: solved.modes,
-                });
+                return Ok(sample);
             }
-            let functions = [(&dual, &[own][..], 0.0)];
-            let (increments, changes, size) = solved.step(&functions, linear.noise)?;
-            fraction += changes[0];
-            state = self.moved(&state, fraction, &increments, 1.0)?;
+            let (next, size) = self.newton_step(&sample, &normals)?;
+            solution = next;
             let rests = at_rest(size, previous);
             finished = rests && corrected;
             corrected |= rests;
@@ -86,13 +71,44 @@ impl Equations<'_> {
         Err(Stuck::NotConverged)
     }
 
+    /// The state and parameters after the step of [`Solved::step`], and its size.
+    pub(super) fn newton_step(
+        &mut self,
+        sample: &Sample<N>,
+        functions: &[(&Field, &[f64], f64)],
+    ) -> Result<(Solution<N>, f64), Stuck> {
+        let Solution { state, params } = &sample.solution;
+        let (increments, changes, size) = sample.solved.step(functions, sample.noise)?;
+        let params = from_fn(|i| params[i] + changes[i]);
+        let state = self.advanced(state, params, &increments, 1.0)?;
+        Ok((Solution { state, params }, size))
+    }
+
+    /// Solves the bordered equations at a state, in equilibrium or not, given the rates of the
+    /// parameters; `soft` as in [`Equations::assemble`].
+    pub(super) fn sample(
+        &mut self,
+        mut solution: Solution<N>,
+        border: &[Field],
+        rates: Vec<Field>,
+        soft: bool,
+    ) -> Result<Sample<N>, Stuck> {
+        let linear = self.assemble(&mut solution, soft)?;
+        Ok(Sample {
+            solved: self.solve_bordered(border, &linear.forces, &rates, 0.0)?,
+            solution,
+            rates,
+            noise: linear.noise,
+        })
+    }
+
     /// Solves the bordered equations with K + `shift` M, where K is the assembled matrix: for the
     /// forces, their rates, and the unit vectors of the border.
     pub(super) fn solve_bordered(
         &mut self,
         border: &[Field],
         forces: &Field,
-        rates: &[&Field],
+        rates: &[Field],
         shift: f64,
     ) -> Result<Solved, Stuck> {
         let p = border.len();
@@ -118,12 +134,13 @@ impl Equations<'_> {
             negative: factor.negative(),
         })
     }
+}
 
+impl Equations<'_> {
     /// The `count` modes whose eigenvalues are nearest to zero at a point, by
     /// subspace inverse iteration; of mass one, in the order of these eigenvalues.
     pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
-        let mut state = point.state.clone();
-        self.linearise(&mut state, point.fraction)?;
+        self.assemble(&mut point.solution(), false)?;
         let count = count
             .min(6 * self.rods() * self.grid().segments() / 2)
             .max(1);
@@ -174,7 +191,7 @@ impl Equations<'_> {
 }
 
 /// Solutions of the bordered equations at some state.
-pub(super) struct Solved {
+pub struct Solved {
     /// For the forces, and for their rates with respect to each parameter.
     pub forces: Bordered,
     pub rates: Vec<Bordered>,

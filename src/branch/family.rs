@@ -1,11 +1,11 @@
-//! Leaves that differ in one parameter.
+//! Leaves that differ in one parameter, or in two.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::cache::{LruCache, Patterns};
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State, System};
 use crate::scenario::Scenario;
 
 /// Largest stiffness in stretch and shear, in units of A/L^2, with which the segment forces are
@@ -20,75 +20,128 @@ pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
     }
 }
 
-/// Makes the scenario at a value of a parameter.
-type Make<'a> = &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync);
+/// Fractions within this of an end of the range are at the end.
+const EXACT: f64 = 1e-12;
 
-/// A leaf for every value of a parameter.
+/// Makes the scenario at values of the parameters.
+type Make<'a, const N: usize> = &'a (dyn Fn([f64; N]) -> Result<Scenario, String> + Sync);
+
+/// A leaf for all values of N parameters.
 #[derive(Clone)]
-pub struct Family<'a> {
-    make: Make<'a>,
-    /// Values of the parameter at the fractions 0 and 1.
-    from: f64,
-    to: f64,
-    /// Whether fractions are those of the logarithm of the value.
-    log: bool,
-    /// The leaves at the fractions 0 and 1.
-    ends: [Leaf; 2],
+pub struct Family<'a, const N: usize = 1> {
+    make: Make<'a, N>,
+    ranges: [Range; N],
+    /// The first leaf, in whose units all are.
+    first: Leaf,
+    /// A leaf with coupled veins, if there is one at an end of a range.
+    coupled: Leaf,
     /// Sparsity patterns of their matrices.
     pub patterns: Arc<Patterns>,
 }
 
+/// The range of a parameter.
+#[derive(Clone, Copy)]
+pub struct Range {
+    /// Values at the fractions 0 and 1.
+    pub ends: [f64; 2],
+    /// Whether fractions are those of the logarithm of the value.
+    pub log: bool,
+}
+
+impl Range {
+    /// The value at a fraction.
+    fn value(self, fraction: f64) -> f64 {
+        // At an end, rounding must not lead beyond: there may be no leaf.
+        match fraction {
+            part if part.abs() < EXACT => self.ends[0],
+            part if (part - 1.0).abs() < EXACT => self.ends[1],
+            part => between(self.ends, self.log, part),
+        }
+    }
+
+    /// The fraction at a value.
+    pub fn fraction(self, value: f64) -> f64 {
+        let [from, to] = self.ends;
+        match self.log {
+            true => (value / from).ln() / (to / from).ln(),
+            false => (value - from) / (to - from),
+        }
+    }
+}
+
 /// A value of the parameter that no leaf can have, with the message of the scenario.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct OutOfRange(pub String);
 
 impl<'a> Family<'a> {
-    /// The leaves given by `make`, for values of the parameter in this range (divided
-    /// logarithmically if `log`), in the units of the first.
-    pub fn new(make: Make<'a>, (from, to): (f64, f64), log: bool) -> Result<Self, OutOfRange> {
-        let scale = make(from).map_err(OutOfRange)?.scale();
-        Family::in_units(make, (from, to), log, scale)
+    /// The leaves given by `make`, for values of the parameter in this range, in the units of the
+    /// first.
+    pub fn new(make: Make<'a, 1>, ends: [f64; 2], log: bool) -> Result<Self, OutOfRange> {
+        let scale = make([ends[0]]).map_err(OutOfRange)?.scale();
+        Family::of(make, [Range { ends, log }], scale, ends.map(|end| [end]))
     }
 
-    fn in_units(
-        make: Make<'a>,
-        (from, to): (f64, f64),
-        log: bool,
-        scale: Scale,
-    ) -> Result<Self, OutOfRange> {
-        let leaf = |value: f64| {
-            let scenario = make(value).map_err(OutOfRange)?;
-            Ok(Leaf::in_units(Arc::new(scenario), scale))
-        };
-        let [first, last] = [leaf(from)?, leaf(to)?];
-        Ok(Family {
-            make,
-            from,
-            to,
-            log,
-            ends: [first, last],
-            patterns: Arc::default(),
-        })
+    /// The parameter at a fraction of its range.
+    pub fn value(&self, fraction: f64) -> f64 {
+        self.values([fraction])[0]
+    }
+}
+
+impl<'a> Family<'a, 2> {
+    /// The leaves given by `make`, for values of two parameters in these ranges, in the units of
+    /// that at the start of the first and at `start` of the second.
+    pub fn plane(make: Make<'a, 2>, ranges: [Range; 2], start: f64) -> Result<Self, OutOfRange> {
+        let [[from, to], [low, high]] = ranges.map(|range| range.ends);
+        let scale = make([from, start]).map_err(OutOfRange)?.scale();
+        let ends = [[from, start], [to, start], [from, low], [from, high]];
+        Family::of(make, ranges, scale, ends)
     }
 
-    /// Leaves of the same kind, in the same units, along another path with the parameter 0 to 1.
-    pub fn along_path<'b>(&self, make: Make<'b>) -> Result<Family<'b>, OutOfRange> {
-        let family = Family::in_units(make, (0.0, 1.0), false, self.scale())?;
+    /// Leaves of the same kind, in the same units, along a path with the parameter 0 to 1.
+    pub fn along_path<'b>(&self, make: Make<'b, 1>) -> Result<Family<'b>, OutOfRange> {
+        let (ends, log) = ([0.0, 1.0], false);
+        let family = Family::of(make, [Range { ends, log }], self.scale(), [[0.0], [1.0]])?;
         Ok(Family {
             patterns: self.patterns.clone(),
             ..family
         })
     }
+}
+
+impl<'a, const N: usize> Family<'a, N> {
+    /// In these units, with leaves at these values of the parameters.
+    fn of<const ENDS: usize>(
+        make: Make<'a, N>,
+        ranges: [Range; N],
+        scale: Scale,
+        ends: [[f64; N]; ENDS],
+    ) -> Result<Self, OutOfRange> {
+        let leaf = |values| {
+            let scenario = make(values).map_err(OutOfRange)?;
+            Ok(Leaf::in_units(Arc::new(scenario), scale))
+        };
+        let ends: Vec<Leaf> = ends.into_iter().map(leaf).collect::<Result<_, _>>()?;
+        let is_coupled =
+            |leaf: &&Leaf| (1..leaf.rods()).any(|g| leaf.coupling(g - 1) != DVec3::ZERO);
+        let coupled = ends.iter().find(is_coupled);
+        Ok(Family {
+            make,
+            ranges,
+            coupled: coupled.unwrap_or(&ends[1]).clone(),
+            first: ends[0].clone(),
+            patterns: Arc::default(),
+        })
+    }
 
     /// The units of all its leaves.
     pub fn scale(&self) -> Scale {
-        self.ends[0].scale
+        self.first.scale
     }
 
     /// Tips of all rods in the scenario's units: the shared one alone, or each.
     pub fn tips(&self, tips: &[DVec3]) -> Vec<DVec3> {
-        let count = if self.first().joined() { 1 } else { tips.len() };
+        let count = if self.first.joined() { 1 } else { tips.len() };
         let tips = tips.iter().take(count);
         tips.map(|tip| *tip * self.scale().length).collect()
     }
@@ -101,41 +154,32 @@ impl<'a> Family<'a> {
             .collect()
     }
 
-    /// The leaf at the fraction 0.
+    /// The leaf at the start of the ranges.
     pub fn first(&self) -> &Leaf {
-        &self.ends[0]
+        &self.first
     }
 
-    /// The parameter at a fraction of its range.
-    pub fn value(&self, fraction: f64) -> f64 {
-        match fraction {
-            1.0 => self.to,
-            _ => between([self.from, self.to], self.log, fraction),
-        }
+    /// Values of the parameters at fractions of their ranges.
+    pub fn values(&self, params: [f64; N]) -> [f64; N] {
+        std::array::from_fn(|i| self.ranges[i].value(params[i]))
     }
 
-    /// The scenario at a fraction.
-    pub fn scenario(&self, fraction: f64) -> Result<Scenario, OutOfRange> {
-        (self.make)(self.value(fraction)).map_err(OutOfRange)
+    /// The scenario at fractions.
+    pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
+        (self.make)(self.values(params)).map_err(OutOfRange)
     }
 
-    /// The leaf at a fraction.
-    pub fn leaf(&self, fraction: f64) -> Result<Leaf, OutOfRange> {
-        Ok(match fraction {
-            0.0 => self.ends[0].clone(),
-            1.0 => self.ends[1].clone(),
-            _ => Leaf::in_units(Arc::new(self.scenario(fraction)?), self.scale()),
-        })
+    /// The leaf at fractions.
+    pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
+        Ok(Leaf::in_units(
+            Arc::new(self.scenario(params)?),
+            self.scale(),
+        ))
     }
 
-    /// Calls `act` with the leaf at a fraction, on a grid.
-    pub fn with<R>(
-        &self,
-        fraction: f64,
-        grid: &Grid,
-        act: impl FnOnce(&DiscreteLeaf) -> R,
-    ) -> Result<R, OutOfRange> {
-        Ok(act(&discretised(&self.leaf(fraction)?, grid, None)))
+    /// A system of equations for all its leaves on a grid.
+    pub fn system(&self, grid: &Grid) -> System {
+        System::new(&discretised(&self.coupled, grid, None))
     }
 }
 
@@ -151,35 +195,20 @@ fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf
     discrete
 }
 
-/// Leaves that differ in parameters, which are given as fractions of their ranges.
-pub trait Source: Copy {
-    type At: Copy + PartialEq;
-
-    fn leaf_at(self, at: Self::At) -> Result<Leaf, OutOfRange>;
-}
-
-impl Source for &Family<'_> {
-    type At = f64;
-
-    fn leaf_at(self, fraction: f64) -> Result<Leaf, OutOfRange> {
-        self.leaf(fraction)
-    }
-}
-
-/// Leaves of a family, or of a plane, on one grid. The last few are cached: iterations
+/// Leaves of a family on one grid. The last few are cached: iterations
 /// return to them, and making a scenario costs more than assembling a small leaf.
-pub struct Leaves<F: Source> {
-    pub family: F,
+pub struct Leaves<'a, const N: usize = 1> {
+    pub family: &'a Family<'a, N>,
     pub grid: Grid,
     softening: Option<f64>,
-    cache: LruCache<F::At, DiscreteLeaf, CACHED>,
+    cache: LruCache<[f64; N], DiscreteLeaf, CACHED>,
 }
 
 /// Number of cached leaves: those of differences over two parameters, and one more.
 const CACHED: usize = 6;
 
-impl<F: Source> Leaves<F> {
-    pub fn new(family: F, grid: Grid) -> Self {
+impl<'a, const N: usize> Leaves<'a, N> {
+    pub fn new(family: &'a Family<'a, N>, grid: Grid) -> Self {
         Leaves {
             family,
             grid,
@@ -193,7 +222,7 @@ impl<F: Source> Leaves<F> {
     /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
     /// the point at which they become neutral is analytic in the softening, and can be
     /// extrapolated to zero softening.
-    pub fn softened(family: F, grid: Grid, softening: f64) -> Self {
+    pub fn softened(family: &'a Family<'a, N>, grid: Grid, softening: f64) -> Self {
         Leaves {
             softening: Some(softening),
             ..Leaves::new(family, grid)
@@ -212,11 +241,11 @@ impl<F: Source> Leaves<F> {
         }
     }
 
-    /// The leaf at these parameters.
-    pub fn at(&mut self, at: F::At) -> Result<&DiscreteLeaf, OutOfRange> {
+    /// The leaf at these parameters, as fractions of their ranges.
+    pub fn at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
         let (family, grid, softening) = (self.family, &self.grid, self.softening);
-        let make = || Ok(discretised(&family.leaf_at(at)?, grid, softening));
-        self.cache.at(at, make)
+        let make = || Ok(discretised(&family.leaf(params)?, grid, softening));
+        self.cache.at(params, make)
     }
 }
 

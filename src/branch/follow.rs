@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Point;
 use super::equations::{Equations, Stuck};
-use super::family::{Family, OutOfRange};
+use super::family::Family;
 use super::refine::refine;
 use super::refine_critical::refine_critical;
 use super::refined::{Doubt, Refined};
@@ -54,10 +54,10 @@ pub struct Followed {
 
 impl<'a> Grids<'a> {
     /// Starts with one grid.
-    pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
-        Ok(Grids {
-            equations: vec![Equations::new(family, grid)?],
-        })
+    pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
+        Grids {
+            equations: vec![Equations::new(family, grid)],
+        }
     }
 
     /// The equations on the grid of a state, which must be one of these.
@@ -67,17 +67,17 @@ impl<'a> Grids<'a> {
     }
 
     /// Creates the next finer grid if needed; false if that is too fine.
-    fn refine(&mut self, state: &State) -> Result<bool, OutOfRange> {
+    fn refine(&mut self, state: &State) -> bool {
         let finer = 2 * state.segments();
         if finer > FINEST || finer * state.rods() > MOST_NODES {
-            return Ok(false);
+            return false;
         }
         let last = &self.equations[self.equations.len() - 1];
         if last.grid().segments() < finer {
-            let refined = last.refined()?;
+            let refined = last.refined();
             self.equations.push(refined);
         }
-        Ok(true)
+        true
     }
 
     /// Number of matrices factorised so far.
@@ -131,8 +131,7 @@ impl<'a> Grids<'a> {
             let last = known.points.len().saturating_sub(1);
             known.branch.truncate_at(last);
             let here = known.branch.points[last].state.clone();
-            let refined = matches!(self.refine(&here), Ok(true))
-                && known.branch.refine(self.of(&here)).is_ok();
+            let refined = self.refine(&here) && known.branch.refine(self.of(&here)).is_ok();
             known.branch.shorten(if refined { 1.0 } else { SHORTER });
             if !refined && (tries > TRIES || known.points.is_empty() || doubt.is_none()) {
                 known.end = match (doubt, end) {

@@ -28,6 +28,7 @@ mod begin;
 pub mod boundary;
 mod cache;
 mod climb;
+mod correct;
 mod critical;
 mod deflation;
 mod equations;
@@ -45,15 +46,13 @@ mod walk;
 pub use begin::{begin, switch};
 pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
-pub use family::{Family, between as value_between};
+pub use family::{Family, Range, between as value_between};
 pub(crate) use field::{between, prolong as prolong_field, times};
 pub use follow::{Followed, Grids};
 pub(crate) use refine::{on_finer, refine_at};
 pub(crate) use refine_critical::NEARLY_RIGID;
 pub use refined::{Doubt, Refined};
 pub use walk::{End, Walk, walk};
-
-use crate::relax::prolong::prolong as prolonged;
 
 use crate::leaf::{Field, State};
 
@@ -65,18 +64,52 @@ pub struct Point {
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
     /// The unit tangent of the branch.
-    pub tangent: Tangent,
+    pub tangent: Direction,
     /// Morse index.
     pub index: usize,
     /// Newton iterations by which it was found.
     pub iterations: usize,
 }
 
-/// A direction along a branch, of length one.
+impl Point {
+    /// Its state and parameter.
+    fn solution(&self) -> Solution {
+        Solution {
+            state: self.state.clone(),
+            params: [self.fraction],
+        }
+    }
+}
+
+/// A leaf in equilibrium, or nearly so, with its parameters as fractions of their ranges.
 #[derive(Clone, Debug)]
-pub struct Tangent {
+pub struct Solution<const N: usize = 1> {
+    /// The state of the leaf.
+    pub state: State,
+    /// The parameters.
+    pub params: [f64; N],
+}
+
+/// A direction along which the state and the parameters change.
+#[derive(Clone, Debug)]
+pub struct Direction<const N: usize = 1> {
     /// Increments of the nodes.
     pub increments: Field,
-    /// Change of the parameter, as a fraction of its range.
-    pub fraction: f64,
+    /// Changes of the parameters, as fractions of their ranges.
+    pub params: [f64; N],
+}
+
+impl<const N: usize> Direction<N> {
+    /// The opposite direction.
+    pub fn reversed(&self) -> Self {
+        Direction {
+            increments: times(&self.increments, -1.0),
+            params: self.params.map(|part| -part),
+        }
+    }
+
+    /// Parameters `step` further along it than these.
+    fn further(&self, params: [f64; N], step: f64) -> [f64; N] {
+        std::array::from_fn(|i| params[i] + step * self.params[i])
+    }
 }

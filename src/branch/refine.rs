@@ -1,12 +1,13 @@
 //! Regular points of a branch on finer and finer grids.
 
-use super::equations::{Equations, Plane, Stuck, reversed};
+use super::correct::Plane;
+use super::equations::{Equations, Stuck};
 use super::family::{Family, OutOfRange};
-use super::field::{at_same_nodes, every_second, prolong as prolong_field};
+use super::field::every_second;
 use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::both_sides;
-use super::{Point, Tangent};
-use crate::leaf::{DiscreteLeaf, Grid, State};
+use super::{Direction, Point};
+use crate::leaf::{Grid, State};
 use crate::relax::prolong::{prolong, restrict};
 use glam::DVec3;
 
@@ -40,48 +41,10 @@ const FINISHED: f64 = 1e-12;
 /// Number of consecutive grids with the same index, if only the index is wanted.
 const AGREEING: usize = 3;
 
-/// The condition that fixes a point on a branch, the same on all grids.
-enum Condition {
-    /// A given value of the parameter.
-    Value,
-    /// A given displacement along the branch, measured by the shifts and turns of the
-    /// nodes of the original grid only, lest it depend on how states are interpolated.
-    Plane(Plane),
-}
-
-impl Condition {
-    fn plane(equations: &Equations, point: &Point) -> Self {
-        let direction = equations.normalised(Tangent {
-            increments: point.tangent.increments.clone(),
-            fraction: 0.0,
-        });
-        Condition::Plane(Plane {
-            dual: equations.momentum(&direction.increments),
-            own: 0.0,
-            through: Some(point.state.clone()),
-        })
-    }
-
-    /// The same on the grid with all segments halved.
-    fn refine(&mut self, leaf: &DiscreteLeaf) {
-        if let Condition::Plane(plane) = self {
-            plane.dual = at_same_nodes(&plane.dual);
-            plane.through = plane.through.as_ref().map(|state| prolong(leaf, state));
-        }
-    }
-
-    fn as_plane(&self) -> Option<&Plane> {
-        match self {
-            Condition::Value => None,
-            Condition::Plane(plane) => Some(plane),
-        }
-    }
-}
-
 /// Whether the branch goes along the parameter alone, or the point is at an end of its range.
 fn along_parameter(point: &Point) -> bool {
     let inside = point.fraction != 0.0 && point.fraction != 1.0;
-    !inside || point.tangent.fraction.abs() >= ALONG
+    !inside || point.tangent.params[0].abs() >= ALONG
 }
 
 /// A point on the grid with all segments halved, with the equations there: in the same
@@ -90,11 +53,8 @@ pub fn on_finer<'a>(
     equations: &mut Equations<'a>,
     point: &Point,
 ) -> Result<(Equations<'a>, Point), Stuck> {
-    let mut condition = match along_parameter(point) {
-        true => Condition::Value,
-        false => Condition::plane(equations, point),
-    };
-    let finer = on_next_grid(equations, point, &mut condition)?;
+    let mut plane = (!along_parameter(point)).then(|| Plane::across(equations, point));
+    let finer = on_next_grid(equations, point, &mut plane)?;
     Ok((finer.equations, finer.point))
 }
 
@@ -103,7 +63,7 @@ struct Finer<'a> {
     equations: Equations<'a>,
     point: Point,
     /// The tangent of the previous grid, interpolated to this one.
-    tangent: Tangent,
+    tangent: Direction,
     /// Displacement from the interpolated state.
     moved: f64,
     /// Displacement by the last iteration: its error is not larger.
@@ -130,25 +90,20 @@ fn finished(
     Ok((found, unfinished))
 }
 
-/// The point under the same condition on the grid with all segments halved.
+/// The point in the same plane, or at the same parameter, on the grid with all segments halved.
 fn on_next_grid<'a>(
     equations: &mut Equations<'a>,
     point: &Point,
-    condition: &mut Condition,
+    plane: &mut Option<Plane>,
 ) -> Result<Finer<'a>, Stuck> {
-    let leaf = equations.leaves.at(point.fraction)?;
+    let leaf = equations.leaves.at([point.fraction])?;
     let guess = prolong(leaf, &point.state);
-    condition.refine(leaf);
-    let mut equations = equations.refined()?;
-    let tangent = equations.normalised(Tangent {
-        increments: prolong_field(&point.tangent.increments),
-        ..point.tangent
-    });
-    let plane = condition.as_plane();
-    let (mut found, unfinished) = finished(&mut equations, (&guess, point.fraction), plane)?;
-    if equations.inner(&found.tangent, &tangent) < 0.0 {
-        found.tangent = reversed(found.tangent);
-    }
+    *plane = plane.as_ref().map(|plane| plane.refined(leaf));
+    let mut equations = equations.refined();
+    let tangent = equations.prolonged(&point.tangent);
+    let start = (&guess, point.fraction);
+    let (mut found, unfinished) = finished(&mut equations, start, plane.as_ref())?;
+    found.tangent = equations.oriented(found.tangent, &tangent);
     Ok(Finer {
         moved: guess.shift_to(&found.state),
         unfinished,
@@ -187,7 +142,7 @@ pub fn refine_at(
 /// agree; on all of them the point must be on the same branch.
 pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt> {
     let (mut moved, mut same, mut index) = (f64::INFINITY, 1, point.index);
-    let mut finer = on_next_grid(equations, point, &mut Condition::Value)?;
+    let mut finer = on_next_grid(equations, point, &mut None)?;
     for _ in 1..GRIDS {
         let along = finer.equations.inner(&finer.point.tangent, &finer.tangent);
         if along < SAME_BRANCH || finer.moved > moved.max(STILL) {
@@ -205,12 +160,12 @@ pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt
         if 2 * finer.point.state.segments() > FINEST {
             break;
         }
-        finer = on_next_grid(&mut finer.equations, &finer.point, &mut Condition::Value)?;
+        finer = on_next_grid(&mut finer.equations, &finer.point, &mut None)?;
     }
     Err(Doubt::OtherIndex)
 }
 
-/// A point on the grid with every second node, and the condition on the next one. It adds to
+/// A point on the grid with every second node, and its plane on the next one. It adds to
 /// what the series of grids tells of its order. `None` if there is no such grid, or no point near
 /// on it.
 fn on_coarser(
@@ -218,31 +173,27 @@ fn on_coarser(
     grid: &Grid,
     point: &Point,
     in_plane: bool,
-) -> Option<(usize, Values, Condition)> {
-    let mut equations = Equations::new(family, grid.coarsened()?).ok()?;
+) -> Option<(usize, Values, Option<Plane>)> {
+    let mut equations = Equations::new(family, grid.coarsened()?);
     let near = Point {
         state: restrict(&point.state),
-        tangent: equations.normalised(Tangent {
+        tangent: equations.normalised(Direction {
             increments: every_second(&point.tangent.increments),
             ..point.tangent
         }),
         ..point.clone()
     };
-    let mut condition = match in_plane {
-        true => Condition::plane(&equations, &near),
-        false => Condition::Value,
-    };
-    let plane = condition.as_plane();
+    let plane = in_plane.then(|| Plane::across(&equations, &near));
     let start = (&near.state, point.fraction);
-    let (found, _) = finished(&mut equations, start, plane).ok()?;
+    let (found, _) = finished(&mut equations, start, plane.as_ref()).ok()?;
     let along = equations.inner(&found.tangent, &near.tangent).abs();
     if along < SAME_BRANCH || near.state.shift_to(&found.state) > NEAR {
         return None;
     }
     let values = Values::of(&mut equations, &found.state, found.fraction).ok()?;
     let segments = equations.grid().segments();
-    condition.refine(equations.leaves.at(point.fraction).ok()?);
-    Some((segments, values, condition))
+    let leaf = equations.leaves.at([point.fraction]).ok()?;
+    Some((segments, values, plane.map(|plane| plane.refined(leaf))))
 }
 
 fn refine_in(
@@ -253,20 +204,17 @@ fn refine_in(
     in_plane: bool,
 ) -> Result<Refined, Doubt> {
     let mut table = Table::of_regular_point();
-    let mut equations = Equations::new(family, grid.clone())?;
-    let mut condition = match on_coarser(family, grid, point, in_plane) {
-        Some((segments, values, condition)) => {
+    let mut equations = Equations::new(family, grid.clone());
+    let mut plane = match on_coarser(family, grid, point, in_plane) {
+        Some((segments, values, plane)) => {
             table.push(segments, values);
-            condition
+            plane
         }
-        None if in_plane => Condition::plane(&equations, point),
-        None => Condition::Value,
+        None => in_plane.then(|| Plane::across(&equations, point)),
     };
     let start = (&point.state, point.fraction);
-    let (mut now, unfinished) = finished(&mut equations, start, condition.as_plane())?;
-    if equations.inner(&now.tangent, &point.tangent) < 0.0 {
-        now.tangent = reversed(now.tangent);
-    }
+    let (mut now, unfinished) = finished(&mut equations, start, plane.as_ref())?;
+    now.tangent = equations.oriented(now.tangent, &point.tangent);
     table.noise = unfinished;
     let values = Values::of(&mut equations, &now.state, now.fraction)?;
     table.push(grid.segments(), values);
@@ -275,7 +223,7 @@ fn refine_in(
         if 2 * equations.grid().segments() > FINEST {
             break;
         }
-        let finer = on_next_grid(&mut equations, &now, &mut condition)?;
+        let finer = on_next_grid(&mut equations, &now, &mut plane)?;
         equations = finer.equations;
         let same = equations.inner(&finer.point.tangent, &finer.tangent);
         if same < SAME_BRANCH || finer.moved > moved.max(STILL) {
@@ -302,36 +250,30 @@ fn refine_in(
 /// neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let [after, before] = both_sides(|step| {
+    let held = equations.leaves.at([point.fraction])?.leaf.held.is_some();
+    let [
+        (after, energy, force),
+        (before, energy_before, force_before),
+    ] = both_sides(|step| {
         let at = point.fraction + step;
-        let leaf = equations.leaves.at(at)?;
-        Ok::<_, OutOfRange>((at, leaf.energy(&point.state)))
+        let energy = equations.leaves.at([at])?.energy(&point.state);
+        let mut force = DVec3::ZERO;
+        if held {
+            let length = step / tangent.params[0];
+            let state = equations.advanced(&point.state, [at], &tangent.increments, length)?;
+            force = equations.leaves.at([at])?.reaction(&state).0;
+        }
+        Ok::<_, OutOfRange>((at, energy, force))
     })?;
-    let reaction = reaction_rate(equations, point)?;
-    let leaf = equations.leaves.at(point.fraction)?;
+    let leaf = equations.leaves.at([point.fraction])?;
     let nodes = observed_nodes(leaf, leaf.segments());
     let displacements = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
     Ok(Values {
         points: displacements
-            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.fraction))
+            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.params[0]))
             .collect(),
         fraction: 1.0,
-        energy: (after.1 - before.1) / (after.0 - before.0),
-        reaction,
+        energy: (energy - energy_before) / (after - before),
+        reaction: (force - force_before) / (after - before),
     })
-}
-
-/// Derivative of the reaction at held tips with respect to the parameter.
-fn reaction_rate(equations: &mut Equations, point: &Point) -> Result<DVec3, Stuck> {
-    if equations.leaves.at(point.fraction)?.leaf.held.is_none() {
-        return Ok(DVec3::ZERO);
-    }
-    let tangent = &point.tangent;
-    let [(after, force), (before, force_before)] = both_sides(|step| {
-        let at = point.fraction + step;
-        let length = step / tangent.fraction;
-        let state = equations.moved(&point.state, at, &tangent.increments, length)?;
-        Ok::<_, OutOfRange>((at, equations.leaves.at(at)?.reaction(&state).0))
-    })?;
-    Ok((force - force_before) / (after - before))
 }

@@ -1,9 +1,8 @@
 //! Critical points of a branch on finer and finer grids.
 
-use super::Tangent;
 use super::critical::{Critical, Kind};
 use super::equations::{Equations, Stuck};
-use super::family::{Family, Leaves};
+use super::family::Family;
 use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
@@ -47,22 +46,18 @@ pub fn refine_critical(
     grids: usize,
 ) -> Result<Refined, Doubt> {
     let mut table = Table::default();
-    let mut equations = Equations::new(family, grid.clone())?;
+    let mut equations = Equations::new(family, grid.clone());
     let mut critical = found.clone();
     let mut softening = Softening(SOFTENINGS[0]);
     let mut moved = f64::INFINITY;
     for level in 0..GRIDS {
         if level > 0 {
-            let leaf = equations.leaves.at(critical.fraction)?;
+            let leaf = equations.leaves.at([critical.fraction])?;
             let state = prolong(leaf, &critical.state);
-            equations = equations.refined()?;
-            let tangent = equations.normalised(Tangent {
-                increments: prolong_field(&critical.tangent.increments),
-                ..critical.tangent
-            });
+            equations = equations.refined();
             let finer = Critical {
                 state,
-                tangent,
+                tangent: equations.prolonged(&critical.tangent),
                 soft: critical.soft.iter().map(prolong_field).collect(),
                 ..critical.clone()
             };
@@ -118,7 +113,7 @@ impl Softening {
         critical: &Critical,
         table: &mut Table,
     ) -> Result<(Values, f64), Stuck> {
-        let leaf = equations.leaves.at(critical.fraction)?;
+        let leaf = equations.leaves.at([critical.fraction])?;
         let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
         let mut stiffest = stiffest_condensed(leaf);
         let segments = leaf.segments();
@@ -179,9 +174,8 @@ fn extrapolated(
     softening: f64,
 ) -> Result<Unsoftened, Stuck> {
     let softened = |k: usize| {
-        let mut equations = Equations::new(family, grid.clone())?;
-        let softening = softening * (k + 1) as f64;
-        equations.softened = Some(Leaves::softened(family, grid.clone(), softening));
+        let mut equations = Equations::new(family, grid.clone());
+        equations.soften(softening * (k + 1) as f64);
         let near = critical.relocated(&mut equations)?;
         Values::of(&mut equations, &near.state, near.fraction)
     };
@@ -262,10 +256,7 @@ fn interpolated(
     const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
     let tangent = &critical.tangent;
     let mut values_at = |side: f64| {
-        let distance = side * apart;
-        let at = critical.fraction + distance * tangent.fraction;
-        let moved = equations.moved(&critical.state, at, &tangent.increments, distance);
-        let point = equations.correct(&moved.ok()?, at, Some(tangent)).ok()?;
+        let point = critical.beside(equations, tangent, side * apart).ok()?;
         Values::of(equations, &point.state, point.fraction).ok()
     };
     let pairs = [1.0, 2.0, 3.0].into_iter();

@@ -1,7 +1,7 @@
 //! A point of a branch, extrapolated over finer and finer grids.
 
 use super::equations::{Equations, Stuck};
-use super::family::{Family, OutOfRange};
+use super::family::{Family, Leaves, OutOfRange};
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::relax::richardson::Richardson;
 use crate::relax::shape_of;
@@ -51,9 +51,8 @@ impl Refined {
     /// # Errors
     /// If the extrapolated parameter is one that no leaf can have.
     pub fn shapes(&self, family: &Family) -> Result<Vec<RodShape>, OutOfRange> {
-        family.with(self.fraction, &self.grid, |leaf| {
-            shape_of(leaf, &self.state)
-        })
+        let mut leaves = Leaves::new(family, self.grid.clone());
+        Ok(shape_of(leaves.at([self.fraction])?, &self.state))
     }
 }
 
@@ -79,8 +78,11 @@ pub enum Doubt {
 }
 
 impl From<Stuck> for Doubt {
-    fn from(_: Stuck) -> Self {
-        Doubt::Unsolved
+    fn from(stuck: Stuck) -> Self {
+        match stuck {
+            Stuck::Separated | Stuck::Unfolded => Doubt::OtherBranch,
+            _ => Doubt::Unsolved,
+        }
     }
 }
 
@@ -110,7 +112,7 @@ pub(super) fn observed_nodes(leaf: &DiscreteLeaf, segments: usize) -> impl Itera
 
 impl Values {
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
-        let leaf = equations.leaves.at(fraction)?;
+        let leaf = equations.leaves.at([fraction])?;
         let nodes = observed_nodes(leaf, state.segments());
         let reaction = match leaf.leaf.held {
             Some(_) => leaf.reaction(state).0,
@@ -224,16 +226,11 @@ impl Table {
         let Some(best) = self.of(|values| vec![values.fraction]).best() else {
             return f64::INFINITY;
         };
-        let fraction = |back: usize| {
-            Some(
-                self.rows
-                    .get(self.rows.len().checked_sub(back)?)?
-                    .1
-                    .fraction,
-            )
-        };
-        match (best.columns, fraction(2), fraction(3)) {
-            (0, Some(last), Some(before)) => best.error.max(LEAST_FALL * (last - before).abs()),
+        match self.rows.as_slice() {
+            [.., (_, before), (_, last), _] if best.columns == 0 => {
+                let fall = LEAST_FALL * (last.fraction - before.fraction).abs();
+                best.error.max(fall)
+            }
             _ => best.error,
         }
     }

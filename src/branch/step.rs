@@ -39,18 +39,17 @@ impl Found {
             _ => return Ok(None),
         };
         let part = (edge - now.fraction) / (self.point.fraction - now.fraction);
-        self.point = at_edge(equations, now, edge, part * step)?;
+        (self.point, _) = at_edge(equations, now, edge, part * step)?;
         self.step = part * step;
         Ok(Some(edge))
     }
 }
 
 fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
-    let tangent = &now.tangent;
-    let fraction = now.fraction + step * tangent.fraction;
-    let state = equations.moved(&now.state, fraction, &tangent.increments, step)?;
-    let point = equations.correct(&state, fraction, Some(tangent))?;
-    let drift = (state.shift_to(&point.state)).max((point.fraction - fraction).abs());
+    let near = equations.moved(&now.solution(), &now.tangent, step)?;
+    let [fraction] = near.params;
+    let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
+    let drift = (near.state.shift_to(&point.state)).max((point.fraction - fraction).abs());
     Ok(Found { point, step, drift })
 }
 
@@ -61,26 +60,35 @@ fn advance_to_edge(
     step: f64,
     out: OutOfRange,
 ) -> Result<Found, Stuck> {
-    let edge = if now.tangent.fraction > 0.0 { 1.0 } else { 0.0 };
-    let length = (edge - now.fraction) / now.tangent.fraction;
+    let edge = if now.tangent.params[0] > 0.0 {
+        1.0
+    } else {
+        0.0
+    };
+    let length = (edge - now.fraction) / now.tangent.params[0];
     if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let point = at_edge(equations, now, edge, length)?;
+    let (point, drift) = at_edge(equations, now, edge, length)?;
     let part = length / step;
-    let state = equations.moved(&now.state, edge, &now.tangent.increments, length)?;
     Ok(Found {
-        drift: state.shift_to(&point.state) / part,
+        drift: drift / part,
         point,
         step: length,
     })
 }
 
-/// The point at an end of the range, predicted `length` along the tangent.
-fn at_edge(equations: &mut Equations, now: &Point, edge: f64, length: f64) -> Result<Point, Stuck> {
-    let increments = &now.tangent.increments;
-    let state = equations.moved(&now.state, edge, increments, length)?;
+/// The point at an end of the range, predicted `length` along the tangent, and its distance from
+/// the prediction.
+fn at_edge(
+    equations: &mut Equations,
+    now: &Point,
+    edge: f64,
+    length: f64,
+) -> Result<(Point, f64), Stuck> {
+    let state = equations.advanced(&now.state, [edge], &now.tangent.increments, length)?;
     let mut point = equations.correct(&state, edge, None)?;
     point.tangent = equations.oriented(point.tangent, &now.tangent);
-    Ok(point)
+    let drift = state.shift_to(&point.state);
+    Ok((point, drift))
 }

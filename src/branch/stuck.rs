@@ -3,7 +3,7 @@
 use super::family::OutOfRange;
 
 /// Why no point is found.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Stuck {
     /// The parameter has left its range.
     #[error(transparent)]
@@ -25,4 +25,10 @@ pub enum Stuck {
     /// Rounding may change the sign of the softest eigenvalues.
     #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
     Rounding,
+    /// Modes that became neutral together no longer do.
+    #[error("modes that become neutral together part")]
+    Separated,
+    /// The second parameter breaks the symmetry to which the branch point is due.
+    #[error("the second number breaks the symmetry by which branches cross")]
+    Unfolded,
 }

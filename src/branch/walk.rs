@@ -1,12 +1,12 @@
 //! Following a branch on one grid.
 
 use super::critical::{Critical, Kind, locate};
-use super::equations::{Equations, Stuck, reversed};
+use super::equations::{Equations, Stuck};
 use super::field::{add, between, plus};
 use super::refine::on_finer;
 use super::refined::Doubt;
 use super::step::Found;
-use super::{Point, Tangent};
+use super::{Direction, Point};
 
 /// First step and shortest step, as parts of the longest.
 const FIRST: f64 = 0.25;
@@ -78,15 +78,17 @@ impl Walk<'_> {
     }
 }
 
-/// How a branch ended.
-#[derive(Clone, Debug)]
+/// How a branch ended, or a boundary on one of its sides.
+#[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// At the end of the range.
+    /// At the end of the range; of a boundary, at an end of one of the ranges.
     Reached,
     /// Back at the start of the range.
     Returned,
     /// Where it began.
     Closed,
+    /// On a boundary that was followed before.
+    Met,
     /// After as many points as were allowed.
     MostPoints,
     /// Where the stopping criterion was met.
@@ -253,7 +255,7 @@ impl Branch {
             next.point = point;
             end = Some(End::Closed);
         }
-        let turned = now.tangent.fraction * next.point.tangent.fraction < 0.0;
+        let turned = now.tangent.params[0] * next.point.tangent.params[0] < 0.0;
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
             let distance = equations.inner(&chord(now, &next.point), &now.tangent);
@@ -304,25 +306,25 @@ impl Walk<'_> {
 }
 
 /// The difference of two points.
-fn chord(a: &Point, b: &Point) -> Tangent {
-    Tangent {
+fn chord(a: &Point, b: &Point) -> Direction {
+    Direction {
         increments: between(&a.state, &b.state),
-        fraction: b.fraction - a.fraction,
+        params: [b.fraction - a.fraction],
     }
 }
 
 /// The part of the chord between two points that is transverse to the mean of their
 /// tangents.
 fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
-    let mean = equations.normalised(Tangent {
+    let mean = equations.normalised(Direction {
         increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
-        fraction: a.tangent.fraction + b.tangent.fraction,
+        params: [a.tangent.params[0] + b.tangent.params[0]],
     });
     let mut rest = chord(a, b);
     let length = equations.inner(&rest, &rest).sqrt();
     let along = equations.inner(&rest, &mean);
     add(&mut rest.increments, -along, &mean.increments);
-    rest.fraction -= along * mean.fraction;
+    rest.params[0] -= along * mean.params[0];
     equations.inner(&rest, &rest).sqrt() / length
 }
 
@@ -342,10 +344,8 @@ fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) 
         if shift.abs() > 2.0 * step {
             return None;
         }
-        let increments = &near.tangent.increments;
-        let fraction = near.fraction + shift * near.tangent.fraction;
-        let state = (equations.moved(&near.state, fraction, increments, shift)).ok()?;
-        near = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
+        let moved = (equations.moved(&near.solution(), &near.tangent, shift)).ok()?;
+        near = (equations.correct(&moved.state, moved.params[0], Some(&first.tangent))).ok()?;
     }
     None
 }
@@ -355,12 +355,12 @@ fn distance(a: &Point, b: &Point) -> f64 {
     (a.state.shift_to(&b.state)).max((a.fraction - b.fraction).abs())
 }
 
-impl Tangent {
-    /// The direction in which the parameter grows, or decreases.
-    pub fn towards(self, growing: bool) -> Self {
-        match (self.fraction >= 0.0) == growing {
+impl Direction {
+    /// The direction in which the parameter grows.
+    pub fn growing(self) -> Self {
+        match self.params[0] >= 0.0 {
             true => self,
-            false => reversed(self),
+            false => self.reversed(),
         }
     }
 }

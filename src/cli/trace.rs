@@ -99,14 +99,14 @@ impl Trace {
         let boundary = study::boundary(&request, &mut |curve, points, [first, second]| {
             // A curve is followed to both ends of the second number's range.
             let fraction = match curve {
-                None => fraction_between(ends(along)[0], first, ends(along)[1], along.log),
+                None => fraction_between(along.ends()[0], first, along.ends()[1], along.log),
                 Some(number) => {
                     if number != seen.0 {
                         seen = (number, [second; 2]);
                         line.next_phase();
                     }
                     seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
-                    let [from, to] = ends(across);
+                    let [from, to] = across.ends();
                     let [low, high] = seen.1.map(|at| fraction_between(from, at, to, across.log));
                     low.zip(high).map(|(low, high)| (high - low).abs())
                 }
@@ -132,14 +132,14 @@ impl Trace {
             );
         }
         let mut line = job.progress();
-        let mut seen = (0, ends(vary)[0]);
+        let mut seen = (0, vary.ends()[0]);
         let mut trace = study::trace(&request, &mut |branch, points, value| {
             if branch != seen.0 {
                 seen = (branch, value);
                 line.next_phase();
             }
             // Relative to the end it moves to; the number of branches is not known.
-            let [from, to] = ends(vary);
+            let [from, to] = vary.ends();
             let backwards = (value - seen.1) * (to - from) < 0.0;
             let to = if backwards { from } else { to };
             line.update(fraction_between(seen.1, value, to, vary.log), || {
@@ -163,12 +163,6 @@ fn cells(given: &str) -> Result<[usize; 2], String> {
         Some([Some(columns), Some(rows)]) => Ok([columns, rows]),
         _ => Err("give cells along both numbers, as 16x16".into()),
     }
-}
-
-/// The first and the last value.
-fn ends(vary: &Vary) -> [f64; 2] {
-    let ends = [vary.values.first(), vary.values.last()];
-    ends.map(|end| end.copied().unwrap_or_default())
 }
 
 /// An error together with the option that caused it.

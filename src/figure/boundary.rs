@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::kit::*;
 use super::map::{DARKEST_INDEX, fill_index, name};
-use crate::branch::Kind;
+use crate::branch::{Kind, value_between};
 use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
 use crate::report::sides;
 use crate::report::words::stable_or_index;
@@ -156,13 +156,10 @@ fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[DrawnLeaf], cel
 /// Draws the cells of the map, each in the colour of its index.
 fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &BoundaryMap) {
     let edges = |which: usize, cells: usize| -> Vec<f64> {
-        let [from, to] = boundary.ranges[which];
         let part = |k: usize| k as f64 / cells as f64;
-        let value = |part: f64| match boundary.log[which] {
-            true => from * (to / from).powf(part),
-            false => from + (to - from) * part,
-        };
-        (0..=cells).map(|k| value(part(k))).collect()
+        (0..=cells)
+            .map(|k| value_between(boundary.ranges[which], boundary.log[which], part(k)))
+            .collect()
     };
     let (x, y) = (edges(0, map.first.len()), edges(1, map.second.len()));
     for (r, row) in map.index.iter().enumerate() {

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::kit::*;
+use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, Law, PointKind, Trace, TraceBranch,
@@ -206,7 +207,7 @@ fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec
     let (number, points) = (number + 1, curve.points.len());
     let mut lines = vec![format!("{number}: {points} points, {what}")];
     let end = |label: &str, point: Option<&BoundaryPoint>, end: usize| {
-        let phrase = curve.ends[end].phrase();
+        let phrase = curve_end(&curve.ends[end]);
         let at = point.map_or(String::new(), |point| place_in_plane(boundary, point));
         format!("  {label} {at}: {phrase}")
     };
@@ -217,6 +218,26 @@ fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec
     );
     lines.push(end("to", curve.points.last(), 1));
     lines
+}
+
+/// How a curve ended on one of its sides, as a phrase.
+fn curve_end(end: &End) -> &'static str {
+    match end {
+        End::Reached | End::Returned => "the end of a range",
+        End::Closed => "closed",
+        End::Met => "on a curve above",
+        End::MostPoints | End::Enough => "goes on: allow more points",
+        End::Stuck(Stuck::Unfolded) => {
+            "the second number breaks the symmetry by which branches cross"
+        }
+        End::Stuck(Stuck::Separated) => "modes that become neutral together part",
+        End::Stuck(Stuck::OutOfRange(_)) => "no leaf is there",
+        End::Stuck(_) => "lost",
+        End::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
+        End::Unverified(Doubt::OtherIndex) => "not verified: finer grids have another index",
+        End::Unverified(Doubt::Inaccurate) => "not verified: the tolerance is not reached",
+        End::Unverified(_) => "not verified: finer grids have another curve",
+    }
 }
 
 /// Most disagreeing cells that are listed.

@@ -89,6 +89,7 @@ pub fn branch_end(end: &End) -> &'static str {
         End::Reached => "to the end of the range",
         End::Returned => "back to the start of the range",
         End::Closed => "closed",
+        End::Met => "met",
         End::MostPoints | End::Enough => "goes on",
         End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
         End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",

@@ -2,11 +2,10 @@
 
 use glam::DVec3;
 
-use super::manifold::Solution;
-use super::plane::Plane;
+use super::manifold::{Plane, Solution};
 use crate::branch::Point;
 use crate::branch::critical::Critical;
-use crate::branch::equations::{Equations, Stuck};
+use crate::branch::equations::Equations;
 use crate::branch::refine::{index_at, on_finer};
 use crate::branch::refine_critical::refine_critical;
 use crate::branch::refined::{Doubt, Refined};
@@ -38,10 +37,9 @@ pub struct AtRest {
 }
 
 /// What was found on the straight path from an equilibrium to another point of the plane.
-#[derive(Default)]
 pub struct Path {
-    /// The grid on which it was followed, if that could be begun.
-    pub grid: Option<Grid>,
+    /// The grid on which it was followed.
+    pub grid: Grid,
     /// Tips of all rods along it, in the family's units.
     pub tips: Vec<Vec<DVec3>>,
     /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
@@ -54,15 +52,15 @@ pub struct Path {
 }
 
 /// The scenarios on the straight path between two points of the plane.
-type Between<'p> = dyn Fn(f64) -> Result<Scenario, String> + Sync + 'p;
+type Between<'p> = dyn Fn([f64; 1]) -> Result<Scenario, String> + Sync + 'p;
 
 fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> {
-    Box::new(move |part: f64| {
+    Box::new(move |[part]: [f64; 1]| {
         let at = |i: usize| match part {
             1.0 => to[i],
             _ => from[i] + part * (to[i] - from[i]),
         };
-        (plane.make)(plane.values([at(0), at(1)]))
+        plane.scenario([at(0), at(1)]).map_err(|out| out.0)
     })
 }
 
@@ -72,15 +70,18 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 /// on the grid of the path, that grid is too coarse, and a finer one is tried.
 pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
     let make = between(plane, [from.solution.params, to]);
-    let family = plane.family.along_path(&*make);
-    let mut path = Path::default();
+    let family = plane.along_path(&*make);
+    let mut path = Path {
+        grid: from.grid.clone(),
+        tips: Vec::new(),
+        critical: Vec::new(),
+        turned: false,
+        end: None,
+        factorizations: 0,
+    };
     let Ok(family) = family else { return path };
-    let equations = Equations::new(&family, from.grid.clone());
-    let first = equations.map_err(Stuck::from).and_then(|mut equations| {
-        let first = equations.correct(&from.solution.state, 0.0, None)?;
-        Ok((equations, first))
-    });
-    let Ok((mut equations, mut first)) = first else {
+    let mut equations = Equations::new(&family, from.grid.clone());
+    let Ok(mut first) = equations.correct(&from.solution.state, 0.0, None) else {
         return path;
     };
     loop {
@@ -113,8 +114,8 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
 /// it, or do not agree.
 pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
     let make = between(plane, [at.solution.params; 2]);
-    let family = plane.family.along_path(&*make).ok()?;
-    let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
+    let family = plane.along_path(&*make).ok()?;
+    let mut equations = Equations::new(&family, at.grid.clone());
     let mut point = equations.correct(&at.solution.state, 0.0, None).ok()?;
     while point.state.segments() < RECOUNTED {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
@@ -125,8 +126,8 @@ pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
 /// The point at the end of the path on this grid, if the branch reaches it.
 fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<Point> {
     let mut first = first.clone();
-    first.tangent = first.tangent.towards(true);
-    let turned = |points: &[Point]| points[points.len() - 1].tangent.fraction < 0.0;
+    first.tangent = first.tangent.growing();
+    let turned = |points: &[Point]| points[points.len() - 1].tangent.params[0] < 0.0;
     let how = Walk {
         enough: Some(&turned),
         ..Walk::new(LONGEST, MOST)
@@ -134,7 +135,7 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
     let before = equations.factorizations;
     let branch = walk(equations, first, &how, &mut |_, _| {});
     path.factorizations += equations.factorizations - before;
-    path.grid = Some(equations.grid().clone());
+    path.grid.clone_from(equations.grid());
     let tips = |point: &Point| point.state.tips().collect();
     path.tips = branch.points.iter().map(tips).collect();
     path.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
@@ -154,6 +155,6 @@ pub fn refine_on_path(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     let make = between(plane, ends);
-    let family = plane.family.along_path(&*make)?;
+    let family = plane.along_path(&*make)?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }

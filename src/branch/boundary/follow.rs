@@ -3,14 +3,12 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use super::halt::Halt;
-use super::manifold::Manifold;
-use super::plane::Plane;
-use super::search::NotFound;
+use super::manifold::{Manifold, Plane};
 use super::singular_point::{Seed, SingularPoint};
 use super::table::Verified;
-use super::walk::{Walk, WalkOptions};
+use super::walk::{Walk, WalkOptions, lost};
 use crate::branch::critical::Kind;
+use crate::branch::walk::End;
 use crate::leaf::Grid;
 
 /// A boundary, on both sides of its starting point.
@@ -21,7 +19,7 @@ pub struct Boundary {
     pub neutral: usize,
     pub points: Vec<Verified>,
     /// How it ended at its first point and at its last.
-    pub ends: [Halt; 2],
+    pub ends: [End; 2],
     /// Matrices factorised for it, without those of softened leaves.
     pub factorizations: usize,
 }
@@ -31,7 +29,7 @@ type Progress<'p> = dyn FnMut(usize, [f64; 2]) + Send + 'p;
 
 /// Follows the boundary through a critical point of a branch in both directions, in parallel.
 pub fn follow(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     seed: &Seed,
     how: &WalkOptions,
@@ -41,19 +39,17 @@ pub fn follow(
         kind: seed.critical.kind,
         neutral: seed.critical.modes.len(),
         points: Vec::new(),
-        ends: [Halt::Stuck; 2],
+        ends: [End::MostPoints, End::MostPoints],
         factorizations: 0,
     };
-    let begun = Manifold::new(plane, grid.clone()).map_err(NotFound::from);
-    let begun = begun.and_then(|mut manifold| {
-        let begun = SingularPoint::begin(&mut manifold, seed);
-        boundary.factorizations += manifold.equations.factorizations;
-        begun
-    });
+    let mut manifold = Manifold::new(plane, grid.clone());
+    let begun = SingularPoint::begin(&mut manifold, seed);
+    boundary.factorizations += manifold.factorizations;
     let first = match begun {
         Ok(first) => first,
-        Err(lost) => {
-            boundary.ends = [Halt::from(lost); 2];
+        Err(stuck) => {
+            let end = lost(stuck);
+            boundary.ends = [end.clone(), end];
             return boundary;
         }
     };
@@ -69,16 +65,16 @@ pub fn follow(
         // If one direction leads back to the start, the other is not needed.
         let cancelled = || side == 0 && closed.load(Ordering::Relaxed);
         let end = walk.run(grid.clone(), &cancelled, &mut report);
-        closed.fetch_or(side == 1 && end == Halt::Closed, Ordering::Relaxed);
+        closed.fetch_or(side == 1 && end == End::Closed, Ordering::Relaxed);
         (walk, end)
     };
     let ((forward, end), (backward, beginning)) =
         rayon::join(|| walk(1, first.clone()), || walk(0, first.turned()));
     boundary.factorizations += forward.factorizations;
-    boundary.ends = [beginning, end];
+    let is_closed = end == End::Closed;
+    boundary.ends = [if is_closed { end.clone() } else { beginning }, end];
     boundary.points = forward.in_order();
-    if end == Halt::Closed {
-        boundary.ends[0] = end;
+    if is_closed {
         return boundary;
     }
     boundary.factorizations += backward.factorizations;

@@ -1,9 +1,8 @@
 //! Transfer of boundary points to finer and coarser grids.
 
-use super::manifold::{Direction, Manifold, Solution};
-use super::plane::Plane;
-use super::search::NotFound;
+use super::manifold::{Direction, Manifold, Plane, Solution};
 use super::singular_point::SingularPoint;
+use crate::branch::equations::Stuck;
 use crate::branch::field::{every_second, prolong as prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::{prolong, restrict};
@@ -16,9 +15,12 @@ const COARSEST: usize = 8;
 pub fn on_finer<'a>(
     manifold: &mut Manifold<'a>,
     point: &SingularPoint,
-) -> Result<(Manifold<'a>, SingularPoint), NotFound> {
-    let state = prolong(manifold.leaf(point.solution.params)?, &point.solution.state);
-    let finer = manifold.refined()?;
+) -> Result<(Manifold<'a>, SingularPoint), Stuck> {
+    let state = prolong(
+        manifold.leaves.at(point.solution.params)?,
+        &point.solution.state,
+    );
+    let finer = manifold.refined();
     let point = transferred(point, state, prolong_field);
     let point = SingularPoint {
         tangent: finer.normalised(point.tangent),
@@ -30,7 +32,7 @@ pub fn on_finer<'a>(
 
 /// Initial guess for the point on the grid with every second node.
 pub fn on_coarser(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     point: &SingularPoint,
 ) -> Option<(Grid, SingularPoint)> {
@@ -62,12 +64,12 @@ fn transferred(
 
 /// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
 /// not its refinement.
-pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
+pub fn state_on_coarser(plane: &Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
     let half = state.segments() / 2;
     if half < COARSEST || 2 * half != state.segments() {
         return None;
     }
-    let coarse = coarsened(grid, half, plane.family.first().kinks());
+    let coarse = coarsened(grid, half, plane.first().kinks());
     (coarse.refined() == *grid).then(|| (coarse, restrict(state)))
 }
 

@@ -30,10 +30,8 @@
 mod cells;
 mod follow;
 mod grids;
-mod halt;
 mod manifold;
 mod neighbours;
-mod plane;
 mod refine;
 mod search;
 mod singular_point;
@@ -44,12 +42,10 @@ mod walk;
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
 pub use follow::{Boundary, follow};
 pub use grids::coarsened;
-pub use halt::Halt;
 #[cfg(test)]
 pub use manifold::Direction;
-pub use manifold::Solution;
+pub use manifold::{Plane, Solution};
 pub use neighbours::{Neighbour, beside};
-pub use plane::Plane;
 pub use refine::Accuracy;
 pub use singular_point::Seed;
 pub use special::Special;

@@ -3,12 +3,9 @@
 use std::ops::RangeInclusive;
 
 use super::grids::state_on_coarser;
-use super::manifold::{Direction, Manifold, Solution};
-use super::plane::Plane;
-use super::search::NotFound;
+use super::manifold::{Direction, Manifold, Plane, Solution};
 use super::table::Verified;
 use crate::branch::critical::Kind;
-use crate::branch::family::Source;
 use crate::branch::field::every_second;
 use crate::leaf::{Grid, State};
 use crate::limit::Limit;
@@ -33,7 +30,7 @@ pub struct Neighbour {
 /// The leaves on both sides of a point of a boundary with this tangent `along` it in the
 /// parameter plane: equilibria, the one of smaller index first. If that is stable, the other is
 /// where it comes to rest beyond the boundary. None if one of them is not found.
-pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Neighbour; 2]> {
+pub fn beside(plane: &Plane, point: &Verified, along: [f64; 2]) -> Option<[Neighbour; 2]> {
     let (grid, point) = &for_pictures(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
@@ -54,8 +51,8 @@ pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Neighb
 }
 
 /// The point on the coarsest grid that pictures allow.
-fn for_pictures(plane: Plane, point: &Verified) -> (Grid, Verified) {
-    let mut grid = Grid::through(&point.stations, plane.family.first().kinks());
+fn for_pictures(plane: &Plane, point: &Verified) -> (Grid, Verified) {
+    let mut grid = Grid::through(&point.stations, plane.first().kinks());
     let mut point = point.clone();
     while grid.segments() > FINEST
         && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
@@ -68,33 +65,32 @@ fn for_pictures(plane: Plane, point: &Verified) -> (Grid, Verified) {
 
 /// The equilibrium at a distance across the boundary, if its index is one of these.
 fn on_sheet(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     point: &Verified,
     along: [f64; 2],
     (away, indices): (f64, &RangeInclusive<usize>),
 ) -> Option<Neighbour> {
-    let found = || -> Result<Neighbour, NotFound> {
-        let mut manifold = Manifold::new(plane, grid.clone())?;
-        let along = Direction {
-            params: along,
-            ..manifold.unit_parameter(0)
-        };
-        let start = Solution {
-            state: point.state.clone(),
-            params: point.params,
-        };
-        let start = manifold.beside(&start, &point.across, away)?;
-        let rates = manifold.rates(&start)?;
-        let sample = manifold.correct(&start, [&along, &point.across], &[], &rates)?;
-        Ok(Neighbour {
-            solution: sample.solution,
-            index: sample.solved.negative,
-            fallen_from: None,
-        })
+    let mut manifold = Manifold::new(plane, grid.clone());
+    let along = Direction {
+        params: along,
+        ..manifold.unit_parameter(0)
     };
-    let found = found().ok()?;
-    (indices.contains(&found.index) && inside(found.solution.params)).then_some(found)
+    let start = Solution {
+        state: point.state.clone(),
+        params: point.params,
+    };
+    let start = manifold.beside(&start, &point.across, away).ok()?;
+    let rates = manifold.rates(&start, false).ok()?;
+    let normals = [&along, &point.across];
+    let found = manifold.deflated(start, normals, &[], Some(&rates), false);
+    let found = found.ok()?;
+    let index = found.solved.negative;
+    (indices.contains(&index) && inside(found.solution.params)).then_some(Neighbour {
+        solution: found.solution,
+        index,
+        fallen_from: None,
+    })
 }
 
 /// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with
@@ -117,8 +113,8 @@ fn beyond(point: &Verified, stable: &Solution, along: [f64; 2]) -> Option<Soluti
 }
 
 /// The equilibrium to which a leaf relaxes.
-fn at_rest(plane: Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
-    let leaf = plane.leaf_at(from.params).ok()?;
+fn at_rest(plane: &Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
+    let leaf = plane.leaf(from.params).ok()?;
     let state = settle_from(&leaf, grid, from.state.clone(), &Limit::default())?;
     Some(Neighbour {
         solution: Solution {

@@ -1,13 +1,13 @@
 //! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
 use super::grids::{on_coarser, on_finer};
-use super::manifold::{Manifold, Solution};
-use super::plane::Plane;
-use super::search::{NotFound, Search};
+use super::manifold::{Manifold, Plane, Solution};
+use super::search::Search;
 use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
 use super::table::{Parameters, Table, Verified};
 use crate::branch::critical::Kind;
+use crate::branch::equations::Stuck;
 use crate::branch::refine_critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
@@ -70,13 +70,14 @@ pub struct Step {
 /// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
 /// coarser ones if possible.
 pub fn refine(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let rigid = Manifold::new(plane, grid.clone())?
-        .leaf(step.point.solution.params)?
+    let rigid = Manifold::new(plane, grid.clone())
+        .leaves
+        .at(step.point.solution.params)?
         .stiffest();
     if rigid * NEARLY_RIGID < 1.0
         && let Some((grid, point)) = on_coarser(plane, grid, &step.point)
@@ -94,12 +95,12 @@ pub fn refine(
 
 /// The same, starting from this grid.
 fn refine_from(
-    plane: Plane,
+    plane: &Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let mut manifold = Manifold::new(plane, grid.clone())?;
+    let mut manifold = Manifold::new(plane, grid.clone());
     let mut near = step.point.clone();
     let given = step.given.or_else(|| given_at(&manifold, &near));
     let given = given.filter(|_| step.special.is_none());
@@ -116,7 +117,7 @@ fn refine_from(
         let mut start = near.solution.clone();
         let believed = table.tips.best().map_or(0, |best| best.columns + 1);
         predict_spot(&levels, &params, believed, &mut start);
-        let rigid = manifold.leaf(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
+        let rigid = manifold.leaves.at(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
         let (point, along) = match (step.special, rigid) {
             (None, false) => {
                 let left = LEFT * enough;
@@ -127,7 +128,7 @@ fn refine_from(
             }
             _ => relocated(&mut manifold, &near, step.special, given)?,
         };
-        factorizations += manifold.equations.factorizations;
+        factorizations += manifold.factorizations;
         let shift = near.solution.state.shift_to(&point.solution.state);
         if shift > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
@@ -140,7 +141,7 @@ fn refine_from(
         }
         near = point;
         levels.push(Level {
-            leaf: manifold.leaf(near.solution.params)?.clone(),
+            leaf: manifold.leaves.at(near.solution.params)?.clone(),
             state: near.solution.state.clone(),
         });
         params.push(near.solution.params);
@@ -199,7 +200,7 @@ fn relocated(
     near: &SingularPoint,
     special: Option<Special>,
     given: Option<usize>,
-) -> Result<(SingularPoint, Option<f64>), NotFound> {
+) -> Result<(SingularPoint, Option<f64>), Stuck> {
     if let Some(special) = special {
         let (point, slope) = locate_near(manifold, near, special)?;
         return Ok((point, (special == Special::Crossing).then_some(slope)));
@@ -231,7 +232,7 @@ fn newton_or_secant(
     given: Option<usize>,
     accuracy: f64,
     contraction: &mut Contraction,
-) -> Result<(SingularPoint, f64), NotFound> {
+) -> Result<(SingularPoint, f64), Stuck> {
     let search = near.search(manifold, given, start.clone(), (accuracy, NEAR));
     let frozen = near.kind == Kind::Branching;
     let found = search.newton(manifold, frozen, contraction);
@@ -254,7 +255,7 @@ fn least_softened(
     near: &SingularPoint,
     sought: (Option<Special>, Option<usize>),
     (table, along): (&Table, Option<f64>),
-) -> Result<Parameters, NotFound> {
+) -> Result<Parameters, Stuck> {
     let largest = |[a, b]: [f64; 2]| a.max(b);
     let mut numbers = unsoftened(manifold, near, sought, FIRST_SOFTENING)?;
     let finest = FINER * manifold.grid().segments() as f64;
@@ -279,12 +280,12 @@ fn unsoftened(
     near: &SingularPoint,
     (special, given): (Option<Special>, Option<usize>),
     softening: f64,
-) -> Result<Parameters, NotFound> {
+) -> Result<Parameters, Stuck> {
     let grid = manifold.grid().clone();
     let mut values_by_softening = [[0.0; 2]; 4];
     let mut search = sought(manifold, near, given);
     for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
-        let mut soft = Manifold::new(manifold.plane, grid.clone())?;
+        let mut soft = Manifold::new(manifold.leaves.family, grid.clone());
         soft.soften(softening * (k + 1) as f64);
         search.solution = match special {
             Some(special) => {
@@ -315,13 +316,4 @@ fn unsoftened(
         softening,
         errors: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
     })
-}
-
-impl From<NotFound> for Doubt {
-    fn from(lost: NotFound) -> Self {
-        match lost {
-            NotFound::Stuck(stuck) => stuck.into(),
-            NotFound::Separated | NotFound::Unfolded => Doubt::OtherBranch,
-        }
-    }
 }

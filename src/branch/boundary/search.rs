@@ -27,22 +27,6 @@ pub struct Eigen {
     pub others: Vec<f64>,
 }
 
-/// Why no point of a boundary is found.
-#[derive(Clone, Debug)]
-pub enum NotFound {
-    Stuck(Stuck),
-    /// The modes do not become neutral together.
-    Separated,
-    /// The parameter does work on the mode, so that there is no branch point.
-    Unfolded,
-}
-
-impl<E: Into<Stuck>> From<E> for NotFound {
-    fn from(stuck: E) -> Self {
-        NotFound::Stuck(stuck.into())
-    }
-}
-
 /// A search for a point of a boundary.
 pub struct Search {
     /// From here,
@@ -103,19 +87,19 @@ impl Search {
         manifold: &mut Manifold,
         frozen: bool,
         contraction: &mut Contraction,
-    ) -> Result<(Found, f64), NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
-        let along = manifold.equations.momentum(&self.along.increments);
+    ) -> Result<(Found, f64), Stuck> {
+        let border = manifold.momenta(&self.soft);
+        let along = manifold.momentum(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let rates = manifold.rates(&solution)?;
-            let (mut sample, noise) = manifold.sample(solution, &border, rates, false)?;
+            let rates = manifold.rates(&solution, false)?;
+            let mut sample = manifold.sample(solution, &border, rates, false)?;
             let eigen = eigen(&sample, self.neutral);
             let forces = &sample.solved.forces.multipliers;
             let excited = |mode: &Vec<f64>| {
                 let force: f64 = mode.iter().zip(forces).map(|(part, f)| part * f).sum();
-                force.abs() > noise
+                force.abs() > sample.noise
             };
             if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
                 break;
@@ -126,10 +110,8 @@ impl Search {
                 (&along, self.along.params.as_slice(), 0.0),
                 (&slope, numbers.as_slice(), value),
             ];
-            let (increments, changes, size) = sample.solved.step(&functions, noise)?;
-            let params = [0, 1].map(|i| sample.solution.params[i] + changes[i]);
-            let state = manifold.advanced(&sample.solution.state, params, &increments, 1.0)?;
-            solution = Solution { state, params };
+            let (next, size) = manifold.newton_step(&sample, &functions)?;
+            solution = next;
             contraction.update(size, previous);
             let first = contraction.error_after_first(size, 0.0);
             let accuracy = (self.accuracy, ROUNDED);
@@ -148,7 +130,7 @@ impl Search {
             }
             previous = size;
         }
-        Err(NotFound::Stuck(Stuck::NotConverged))
+        Err(Stuck::NotConverged)
     }
 
     /// Derivatives of the eigenvalue with respect to increments and parameters, over its slope.
@@ -159,7 +141,7 @@ impl Search {
         eigen: &Eigen,
         border: &[Field],
         frozen: bool,
-    ) -> Result<(Field, [f64; 2]), NotFound> {
+    ) -> Result<(Field, [f64; 2]), Stuck> {
         let own = &eigen.vectors[..self.neutral];
         let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
         let modes: Vec<Field> = modes.collect();
@@ -183,14 +165,14 @@ impl Search {
     }
 
     /// The zero of the eigenvalue by a secant method.
-    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
-        let rates = manifold.rates(&self.solution)?;
+    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, Stuck> {
+        let border = manifold.momenta(&self.soft);
+        let rates = manifold.rates(&self.solution, false)?;
         // From the previous solution, to which the next is close.
-        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, NotFound> {
+        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, Stuck> {
             let solution = manifold.moved(from, &self.across, step)?;
             let normals = [&self.along, &self.across];
-            let sample = manifold.correct(&solution, normals, &border, &rates)?;
+            let sample = manifold.deflated(solution, normals, &border, Some(&rates), false)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,
@@ -205,7 +187,7 @@ impl Search {
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || (distance + step).abs() > self.furthest {
-                return Err(NotFound::Stuck(Stuck::NotConverged));
+                return Err(Stuck::NotConverged);
             }
             if step.abs() < self.accuracy {
                 return Ok(best);
@@ -225,6 +207,6 @@ impl Search {
                 return Ok(best);
             }
         }
-        Err(NotFound::Stuck(Stuck::NotConverged))
+        Err(Stuck::NotConverged)
     }
 }

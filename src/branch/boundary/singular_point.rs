@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::manifold::{Direction, Manifold, Sample, Solution};
-use super::search::{self, Eigen, Found, NotFound, Search};
+use super::search::{self, Eigen, Found, Search};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
+use crate::branch::refined::Refined;
 use crate::leaf::Field;
 
 /// Step of the central differences for the derivative of an eigenvalue.
@@ -54,6 +55,8 @@ pub struct SingularPoint {
 #[derive(Clone, Copy)]
 pub struct Seed<'c> {
     pub critical: &'c Critical,
+    /// The same extrapolated over grids.
+    pub refined: &'c Refined,
     /// Both parameters at the start of the branch, as fractions of their ranges,
     pub from: [f64; 2],
     /// and their derivatives with respect to its parameter.
@@ -76,7 +79,7 @@ impl Seed<'_> {
 
 impl SingularPoint {
     /// The first point of a boundary, the normal of which is along the branch.
-    pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, NotFound> {
+    pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, Stuck> {
         let (critical, direction) = (seed.critical, seed.direction);
         let modes = critical.modes.iter().chain(&critical.soft);
         let soft = independent(manifold, modes, critical.soft.len());
@@ -86,7 +89,7 @@ impl SingularPoint {
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),
-            params: direction.map(|part| part * critical.tangent.fraction),
+            params: direction.map(|part| part * critical.tangent.params[0]),
         };
         let slope = critical.slope / manifold.inner(&across, &across).sqrt();
         let across = manifold.normalised(across);
@@ -154,25 +157,21 @@ impl SingularPoint {
     }
 
     /// The same with its own directions; the tangent is oriented as here.
-    pub fn completed(
-        &self,
-        manifold: &mut Manifold,
-        found: Found,
-    ) -> Result<SingularPoint, NotFound> {
-        let border = manifold.equations.momenta(&self.soft);
+    pub fn completed(&self, manifold: &mut Manifold, found: Found) -> Result<SingularPoint, Stuck> {
+        let border = manifold.momenta(&self.soft);
         let solution = found.sample.solution;
-        let rates = manifold.rates(&solution)?;
-        let (sample, _) = manifold.sample(solution, &border, rates, true)?;
+        let rates = manifold.rates(&solution, false)?;
+        let sample = manifold.sample(solution, &border, rates, true)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(manifold, &sample, &eigen)?;
         let soft = soft(manifold, &sample, &eigen);
         let change = self.change(manifold, &sample, &basis, &soft)?;
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {
-            return Err(NotFound::Stuck(Stuck::NotConverged));
+            return Err(Stuck::NotConverged);
         }
         if eigen.spread > TOGETHER * slope {
-            return Err(NotFound::Separated);
+            return Err(Stuck::Separated);
         }
         let [a, b] = change.map(|part| part / slope);
         let normal = Direction::mixed([a, b], &basis);
@@ -182,7 +181,7 @@ impl SingularPoint {
         }
         let forcing = self.forcing(&sample, &eigen, slope);
         if self.kind == Kind::Branching && forcing.largest > FORCED {
-            return Err(NotFound::Unfolded);
+            return Err(Stuck::Unfolded);
         }
         // A fold moves in the direction in which the parameters do no work on the mode.
         let mut heading = forcing.free;
@@ -213,19 +212,18 @@ impl SingularPoint {
         sample: &Sample,
         basis: &[Direction; 2],
         soft: &[Field],
-    ) -> Result<[f64; 2], NotFound> {
+    ) -> Result<[f64; 2], Stuck> {
         let modes = &soft[..self.neutral.min(soft.len())];
-        let border = manifold.equations.momenta(soft);
-        let stiff = manifold.leaf(sample.solution.params)?.stiffest() * STIFF <= 1.0;
+        let border = manifold.momenta(soft);
+        let stiff = manifold.leaves.at(sample.solution.params)?.stiffest() * STIFF <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
             let mut at = |step: f64| {
                 let mut solution = manifold.beside(&sample.solution, direction, step)?;
                 if stiff {
-                    let normals = [&basis[0], &basis[1]];
-                    solution = manifold
-                        .correct(&solution, normals, &border, &sample.rates)?
-                        .solution;
+                    let (normals, rates) = ([&basis[0], &basis[1]], Some(&sample.rates[..]));
+                    let corrected = manifold.deflated(solution, normals, &border, rates, false)?;
+                    solution = corrected.solution;
                 }
                 Ok::<_, Stuck>((step, manifold.curvature(solution, modes)?))
             };
@@ -246,7 +244,7 @@ impl SingularPoint {
         manifold: &Manifold,
         sample: &Sample,
         eigen: &Eigen,
-    ) -> Result<[Direction; 2], NotFound> {
+    ) -> Result<[Direction; 2], Stuck> {
         let solved = &sample.solved;
         let p = solved.modes.len();
         let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
@@ -370,18 +368,17 @@ fn independent<'m>(
     modes: impl Iterator<Item = &'m Field>,
     count: usize,
 ) -> Vec<Field> {
-    let equations = &manifold.equations;
     let mut kept: Vec<Field> = Vec::new();
     for mode in modes {
-        let size = equations.product(mode, mode).sqrt();
+        let size = manifold.product(mode, mode).sqrt();
         let mut mode = times(mode, 1.0 / size);
         for _ in 0..2 {
             for other in &kept {
-                let part = equations.product(other, &mode);
+                let part = manifold.product(other, &mode);
                 add(&mut mode, -part, other);
             }
         }
-        let size = equations.product(&mode, &mode).sqrt();
+        let size = manifold.product(&mode, &mode).sqrt();
         if size > 1e-6 && kept.len() < count {
             kept.push(times(&mode, 1.0 / size));
         }

@@ -1,7 +1,6 @@
 //! Special points of a boundary: cusps, and crossings with another boundary.
 
 use super::manifold::Manifold;
-use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
@@ -54,25 +53,12 @@ pub fn at_distance(
     step: f64,
     accuracy: f64,
     furthest: f64,
-) -> Result<(SingularPoint, f64), NotFound> {
+) -> Result<(SingularPoint, f64), Stuck> {
     let solution = manifold.moved(&now.solution, &now.tangent, step)?;
     let search = now.search(manifold, None, solution, (accuracy, furthest));
     let found = search.secant(manifold)?;
     let off = found.distance.abs();
     Ok((now.completed(manifold, found)?, off))
-}
-
-/// The special point between two points of a boundary, the second `step` along the tangent of
-/// the first.
-fn locate(
-    manifold: &mut Manifold,
-    [now, next]: [&SingularPoint; 2],
-    step: f64,
-    special: Special,
-) -> Result<SingularPoint, NotFound> {
-    let values = [now, next].map(|point| special.value(point));
-    let slope = (values[1] - values[0]) / step;
-    Ok(zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?.0)
 }
 
 /// The special point near an approximation to it, and the derivative of the vanishing function
@@ -81,7 +67,7 @@ pub fn locate_near(
     manifold: &mut Manifold,
     near: &SingularPoint,
     special: Special,
-) -> Result<(SingularPoint, f64), NotFound> {
+) -> Result<(SingularPoint, f64), Stuck> {
     let first = at_distance(manifold, near, 0.0, EXACT, REACH)?.0;
     let away = 1e-2;
     let second = at_distance(manifold, &first, away, EXACT, REACH)?.0;
@@ -96,14 +82,14 @@ fn zero(
     special: Special,
     mut slope: f64,
     [least, most]: [f64; 2],
-) -> Result<(SingularPoint, f64), NotFound> {
+) -> Result<(SingularPoint, f64), Stuck> {
     let mut best = now.clone();
     let (mut at, mut value) = (0.0, special.value(now));
     let mut worse = 0;
     for _ in 0..EVALUATIONS {
         let step = -value / slope;
         if !step.is_finite() || !(least..=most).contains(&(at + step)) {
-            return Err(NotFound::Stuck(Stuck::NotConverged));
+            return Err(Stuck::NotConverged);
         }
         let (next, _) = at_distance(manifold, now, at + step, EXACT, REACH)?;
         let after = special.value(&next);
@@ -119,7 +105,7 @@ fn zero(
             return Ok((best, slope));
         }
     }
-    Err(NotFound::Stuck(Stuck::NotConverged))
+    Err(Stuck::NotConverged)
 }
 
 /// The point of the boundary at a value of one of the parameters, predicted `step` along the
@@ -130,7 +116,7 @@ pub fn at_value(
     step: f64,
     which: usize,
     value: f64,
-) -> Result<SingularPoint, NotFound> {
+) -> Result<SingularPoint, Stuck> {
     let mut solution = manifold.moved(&now.solution, &now.tangent, step)?;
     solution.params[which] = value;
     let search = now.search(manifold, Some(which), solution, (GIVEN, 0.5));
@@ -146,14 +132,15 @@ pub fn special_between(
     manifold: &mut Manifold,
     [now, next]: [&SingularPoint; 2],
     step: f64,
-) -> Result<Option<(Special, SingularPoint)>, NotFound> {
+) -> Result<Option<(Special, SingularPoint)>, Stuck> {
     let cusp = now.kind == Kind::Fold && now.speed * next.speed < 0.0;
     let special = match (cusp, now.index.abs_diff(next.index)) {
         (false, 0) => return Ok(None),
         (true, 0) => Special::Cusp,
         (false, 1) => Special::Crossing,
-        _ => return Err(NotFound::Stuck(Stuck::NotConverged)),
+        _ => return Err(Stuck::NotConverged),
     };
-    let point = locate(manifold, [now, next], step, special)?;
+    let slope = (special.value(next) - special.value(now)) / step;
+    let (point, _) = zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
     Ok(Some((special, point)))
 }

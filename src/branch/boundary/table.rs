@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::manifold::{Direction, Manifold};
-use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use super::special::Special;
 use crate::branch::critical::Kind;
+use crate::branch::equations::Stuck;
 use crate::branch::states::stiffest_condensed;
 use crate::leaf::State;
 use crate::relax::richardson::Richardson;
@@ -96,12 +96,12 @@ impl Table {
         (point, along): (&SingularPoint, Option<f64>),
         softening: f64,
         segments: f64,
-    ) -> Result<[f64; 2], NotFound> {
+    ) -> Result<[f64; 2], Stuck> {
         let (across, slope) = match self.given {
             Some((which, _)) => point.across_at(manifold, which),
             None => (point.normal.clone(), point.slope),
         };
-        let leaf = manifold.leaf(point.solution.params)?;
+        let leaf = manifold.leaves.at(point.solution.params)?;
         let stiffest = stiffest_condensed(leaf).min(1.0 / softening);
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
@@ -116,7 +116,7 @@ impl Table {
         manifold: &mut Manifold,
         (point, along): (&SingularPoint, Option<f64>),
         numbers: &Parameters,
-    ) -> Result<(), NotFound> {
+    ) -> Result<(), Stuck> {
         let state = &point.solution.state;
         let segments = state.segments() as f64;
         let rounding = self.rounding(manifold, (point, along), numbers.softening, segments)?;

@@ -3,16 +3,14 @@
 use rayon::prelude::*;
 
 use super::grids::on_finer;
-use super::halt::Halt;
-use super::manifold::Manifold;
-use super::plane::Plane;
+use super::manifold::{Manifold, Plane};
 use super::refine::{Accuracy, Step, refine};
-use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use super::special::{at_distance, at_value, special_between};
 use super::table::Verified;
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
+use crate::branch::walk::End;
 use crate::leaf::Grid;
 
 /// First step and shortest step, as parts of the longest.
@@ -55,7 +53,7 @@ pub struct WalkOptions {
 
 /// A boundary followed in one direction.
 pub struct Walk<'a, 'h> {
-    plane: Plane<'a>,
+    plane: &'a Plane<'a>,
     how: &'h WalkOptions,
     /// The second parameter at the starting point.
     second: f64,
@@ -64,7 +62,7 @@ pub struct Walk<'a, 'h> {
     step: f64,
     steps: Vec<Step>,
     verified: Vec<Verified>,
-    end: Option<Halt>,
+    end: Option<End>,
     /// Matrices factorised on earlier grids, and to verify points.
     pub factorizations: usize,
 }
@@ -72,7 +70,7 @@ pub struct Walk<'a, 'h> {
 impl<'a, 'h> Walk<'a, 'h> {
     /// From its first point, at which one of the parameters may be given.
     pub fn new(
-        plane: Plane<'a>,
+        plane: &'a Plane<'a>,
         how: &'h WalkOptions,
         first: SingularPoint,
         given: Option<usize>,
@@ -100,15 +98,12 @@ impl<'a, 'h> Walk<'a, 'h> {
         grid: Grid,
         cancelled: &dyn Fn() -> bool,
         progress: &mut dyn FnMut(usize, [f64; 2]),
-    ) -> Halt {
-        let mut manifold = match Manifold::new(self.plane, grid) {
-            Ok(manifold) => manifold,
-            Err(_) => return Halt::OutOfRange,
-        };
+    ) -> End {
+        let mut manifold = Manifold::new(self.plane, grid);
         let mut counted = 0;
         loop {
             if cancelled() {
-                return Halt::Closed;
+                return End::Closed;
             }
             // The next points are computed while the previous ones are verified, in parallel.
             let (plane, accuracy, grid) = (self.plane, self.how.accuracy, manifold.grid().clone());
@@ -121,16 +116,17 @@ impl<'a, 'h> Walk<'a, 'h> {
                 });
                 self.extend(&mut manifold, AHEAD, progress);
             });
-            self.factorizations += manifold.equations.factorizations - counted;
-            counted = manifold.equations.factorizations;
+            self.factorizations += manifold.factorizations - counted;
+            counted = manifold.factorizations;
             let all = new.len() + self.verified.len() == self.steps.len();
-            let end = match (self.accept(found), self.end) {
+            let end = match (self.accept(found), self.end.clone()) {
                 (None, Some(end)) if all => match end {
-                    Halt::Stuck | Halt::Unfolded | Halt::Separated => end,
+                    End::Stuck(Stuck::OutOfRange(_)) => return end,
+                    End::Stuck(_) => end,
                     _ => return end,
                 },
                 (None, _) => continue,
-                (Some(doubt), _) => Halt::Unverified(doubt),
+                (Some(doubt), _) => End::Unverified(doubt),
             };
             // A finer grid may resolve it.
             if !self.refine(&mut manifold) {
@@ -177,7 +173,7 @@ impl<'a, 'h> Walk<'a, 'h> {
         let enough = self.steps.len() + points;
         while self.end.is_none() && self.steps.len() < enough {
             if self.steps.len() >= self.how.most {
-                self.end = Some(Halt::MostPoints);
+                self.end = Some(End::MostPoints);
                 break;
             }
             self.try_step(manifold);
@@ -244,7 +240,7 @@ impl<'a, 'h> Walk<'a, 'h> {
                 self.end = end;
             }
             Err(_) if 0.5 * self.step >= SHORTEST * self.how.longest => self.step *= 0.5,
-            Err(lost) => self.end = Some(lost.into()),
+            Err(stuck) => self.end = Some(lost(stuck)),
         }
     }
 
@@ -253,10 +249,10 @@ impl<'a, 'h> Walk<'a, 'h> {
         &mut self,
         manifold: &mut Manifold,
         now: &SingularPoint,
-    ) -> Result<(Vec<Step>, Option<Halt>), NotFound> {
-        let not_converged = || NotFound::Stuck(Stuck::NotConverged);
+    ) -> Result<(Vec<Step>, Option<End>), Stuck> {
+        let not_converged = || Stuck::NotConverged;
         if leaves_range(now) {
-            return Ok((Vec::new(), Some(Halt::Reached)));
+            return Ok((Vec::new(), Some(End::Reached)));
         }
         let mut step = self.step;
         let mut given = self.first_mark(now, step, |which| {
@@ -291,8 +287,8 @@ impl<'a, 'h> Walk<'a, 'h> {
         let edge = value == 0.0 || value == 1.0;
         let mut steps = self.between(manifold, [now, &next], step)?;
         let end = match () {
-            () if edge => Some(Halt::Reached),
-            () if self.is_first(manifold, &next) => Some(Halt::Closed),
+            () if edge => Some(End::Reached),
+            () if self.is_first(manifold, &next) => Some(End::Closed),
             () => None,
         };
         steps.push(Step {
@@ -332,12 +328,12 @@ impl<'a, 'h> Walk<'a, 'h> {
         [now, next]: [&SingularPoint; 2],
         off: f64,
         step: f64,
-    ) -> Result<f64, NotFound> {
+    ) -> Result<f64, Stuck> {
         let turn = manifold.inner(&now.tangent, &next.tangent);
         let tilt = manifold.inner(&now.normal, &next.normal);
         match off <= DRIFT * step && turn > BENT && tilt > BENT {
             true => Ok(turn),
-            false => Err(NotFound::Stuck(Stuck::NotConverged)),
+            false => Err(Stuck::NotConverged),
         }
     }
 
@@ -347,7 +343,7 @@ impl<'a, 'h> Walk<'a, 'h> {
         manifold: &mut Manifold,
         pair: [&SingularPoint; 2],
         step: f64,
-    ) -> Result<Vec<Step>, NotFound> {
+    ) -> Result<Vec<Step>, Stuck> {
         let special = special_between(manifold, pair, step)?;
         let step = |(special, point)| Step {
             point,
@@ -363,6 +359,15 @@ impl<'a, 'h> Walk<'a, 'h> {
             && first.solution.state.shift_to(&point.solution.state) < SAME[1]
             && manifold.inner(&first.tangent, &point.tangent) > BENT
     }
+}
+
+/// The end of a boundary where no point is found. Every grid has been tried: that one is too
+/// coarse says no more.
+pub fn lost(stuck: Stuck) -> End {
+    End::Stuck(match stuck {
+        Stuck::Unresolved => Stuck::NotConverged,
+        stuck => stuck,
+    })
 }
 
 /// Whether extrapolation has reversed the order of the points of two steps.

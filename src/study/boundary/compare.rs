@@ -2,10 +2,9 @@
 
 use glam::DVec3;
 
-use super::known::{IMAGES, image};
+use super::known::{IMAGES, image, through};
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
-use crate::shape::weights;
 
 /// Points closer than this part of both ranges are merged: their errors would dominate the
 /// slopes of interpolating polynomials.
@@ -121,8 +120,9 @@ impl Edge {
                 Some(Special::Crossing) => points[k - 1],
                 _ => points[k],
             };
+            let own: Vec<f64> = near.iter().map(|point| point[1]).collect();
             crossings.push(Crossing {
-                at: through(near, value),
+                at: through(near, &own, value)[0],
                 fold: curve.kind == Kind::Fold && curve.neutral == 1,
                 indices: point.indices,
             });
@@ -152,12 +152,4 @@ impl Edge {
 fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
     distances.fold(0.0, f64::max)
-}
-
-/// Interpolates points by a polynomial in their second coordinate.
-fn through(points: &[[f64; 2]], at: f64) -> f64 {
-    let own: Vec<f64> = points.iter().map(|point| point[1]).collect();
-    let (_, weights) = weights(&own, at, own.len());
-    let terms = points.iter().zip(weights);
-    terms.map(|(point, weight)| weight * point[0]).sum()
 }

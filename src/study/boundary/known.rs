@@ -1,50 +1,11 @@
-//! Critical points of branches in the plane, and whether they lie on a known curve.
+//! Whether critical points of branches in the plane lie on a known curve.
 
 use glam::DVec3;
 
-use crate::branch::boundary::{Boundary, Halt, Seed, Verified, coarsened};
-use crate::branch::{Critical, Kind, Point, Refined};
+use crate::branch::boundary::{Boundary, Seed, Verified, coarsened};
+use crate::branch::{End, Kind};
 use crate::leaf::Grid;
 use crate::shape::weights;
-use crate::study::trace::{Trace, TraceError, TraceRequest, trace_observed};
-
-/// A trace along the first parameter, with its first point and its critical points.
-pub struct Traced {
-    pub trace: Trace,
-    /// The first point, and a grid that refines its own; none if there is no first point.
-    pub first: Option<(Point, Grid)>,
-    pub critical: Vec<(Critical, Refined)>,
-}
-
-pub fn traced(
-    request: &TraceRequest,
-    progress: &mut dyn FnMut(usize, f64),
-) -> Result<Traced, TraceError> {
-    let (mut first, mut critical) = (None, Vec::new());
-    let trace = trace_observed(
-        request,
-        &mut |_, points, value| progress(points, value),
-        &mut |followed| {
-            let begun = followed.branch.points.first().zip(followed.points.first());
-            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
-            first = first.take().or(begun);
-            let found = followed.branch.critical.iter().zip(&followed.critical);
-            critical
-                .extend(found.map(|((_, critical), refined)| (critical.clone(), refined.clone())));
-        },
-    )?;
-    Ok(Traced {
-        trace,
-        first,
-        critical,
-    })
-}
-
-/// A critical point of a branch, extrapolated over grids.
-pub struct Start<'a> {
-    pub seed: Seed<'a>,
-    pub refined: &'a Refined,
-}
 
 /// Parameters (as fractions) and tips that agree within this plus both error bounds are
 /// the same.
@@ -60,25 +21,23 @@ const APART: f64 = 1e-3;
 /// A point may lie outside an interval of a curve by this part of it.
 const BEYOND: f64 = 0.05;
 
-impl Start<'_> {
+impl Seed<'_> {
     /// Its grid, for leaves with these kinks.
     pub fn grid(&self, kinks: &[f64]) -> Grid {
-        let segments = self.seed.critical.state.segments();
+        let segments = self.critical.state.segments();
         coarsened(&self.refined.grid, segments, kinks)
     }
 
     /// Whether it lies on a curve.
     pub fn is_on(&self, curve: &Boundary) -> bool {
-        let (critical, direction) = (self.seed.critical, self.seed.direction);
-        let params = self.seed.params(self.refined.fraction);
-        let length = direction[0].hypot(direction[1]);
+        let [first, second] = self.direction;
         let singular = Singular {
-            params,
+            params: self.params(self.refined.fraction),
             tips: &self.refined.tips,
-            error: self.refined.fraction_error * length + self.refined.error,
-            kind: critical.kind,
-            modes: critical.modes.len(),
-            sides: sorted(critical.indices),
+            error: self.refined.fraction_error * first.hypot(second) + self.refined.error,
+            kind: self.critical.kind,
+            modes: self.critical.modes.len(),
+            sides: sorted(self.critical.indices),
         };
         singular.is_on(curve)
     }
@@ -107,11 +66,11 @@ pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
     let last = repeated.iter().rev().take_while(|known| **known).count();
     if last > 1 {
         curve.points.truncate(repeated.len() - last + 1);
-        curve.ends[1] = Halt::Met;
+        curve.ends[1] = End::Met;
     }
     if first > 1 {
         curve.points.drain(..first - 1);
-        curve.ends[0] = Halt::Met;
+        curve.ends[0] = End::Met;
     }
 }
 
@@ -228,11 +187,11 @@ fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64
     distance(&found, target) < error + distance(&found, &lower)
 }
 
-/// The polynomial through points at these arclengths.
-fn through(points_of_curve: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
-    let mut sum = vec![0.0; points_of_curve[0].len()];
-    for (coordinates, weight) in points_of_curve.iter().zip(weights(at, t, at.len()).1) {
-        for (sum, x) in sum.iter_mut().zip(coordinates) {
+/// The polynomial through points at these values of a variable.
+pub fn through(points: &[impl AsRef<[f64]>], at: &[f64], t: f64) -> Vec<f64> {
+    let mut sum = vec![0.0; points[0].as_ref().len()];
+    for (coordinates, weight) in points.iter().zip(weights(at, t, at.len()).1) {
+        for (sum, x) in sum.iter_mut().zip(coordinates.as_ref()) {
             *sum += weight * x;
         }
     }
@@ -271,7 +230,7 @@ mod tests {
             kind: Kind::Branching,
             neutral: 1,
             points: (0..=20).map(point).collect(),
-            ends: [Halt::Reached; 2],
+            ends: [End::Reached, End::Reached],
             factorizations: 0,
         }
     }
@@ -281,7 +240,7 @@ mod tests {
         let known = [curve(0.0, 0.61, 0.5)];
         let mut second = curve(0.2, 1.0, 0.5);
         remove_known(&mut second, &known);
-        assert_eq!(second.ends, [Halt::Met, Halt::Reached]);
+        assert_eq!(second.ends, [End::Met, End::Reached]);
         let first = &second.points[0];
         assert!((first.params[1] - 0.6).abs() < 1e-12, "{:?}", first.params);
         assert_eq!(second.points.len(), 11);
@@ -304,6 +263,6 @@ mod tests {
             .for_each(|point| point.params[0] += 1e-3 * (point.params[1] - 0.5));
         remove_known(&mut second, &[other]);
         assert_eq!(second.points.len(), 21);
-        assert_eq!(second.ends, [Halt::Reached; 2]);
+        assert_eq!(second.ends, [End::Reached, End::Reached]);
     }
 }

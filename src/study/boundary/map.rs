@@ -14,7 +14,7 @@ pub const MOST_CELLS: usize = 256;
 
 /// The cells of a map, as far as they have been computed.
 pub struct Cells<'p> {
-    plane: Plane<'p>,
+    plane: &'p Plane<'p>,
     /// Columns and rows.
     size: [usize; 2],
     /// The equilibria found in the last sweep, from which others may be reached.
@@ -36,7 +36,7 @@ const NEIGHBOURS: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
 impl<'p> Cells<'p> {
     /// A map of so many cells, all unknown.
-    pub fn new(plane: Plane<'p>, size: [usize; 2]) -> Self {
+    pub fn new(plane: &'p Plane<'p>, size: [usize; 2]) -> Self {
         let count = size[0] * size[1];
         Cells {
             plane,
@@ -80,7 +80,7 @@ impl<'p> Cells<'p> {
         let mut now = Some(first);
         for to in [[middle[0], second], middle] {
             if let Some(from) = now.take_if(|from| from.solution.params != to) {
-                let mut path = follow_path(&self.plane, &from, to);
+                let mut path = follow_path(self.plane, &from, to);
                 now = path.end.take();
                 unexplained.extend(self.record((&from, to, now.as_ref()), cell, path, curves));
             }
@@ -98,7 +98,7 @@ impl<'p> Cells<'p> {
                 if edge.is_explained(curves) {
                     return None;
                 }
-                Some((cell, recount(&self.plane, at)?))
+                Some((cell, recount(self.plane, at)?))
             })
             .collect();
         for (cell, index) in counted {
@@ -147,7 +147,7 @@ impl<'p> Cells<'p> {
             let Some(begun) = &self.front[other] else {
                 continue;
             };
-            let path = follow_path(&self.plane, begun, self.middle(cell));
+            let path = follow_path(self.plane, begun, self.middle(cell));
             let found = path.end.is_some();
             paths.push((other, path));
             if found {
@@ -166,7 +166,7 @@ impl<'p> Cells<'p> {
         curves: &[Boundary],
     ) -> Option<Unexplained> {
         self.factorizations += path.factorizations;
-        if self.plane.family.first().joined() {
+        if self.plane.first().joined() {
             path.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
         let ends = [from.solution.params, to];
@@ -184,9 +184,9 @@ impl<'p> Cells<'p> {
             tips: path.tips,
             found: end.map(|end| end.index),
         };
-        let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
+        let unexplained = (!edge.is_explained(curves)).then_some(Unexplained {
             ends: edge.ends,
-            grid: path.grid.unwrap_or_else(|| from.grid.clone()),
+            grid: path.grid,
             critical: path.critical,
         });
         self.edges[cell].push(edge);

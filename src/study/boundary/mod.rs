@@ -6,7 +6,7 @@ mod map;
 mod result;
 mod run;
 
-pub use crate::branch::boundary::Halt as CurveEnd;
+pub use crate::branch::End as CurveEnd;
 pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside};
 pub use run::boundary;
 

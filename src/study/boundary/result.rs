@@ -1,10 +1,10 @@
 //! The result of a boundary.
 
 use glam::DVec3;
-use serde::ser::{Serialize, Serializer};
+use serde::ser::Serializer;
 
-use crate::branch::boundary::{Halt, Special};
-use crate::branch::{Doubt, Kind};
+use crate::branch::boundary::Special;
+use crate::branch::{End, Kind};
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 
@@ -58,7 +58,7 @@ pub struct BoundaryCurve {
     /// How many modes become neutral.
     pub multiplicity: usize,
     /// How it ended: before its first point, and after its last.
-    pub ends: [Halt; 2],
+    pub ends: [End; 2],
     /// Its points, ordered so that the second parameter increases from the first point or, where
     /// that is also the last, has increased.
     pub points: Vec<BoundaryPoint>,
@@ -132,47 +132,6 @@ impl BoundaryMap {
     /// Number of cells with an index.
     pub fn known(&self) -> usize {
         self.index.iter().flatten().flatten().count()
-    }
-}
-
-impl Halt {
-    /// The word used in files.
-    pub fn word(self) -> &'static str {
-        match self {
-            Halt::Reached => "reached",
-            Halt::Closed => "closed",
-            Halt::Met => "met",
-            Halt::MostPoints => "most-points",
-            Halt::Unfolded => "unfolds",
-            Halt::Separated => "parts",
-            Halt::OutOfRange => "out-of-range",
-            Halt::Stuck => "stuck",
-            Halt::Unverified(_) => "unverified",
-        }
-    }
-
-    /// The same as a phrase for people.
-    pub fn phrase(self) -> &'static str {
-        match self {
-            Halt::Reached => "the end of a range",
-            Halt::Closed => "closed",
-            Halt::Met => "on a curve above",
-            Halt::MostPoints => "goes on: allow more points",
-            Halt::Unfolded => "the second number breaks the symmetry by which branches cross",
-            Halt::Separated => "modes that become neutral together part",
-            Halt::OutOfRange => "no leaf is there",
-            Halt::Stuck => "lost",
-            Halt::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
-            Halt::Unverified(Doubt::OtherIndex) => "not verified: finer grids have another index",
-            Halt::Unverified(Doubt::Inaccurate) => "not verified: the tolerance is not reached",
-            Halt::Unverified(_) => "not verified: finer grids have another curve",
-        }
-    }
-}
-
-impl Serialize for Halt {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
     }
 }
 

@@ -4,17 +4,17 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::known::{Start, remove_known, traced};
+use super::known::remove_known;
 use super::map::Cells;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside, word};
 use super::{BoundaryRequest, MOST_CURVES};
-use crate::branch::Family;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Halt, Neighbour, Plane, Seed, Solution, Verified,
-    WalkOptions, beside, coarsened, refine_on_path,
+    self as curves, Accuracy, AtRest, Neighbour, Plane, Seed, Solution, Verified, WalkOptions,
+    beside, coarsened, refine_on_path,
 };
+use crate::branch::{End, Range};
 use crate::scenario::Scenario;
-use crate::study::trace::{Trace, TraceError, TraceRequest};
+use crate::study::trace::{Trace, TraceError, TraceRequest, traced};
 use crate::study::vary::Vary;
 
 /// Longest step along a curve if few values are asked for.
@@ -57,18 +57,16 @@ pub fn boundary(
         base: base.with(&across.keys, start)?,
         ..request.trace.clone()
     };
-    let begun = traced(&along, &mut |points, value| {
+    let begun = traced(&along, &mut |_, points, value| {
         progress(None, points, [value, start]);
     })?;
-    let first = |value: f64| make([value, start]);
-    let family = Family::new(&first, (ends[0][0], ends[0][1]), vary.log);
-    let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
-    let plane = Plane {
-        family: &family,
-        make: &make,
-        range: ends[1],
-        log: across.log,
-    };
+    let ranges = [vary, across].map(|it| Range {
+        ends: it.ends(),
+        log: it.log,
+    });
+    let plane = Plane::plane(&make, ranges, start);
+    let plane = &plane.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+    let from = [0.0, ranges[1].fraction(start)];
     let mut boundary = without_curves(request, &begun.trace, start);
     let mut run = Run {
         plane,
@@ -80,19 +78,20 @@ pub fn boundary(
     for (critical, refined) in &begun.critical {
         let seed = Seed {
             critical,
-            from: [0.0, plane.fraction(start)],
+            refined,
+            from,
             direction: [1.0, 0.0],
         };
-        run.follow_new(&Start { seed, refined }, &mut boundary);
+        run.follow_new(&seed, &mut boundary);
     }
     if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
-        let kinks = family.first().kinks();
+        let kinks = plane.first().kinks();
         let first = AtRest {
             grid: coarsened(&grid, point.state.segments(), kinks),
             index: point.index,
             solution: Solution {
                 state: point.state,
-                params: [0.0, plane.fraction(start)],
+                params: from,
             },
         };
         boundary.map = Some(run.map(size, first, &mut boundary));
@@ -149,7 +148,7 @@ fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
 /// of the first trace are.
 fn conclude(boundary: &mut Boundary, traced: bool) {
     let curves = &boundary.curves;
-    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(Halt::complete);
+    let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(End::complete);
     if curves.is_empty() && boundary.remark.is_none() {
         let [vary, across] = &boundary.keys;
         let at = across.text(boundary.start);
@@ -168,7 +167,7 @@ fn conclude(boundary: &mut Boundary, traced: bool) {
 
 /// The run that follows the curves.
 struct Run<'r, 'p> {
-    plane: Plane<'r>,
+    plane: &'r Plane<'r>,
     how: WalkOptions,
     known: Vec<curves::Boundary>,
     /// Number of critical points from which curves were started.
@@ -178,8 +177,8 @@ struct Run<'r, 'p> {
 
 impl Run<'_, '_> {
     /// Follows the curve through a critical point, unless it lies on a known one.
-    fn follow_new(&mut self, start: &Start, boundary: &mut Boundary) {
-        if self.known.iter().any(|known| start.is_on(known)) {
+    fn follow_new(&mut self, seed: &Seed, boundary: &mut Boundary) {
+        if self.known.iter().any(|known| seed.is_on(known)) {
             return;
         }
         if self.tried == MOST_CURVES {
@@ -190,8 +189,8 @@ impl Run<'_, '_> {
         let (plane, progress) = (self.plane, &mut *self.progress);
         let number = boundary.curves.len();
         let mut report = |points, params| progress(Some(number), points, plane.values(params));
-        let grid = start.grid(plane.family.first().kinks());
-        let mut curve = curves::follow(plane, &grid, &start.seed, &self.how, &mut report);
+        let grid = seed.grid(plane.first().kinks());
+        let mut curve = curves::follow(plane, &grid, seed, &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
             remove_known(&mut curve, &self.known);
@@ -199,7 +198,7 @@ impl Run<'_, '_> {
                 return;
             }
         }
-        (boundary.curves).push(in_units(&plane, &curve));
+        (boundary.curves).push(in_units(plane, &curve));
         self.known.push(curve);
     }
 
@@ -217,15 +216,16 @@ impl Run<'_, '_> {
                 let [from, to] = path.ends;
                 let direction = [0, 1].map(|i| to[i] - from[i]);
                 for critical in &path.critical {
-                    let (plane, grid) = (&self.plane, &path.grid);
+                    let (plane, grid) = (self.plane, &path.grid);
                     let refined = refine_on_path(plane, path.ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
                         let seed = Seed {
                             critical,
+                            refined,
                             from,
                             direction,
                         };
-                        self.follow_new(&Start { seed, refined }, boundary);
+                        self.follow_new(&seed, boundary);
                     }
                 }
             }
@@ -240,7 +240,7 @@ fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
         multiplicity: curve.neutral,
-        ends: curve.ends,
+        ends: curve.ends.clone(),
         points: (curve.points.iter().enumerate())
             .map(|(k, point)| point_in_units(plane, k + 1, point))
             .collect(),
@@ -256,18 +256,18 @@ fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoi
         kind: word(point.kind, point.special),
         values,
         errors: [0, 1].map(|i| (beyond[i] - values[i]).abs()),
-        tips: plane.family.tips(&point.tips),
-        error: point.error * plane.family.scale().length,
+        tips: plane.tips(&point.tips),
+        error: point.error * plane.scale().length,
         index_before: point.indices[0],
         index_behind: point.indices[1],
         stations: point.stations.clone(),
-        curves: plane.family.curves(&point.state),
+        curves: plane.curves(&point.state),
     }
 }
 
 /// Finds leaves on either side of a few curves: of those that bound stable leaves or, if there
 /// are none, of those with the smallest index next to them.
-fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary) {
+fn add_leaves(plane: &Plane, known: &[curves::Boundary], boundary: &mut Boundary) {
     let index = |point: &Verified| point.indices[0].min(point.indices[1]);
     let mut order: Vec<(usize, usize)> = Vec::new();
     for (number, curve) in known.iter().enumerate() {
@@ -294,19 +294,19 @@ fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary)
         Some((number, beside(plane, &points[at], along)?))
     });
     for (number, pair) in found.take(MOST_BESIDE) {
-        let leaves = pair.map(|leaf| beside_in_units(&plane, leaf));
+        let leaves = pair.map(|leaf| beside_in_units(plane, leaf));
         boundary.curves[number].beside = leaves.into();
     }
 }
 
 fn beside_in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
-    let (family, state) = (plane.family, &leaf.solution.state);
+    let state = &leaf.solution.state;
     let tips: Vec<DVec3> = state.tips().collect();
     LeafBeside {
         values: plane.values(leaf.solution.params),
         index: leaf.index,
-        tips: family.tips(&tips),
-        curves: family.curves(state),
-        fallen_from: leaf.fallen_from.as_ref().map(|state| family.curves(state)),
+        tips: plane.tips(&tips),
+        curves: plane.curves(state),
+        fallen_from: leaf.fallen_from.as_ref().map(|state| plane.curves(state)),
     }
 }

@@ -94,8 +94,8 @@ fn lowest(stable: &Stable, starts: &[StartPoint], weight: f64) -> Option<Barrier
 
 /// The same start point on the grid with all segments halved; none if it has too many nodes.
 fn on_refined(stable: &Stable, start: &StartPoint) -> Option<StartPoint> {
-    let mut equations = Equations::new(stable.family, start.grid.clone()).ok()?;
-    let leaf = equations.leaves.at(0.0).ok()?;
+    let mut equations = Equations::new(stable.family, start.grid.clone());
+    let leaf = equations.leaves.at([0.0]).ok()?;
     (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| StartPoint {
         grid: start.grid.refined(),
         state: prolong(leaf, &start.state),
@@ -105,7 +105,7 @@ fn on_refined(stable: &Stable, start: &StartPoint) -> Option<StartPoint> {
 
 /// Both directions along the softest modes of the leaf.
 fn along_modes(stable: &Stable) -> Option<Vec<StartPoint>> {
-    let mut equations = Equations::new(stable.family, stable.grid.clone()).ok()?;
+    let mut equations = Equations::new(stable.family, stable.grid.clone());
     let point = equations.correct(&stable.state, 0.0, None).ok()?;
     let modes = equations.soft_modes(&point, MODES).ok()?;
     let start = |mode: &Field, sign: f64| StartPoint {
@@ -119,15 +119,15 @@ fn along_modes(stable: &Stable) -> Option<Vec<StartPoint>> {
 
 /// Climbs to a saddle, and finds the stable leaf on the same grid.
 fn climb(stable: &Stable, start: &StartPoint) -> Option<Pass> {
-    let mut equations = Equations::new(stable.family, start.grid.clone()).ok()?;
+    let mut equations = Equations::new(stable.family, start.grid.clone());
     let stop = || stable.limit.reached();
     let saddle = equations.climb(&start.state, 0.0, &start.direction, &stop)?;
-    let mut own = Equations::new(stable.family, stable.grid.clone()).ok()?;
+    let mut own = Equations::new(stable.family, stable.grid.clone());
     let mut leaf = own.correct(&stable.state, 0.0, None).ok()?;
     while own.grid().segments() < start.grid.segments() {
         (own, leaf) = on_finer(&mut own, &leaf).ok()?;
     }
-    let discrete = equations.leaves.at(0.0).ok()?;
+    let discrete = equations.leaves.at([0.0]).ok()?;
     let height = discrete.energy(&saddle.state) - discrete.energy(&leaf.state);
     (height > 0.0).then(|| Pass {
         grid: start.grid.clone(),
@@ -141,7 +141,7 @@ fn climb(stable: &Stable, start: &StartPoint) -> Option<Pass> {
 fn beyond(stable: &Stable, pass: &Pass) -> Option<State> {
     let distance = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * distance);
-    let mut equations = Equations::new(stable.family, pass.grid.clone()).ok()?;
+    let mut equations = Equations::new(stable.family, pass.grid.clone());
     let towards = between(&pass.saddle.state, &pass.leaf.state);
     let stop = || stable.limit.reached();
     let both = equations.fall(&pass.saddle, &towards, &stop).ok()?;
@@ -160,10 +160,16 @@ fn beyond(stable: &Stable, pass: &Pass) -> Option<State> {
 
 /// A pass in the scenario's units, its energy extrapolated over grids.
 fn in_units(stable: &Stable, pass: &Pass, neighbour: &State, weight: f64) -> Option<Barrier> {
-    let mut equations = Equations::new(stable.family, pass.grid.clone()).ok()?;
+    let mut equations = Equations::new(stable.family, pass.grid.clone());
     let neighbour = equations.correct(neighbour, 0.0, None).ok()?;
     let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
-    let rounding = ROUNDING * equations.leaves.at(0.0).ok()?.energy(&three[0].state).abs();
+    let rounding = ROUNDING
+        * equations
+            .leaves
+            .at([0.0])
+            .ok()?
+            .energy(&three[0].state)
+            .abs();
     let mut table = Richardson::default();
     table.push(
         pass.grid.segments(),
@@ -211,7 +217,7 @@ fn in_units(stable: &Stable, pass: &Pass, neighbour: &State, weight: f64) -> Opt
 /// Energies of a saddle and of the equilibrium beyond it above that of the leaf, divided by
 /// `unit`, so that tolerances are relative.
 fn heights(equations: &mut Equations, three: &[Point; 3], unit: f64) -> Option<Vec<f64>> {
-    let leaf = equations.leaves.at(0.0).ok()?;
+    let leaf = equations.leaves.at([0.0]).ok()?;
     let [saddle, neighbour, own] = [0, 1, 2].map(|k| leaf.energy(&three[k].state));
     Some(vec![
         (saddle - own) / unit,

@@ -147,8 +147,8 @@ fn margin(
     progress: &mut (dyn FnMut(&MarginProgress) + Send),
 ) -> Result<Margin, MarginError> {
     let clock = Instant::now();
-    let make = |_: f64| Ok(scenario.clone());
-    let Ok(family) = Family::new(&make, (0.0, 1.0), false) else {
+    let make = |_: [f64; 1]| Ok(scenario.clone());
+    let Ok(family) = Family::new(&make, [0.0, 1.0], false) else {
         return Ok(Margin::none(UNDECIDED));
     };
     let (grid, state) = match continuation_grid(&family, levels) {
@@ -221,7 +221,7 @@ fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State),
         segments.is_multiple_of(first) && (segments / first).is_power_of_two()
     });
     let on_level = |level: &Level| {
-        let mut equations = Equations::new(family, level.leaf.grid.clone())?;
+        let mut equations = Equations::new(family, level.leaf.grid.clone());
         let point = equations.correct(&level.state, 0.0, None)?;
         Ok::<_, Stuck>((equations, point))
     };

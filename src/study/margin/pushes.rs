@@ -30,7 +30,7 @@ const OF_RIGID: f64 = 3e-9;
 /// Pushes a leaf in one direction until it loses its stability, or to the largest push;
 /// also returns start points for saddle searches there.
 pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push, Vec<StartPoint>) {
-    let make = |force: f64| -> Result<Scenario, String> {
+    let make = |[force]: [f64; 1]| -> Result<Scenario, String> {
         let mut scenario = stable.scenario.clone();
         scenario.tip_force[direction.axis] += direction.sign() * force;
         Ok(scenario)
@@ -44,17 +44,12 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         remark: Some(why),
         ..unknown.clone()
     };
-    let family = match Family::new(&make, (0.0, stable.largest), false) {
+    let family = match Family::new(&make, [0.0, stable.largest], false) {
         Ok(family) => family,
         Err(out) => return (failed(out.to_string()), Vec::new()),
     };
-    let followed = Grids::new(&family, stable.grid.clone())
-        .map_err(Stuck::from)
-        .and_then(|mut grids| {
-            let followed = follow(stable, direction, &mut grids)?;
-            Ok((grids, followed))
-        });
-    let (mut grids, followed) = match followed {
+    let mut grids = Grids::new(&family, stable.grid.clone());
+    let followed = match follow(stable, direction, &mut grids) {
         Ok(followed) => followed,
         Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
     };
@@ -94,7 +89,7 @@ fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
 /// The branch of a push, until it is known to have lost its stability.
 fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
     let mut first = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
-    first.tangent = first.tangent.towards(true);
+    first.tangent = first.tangent.growing();
     let enough = |points: &[Point]| {
         let behind = points.len().checked_sub(CONFIRMING);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
@@ -130,7 +125,7 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
             _ if stable.limit.reached() => Some("the time allowed was over".into()),
             End::Stuck(stuck) => Some(stuck.to_string()),
             End::Unverified(doubt) => Some(doubt.to_string()),
-            End::Closed | End::Returned | End::MostPoints | End::Enough => {
+            End::Closed | End::Returned | End::Met | End::MostPoints | End::Enough => {
                 Some("the branch could not be followed further".into())
             }
         },
@@ -167,7 +162,7 @@ fn rest_after_fold(
         Ok(point) => point.state,
         // Not reached by the descent: relax from its last state.
         Err(state) => {
-            let leaf = family.leaf(fold.fraction).ok()?;
+            let leaf = family.leaf([fold.fraction]).ok()?;
             settle_from(&leaf, &start.grid, state, stable.limit)?
         }
     };

@@ -7,7 +7,7 @@ mod run;
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 pub use run::trace;
-pub(super) use run::trace_observed;
+pub(super) use run::traced;
 
 use super::vary::{Base, Vary};
 use crate::relax::RelaxError;

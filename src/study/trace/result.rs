@@ -195,9 +195,12 @@ impl End {
             End::Reached => "reached",
             End::Returned => "returned",
             End::Closed => "closed",
+            End::Met => "met",
             End::MostPoints | End::Enough => "most-points",
             End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
             End::Stuck(Stuck::Unresolved) => "unresolved",
+            End::Stuck(Stuck::Unfolded) => "unfolds",
+            End::Stuck(Stuck::Separated) => "parts",
             End::Stuck(_) => "stuck",
             End::Unverified(_) => "unverified",
         }
@@ -205,13 +208,13 @@ impl End {
 
     /// Whether the branch is known as far as requested.
     pub fn complete(&self) -> bool {
-        matches!(self, End::Reached | End::Returned | End::Closed)
+        matches!(self, End::Reached | End::Returned | End::Closed | End::Met)
     }
 
     /// Why an incomplete branch stopped, and what may help.
     pub(super) fn remark(&self) -> Option<String> {
         match self {
-            End::Reached | End::Returned | End::Closed => None,
+            End::Reached | End::Returned | End::Closed | End::Met => None,
             End::MostPoints | End::Enough => Some("there are more points: allow more".into()),
             End::Stuck(stuck) => Some(stuck.to_string()),
             End::Unverified(Doubt::Inaccurate) => {
@@ -219,6 +222,12 @@ impl End {
             }
             End::Unverified(doubt) => Some(format!("what comes next is not verified: {doubt}")),
         }
+    }
+}
+
+impl Serialize for End {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
     }
 }
 
@@ -237,7 +246,7 @@ impl Serialize for TraceBranch {
         let mut object = serializer.serialize_struct("TraceBranch", 7)?;
         object.serialize_field("from", &self.from.map(|from| from.map(|index| index + 1)))?;
         object.serialize_field("points", &self.points.len())?;
-        object.serialize_field("end", self.end.word())?;
+        object.serialize_field("end", &self.end)?;
         match &self.remark {
             Some(remark) => object.serialize_field("remark", remark)?,
             None => object.skip_field("remark")?,

@@ -6,9 +6,10 @@ use std::time::Instant;
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
-use crate::branch::{Family, Followed, Grids, Kind, Point, Refined, Walk, begin, switch};
+use crate::branch::{Critical, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, switch};
+use crate::leaf::Grid;
 use crate::memory::Request;
-use crate::relax::{Options, RelaxError, SemiImplicit, check_segments, relax};
+use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax};
 use crate::scenario::{Key, Part, Scenario};
 use crate::study::Target;
 use crate::undulation::Undulation;
@@ -29,49 +30,38 @@ pub fn trace(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Trace, TraceError> {
-    trace_observed(request, progress, &mut |_| {})
+    Ok(traced(request, progress)?.trace)
 }
 
-/// The same; `observe` is called with each branch as it was followed.
-pub fn trace_observed(
+/// A trace, with its first point and its critical points.
+pub struct Traced {
+    pub trace: Trace,
+    /// The first point, and a grid that refines its own; none if there is no first point.
+    pub first: Option<(Point, Grid)>,
+    pub critical: Vec<(Critical, Refined)>,
+}
+
+/// The same as [`trace`], with those points.
+pub fn traced(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
-    observe: &mut dyn FnMut(&Followed),
-) -> Result<Trace, TraceError> {
+) -> Result<Traced, TraceError> {
     request.check()?;
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
     let ends = vary.ends();
-    let make = |value: f64| -> Result<Scenario, String> {
+    let make = |[value]: [f64; 1]| -> Result<Scenario, String> {
         let at = request.base.at(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
     for value in ends {
         request.base.at(&[(keys, value)])?;
     }
-    let family = Family::new(&make, (ends[0], ends[1]), vary.log);
+    let family = Family::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let scenario = request.base.at(&[(keys, ends[0])])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
-    let options = Options {
-        tolerance: Some(tolerance),
-        method: SemiImplicit {
-            keep_unstable: request.keep_unstable,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..Options::default()
-    };
-    let mut rest = relax(&scenario, &options, &mut |_| {})?;
-    if request.keep_unstable && !rest.outcome.is_at_rest() {
-        // Newton's method leads nowhere from this start.
-        let method = SemiImplicit::default().into();
-        let stable = Options {
-            method,
-            ..options.clone()
-        };
-        rest = relax(&scenario, &stable, &mut |_| {})?;
-    }
+    let (rest, options) = first_equilibrium(&scenario, tolerance, request.keep_unstable)?;
     let check = |least| check_grid(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
@@ -97,18 +87,20 @@ pub fn trace_observed(
         Some(_) => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
         None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
+    let (mut first, mut critical) = (None, Vec::new());
     match began {
-        Ok((grids, first)) => {
+        Ok((grids, point)) => {
             let mut run = Run {
                 family: &family,
                 request,
                 grids,
                 tolerance,
-                crossings: Vec::new(),
+                first: None,
+                critical: Vec::new(),
                 progress,
-                observe,
             };
-            run.follow_all(first, &mut trace);
+            run.follow_all(point, &mut trace);
+            (first, critical) = (run.first, run.critical);
         }
         Err(why) => {
             let at = keys.text(ends[0]);
@@ -120,7 +112,36 @@ pub fn trace_observed(
     trace.complete = trace.remark.is_none() && branches.iter().all(|branch| branch.end.complete());
     trace.law = branches.first().and_then(|branch| law(request, branch));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
-    Ok(trace)
+    Ok(Traced {
+        trace,
+        first,
+        critical,
+    })
+}
+
+/// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how
+/// it was found.
+fn first_equilibrium(
+    scenario: &Scenario,
+    tolerance: f64,
+    keep_unstable: bool,
+) -> Result<(Equilibrium, Options), RelaxError> {
+    let options = |keep_unstable| Options {
+        tolerance: Some(tolerance),
+        method: SemiImplicit {
+            keep_unstable,
+            ..SemiImplicit::default()
+        }
+        .into(),
+        ..Options::default()
+    };
+    let wanted = options(keep_unstable);
+    let mut rest = relax(scenario, &wanted, &mut |_| {})?;
+    if keep_unstable && !rest.outcome.is_at_rest() {
+        // Newton's method leads nowhere from this start.
+        rest = relax(scenario, &options(false), &mut |_| {})?;
+    }
+    Ok((rest, wanted))
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
@@ -160,10 +181,10 @@ struct Run<'r, 'p> {
     /// The grids on which branches are followed.
     grids: Grids<'r>,
     tolerance: f64,
-    /// Branch points found so far.
-    crossings: Vec<Refined>,
+    /// As in [`Traced`], so far.
+    first: Option<(Point, Grid)>,
+    critical: Vec<(Critical, Refined)>,
     progress: &'p mut dyn FnMut(usize, usize, f64),
-    observe: &'p mut dyn FnMut(&Followed),
 }
 
 impl Run<'_, '_> {
@@ -171,7 +192,7 @@ impl Run<'_, '_> {
     /// cross it, breadth first.
     fn follow_all(&mut self, mut first: Point, trace: &mut Trace) {
         trace.segments = first.state.segments();
-        first.tangent = first.tangent.towards(true);
+        first.tangent = first.tangent.growing();
         let values = self.request.vary.values.len();
         let longest = (1.0 / (values - 1) as f64).min(LONGEST);
         let how = Walk::new(longest, self.request.most_points);
@@ -189,17 +210,18 @@ impl Run<'_, '_> {
             let segments = last.map_or(0, |point| point.state.segments());
             trace.segments = trace.segments.max(segments);
             trace.branches.push(self.in_units(&followed, from));
-            (self.observe)(&followed);
-            if self.request.switch {
-                self.enter_crossing(&followed, number, &mut entrances);
-            }
+            let begun = followed.branch.points.first().zip(followed.points.first());
+            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
+            self.first = self.first.take().or(begun);
+            self.enter_crossings(&followed, number, &mut entrances);
         }
         trace.factorizations = self.grids.factorizations();
     }
 
-    /// Adds the first points of crossing branches, each with the indices of the
-    /// branch and the point at which it was entered, if that is new.
-    fn enter_crossing(
+    /// Records the critical points of a branch; if requested, adds the first points of crossing
+    /// branches, each with the indices of the branch and the point at which it was entered, if that
+    /// is new.
+    fn enter_crossings(
         &mut self,
         followed: &Followed,
         number: usize,
@@ -207,17 +229,17 @@ impl Run<'_, '_> {
     ) {
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
-            let known = self.crossings.iter().any(|other| near(other, refined));
-            if critical.kind != Kind::Branching || known {
+            let mut crossings = (self.critical.iter()).filter(|(it, _)| it.kind == Kind::Branching);
+            let known = crossings.any(|(_, other)| near(other, refined));
+            self.critical.push((critical.clone(), refined.clone()));
+            if critical.kind != Kind::Branching || known || !self.request.switch {
                 continue;
             }
-            self.crossings.push(refined.clone());
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
             let new = switch(self.grids.of(&critical.state), critical, self.tolerance);
-            let new = new.into_iter();
             let from = Some([number, after + 1 + which]);
-            entrances.extend(new.map(|point| (point, from)));
+            entrances.extend(new.into_iter().map(|point| (point, from)));
         }
     }
 
@@ -249,7 +271,7 @@ impl Run<'_, '_> {
 
     /// Waves and twist of the leaf at a point, on its finest grid.
     fn undulation(&self, refined: &Refined) -> Option<Undulation> {
-        let scenario = self.family.scenario(refined.fraction).ok()?;
+        let scenario = self.family.scenario([refined.fraction]).ok()?;
         let rods = refined.shapes(self.family).ok()?;
         let error = Some(refined.error * self.family.scale().length);
         Some(Undulation::at_stations(
