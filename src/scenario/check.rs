@@ -4,11 +4,11 @@
 use std::f64::consts::PI;
 
 use super::dynamics::{OUTPUTS, round_inertia};
-use super::entries::MOST_RODS;
+use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
+use super::item::Item;
 use super::key::Key;
 use super::material::Sections;
-use super::raw::{Item, Raw};
 use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
@@ -20,26 +20,36 @@ const TOLERANCE_LEAST: f64 = 1e-12;
 /// An error of a tenth of the length is no accuracy.
 const TOLERANCE_MOST: f64 = 0.1;
 
-pub(super) fn check(raw: &Raw) -> Result<Scenario> {
-    let name = name(raw.item(Key::Name)?)?;
+impl Entries {
+    /// The checked scenario.
+    ///
+    /// # Errors
+    /// If an entry that is needed is missing, or a value is not allowed.
+    pub fn check(&self) -> Result<Scenario> {
+        check(self)
+    }
+}
+
+fn check(entries: &Entries) -> Result<Scenario> {
+    let name = name(entries.item(Key::Name)?)?;
     let units = Units {
-        length: raw.given(Key::UnitLength).map(unit).transpose()?,
-        force: raw.given(Key::UnitForce).map(unit).transpose()?,
+        length: entries.given(Key::UnitLength).map(unit).transpose()?,
+        force: entries.given(Key::UnitForce).map(unit).transpose()?,
     };
-    let rods = raw.item(Key::Rods)?.whole(MOST_RODS)?;
-    let sections = Sections::read(raw, rods)?;
-    let rods = veins(raw, rods, sections.as_ref())?;
-    let joined = raw.item(Key::Joined)?.switch()?;
-    let coupling = coupling(raw, rods.len() - 1)?;
-    let gravity = raw.item(Key::Gravity)?.vector()?;
-    let tip_force = raw.item(Key::TipForce)?.vector()?;
-    let item = raw.item(Key::TipMoment)?;
+    let rods = entries.item(Key::Rods)?.whole(MOST_RODS)?;
+    let sections = Sections::read(entries, rods)?;
+    let rods = veins(entries, rods, sections.as_ref())?;
+    let joined = entries.item(Key::Joined)?.switch()?;
+    let coupling = coupling(entries, rods.len() - 1)?;
+    let gravity = entries.item(Key::Gravity)?.vector()?;
+    let tip_force = entries.item(Key::TipForce)?.vector()?;
+    let item = entries.item(Key::TipMoment)?;
     let tip_moment = item.vector()?;
     on_one_rod(item, rods.len(), &[tip_moment])?;
-    let held_tip = tip::held(raw, &rods, joined)?;
-    let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
+    let held_tip = tip::held(entries, &rods, joined)?;
+    let tolerance = tolerance(entries.item(Key::Tolerance)?)?;
     let loads = [gravity, tip_force, tip_moment];
-    let dynamics = dynamics(raw, &rods, sections.as_ref(), loads)?;
+    let dynamics = dynamics(entries, &rods, sections.as_ref(), loads)?;
     let scenario = Scenario {
         name,
         units,
@@ -56,7 +66,7 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
         tolerance,
         dynamics,
     };
-    limits::check(raw, &scenario)?;
+    limits::check(entries, &scenario)?;
     Ok(scenario)
 }
 
@@ -84,10 +94,10 @@ fn unit(item: Item) -> Result<String> {
     Ok(unit.trim().to_string())
 }
 
-fn veins(raw: &Raw, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>> {
-    let length = raw.item(Key::Length)?.one_each(rods)?;
-    let angle = angles(raw.item(Key::Fan)?, rods)?;
-    let quantity = |key| raw.item(key)?.quantity(rods);
+fn veins(entries: &Entries, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>> {
+    let length = entries.item(Key::Length)?.one_each(rods)?;
+    let angle = angles(entries.item(Key::Fan)?, rods)?;
+    let quantity = |key| entries.item(key)?.quantity(rods);
     let triple = |[first, second, third]: [Key; 3]| -> Result<[Vec<Profile>; 3]> {
         Ok([quantity(first)?, quantity(second)?, quantity(third)?])
     };
@@ -119,20 +129,20 @@ fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
             .map(|n| step * (2.0 * n as f64 - odd - rods as f64))
             .collect()
     };
-    match item.node().text() {
+    match item.value.as_str() {
         Some("paper") => Ok(fan(0.0)),
         Some("symmetric") => Ok(fan(1.0)),
-        None if item.node().length().is_some() => item.one_each(rods),
+        None if item.value.is_array() => item.one_each(rods),
         _ => Err(item.refuse(format_args!(
             "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
         ))),
     }
 }
 
-fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
+fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
     for (axis, key) in Key::COUPLING.into_iter().enumerate() {
-        let stiffness = raw.item(key)?.one_each(gaps)?;
+        let stiffness = entries.item(key)?.one_each(gaps)?;
         for (gap, stiffness) in coupling.iter_mut().zip(stiffness) {
             gap[axis] = stiffness;
         }
@@ -171,14 +181,14 @@ fn tolerance(item: Item) -> Result<f64> {
 
 /// The table `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
 fn dynamics(
-    raw: &Raw,
+    entries: &Entries,
     rods: &[Rod],
     sections: Option<&Sections>,
     loads: [[f64; 3]; 3],
 ) -> Result<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
     let of_sections = sections.and_then(Sections::density);
-    let density = match raw.given(Key::Density) {
+    let density = match entries.given(Key::Density) {
         Some(item) => {
             let why = "section.mass_density is given, too: leave one of them out";
             item.ensure(of_sections.is_none(), why)?;
@@ -191,26 +201,26 @@ fn dynamics(
         None => Dynamics::default_for(rods),
     }
     .with_loads(gravity, tip_force, tip_moment);
-    let number = |key, default| raw.given(key).map_or(Ok(default), |item| item.number());
-    let load = |key, default| match raw.given(key) {
+    let number = |key, default| entries.given(key).map_or(Ok(default), |item| item.number());
+    let load = |key, default| match entries.given(key) {
         Some(item) => item.vectors_in_time(),
         None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
-    let section = rotary_inertia(raw, &preset.density)?;
+    let section = rotary_inertia(entries, &preset.density)?;
     let section = section.or_else(|| sections.and_then(Sections::rotary_inertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
-    let internal_damping = raw.item(Key::InternalDamping)?.number()?;
-    let output_interval = match raw.given(Key::OutputInterval) {
+    let internal_damping = entries.item(Key::InternalDamping)?.number()?;
+    let output_interval = match entries.given(Key::OutputInterval) {
         Some(item) => output_interval(item, duration)?,
         None => duration / OUTPUTS,
     };
-    let clamped = clamped(raw.item(Key::Clamped)?, rods.len())?;
-    let start = start(raw.item(Key::Start)?, clamped)?;
+    let clamped = clamped(entries.item(Key::Clamped)?, rods.len())?;
+    let start = start(entries.item(Key::Start)?, clamped)?;
     let gravity = load(Key::GravityInTime, preset.gravity)?;
     let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
     let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
-    if let Some(item) = raw.given(Key::TipMomentInTime) {
+    if let Some(item) = entries.given(Key::TipMomentInTime) {
         on_one_rod(item, rods.len(), &tip_moment.value)?;
     }
     Ok(Dynamics {
@@ -225,7 +235,7 @@ fn dynamics(
         gravity,
         tip_force,
         tip_moment,
-        rest: match raw.given(Key::RestInTime) {
+        rest: match entries.given(Key::RestInTime) {
             Some(item) => item.factors_in_time()?,
             None => preset.rest,
         },
@@ -233,10 +243,13 @@ fn dynamics(
     })
 }
 
-fn rotary_inertia(raw: &Raw, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
+fn rotary_inertia(entries: &Entries, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
     let quantity = |item: Item| item.quantity(density.len());
-    let inertia = raw.given(Key::RotaryInertia).map(quantity).transpose()?;
-    let Some(item) = raw.given(Key::SectionRadius) else {
+    let inertia = entries
+        .given(Key::RotaryInertia)
+        .map(quantity)
+        .transpose()?;
+    let Some(item) = entries.given(Key::SectionRadius) else {
         return Ok(inertia);
     };
     item.ensure(
@@ -276,7 +289,7 @@ fn clamped(item: Item, rods: usize) -> Result<bool> {
 }
 
 fn start(item: Item, clamped: bool) -> Result<Start> {
-    match item.node().text() {
+    match item.value.as_str() {
         Some("released") => Ok(Start::Released),
         Some("at-rest") if clamped => Ok(Start::AtRest),
         Some("at-rest") => Err(item

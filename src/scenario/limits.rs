@@ -2,10 +2,11 @@
 //! are a mistake, or no grid could resolve its shape. Only given values are checked;
 //! defaults are always within the limits.
 
+use super::entries::Entries;
 use super::error::ScenarioError;
+use super::item::Item;
 use super::key::{Form, Key};
 use super::material;
-use super::raw::{Item, Raw};
 use super::{Profile, Rod, Scale, Scenario, longest};
 
 type Result = std::result::Result<(), ScenarioError>;
@@ -139,21 +140,21 @@ const TOO_MANY: &str =
 const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
-pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result {
-    rods(raw, &scenario.rods)?;
+pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result {
+    rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
         (Key::Gravity, scenario.gravity, GRAVITY),
         (Key::TipForce, scenario.tip_force, TIP_FORCE),
         (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
     ] {
-        if let Some(item) = raw.given(key) {
+        if let Some(item) = entries.given(key) {
             limit.check(item, norm(load) * largest_factor(key, &scenario.rods))?;
         }
     }
-    coupling(raw, scenario)?;
-    dynamics(raw, scenario)?;
-    masses(raw, scenario)?;
-    in_time(raw, scenario)
+    coupling(entries, scenario)?;
+    dynamics(entries, scenario)?;
+    masses(entries, scenario)?;
+    in_time(entries, scenario)
 }
 
 /// The length of a rod and its smallest bending stiffness anywhere along it.
@@ -185,8 +186,8 @@ fn norm([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-fn rods(raw: &Raw, rods: &[Rod]) -> Result {
-    let check = |key, index, limit: &Limit, value| match raw.given(key) {
+fn rods(entries: &Entries, rods: &[Rod]) -> Result {
+    let check = |key, index, limit: &Limit, value| match entries.given(key) {
         Some(item) => limit.check(item.entry(index), value),
         None => Ok(()),
     };
@@ -206,7 +207,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
             check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
         }
         // Stiffnesses that are not given follow from the size of a section.
-        if let Some(item) = material::size(raw) {
+        if let Some(item) = material::size(entries) {
             let couple = rod.couple_stiffness.iter().map(Profile::min);
             let least = couple.fold(f64::INFINITY, f64::min);
             STIFFNESSES.check(item.entry(index), stiffest / least)?;
@@ -224,7 +225,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     Ok(())
 }
 
-fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
+fn coupling(entries: &Entries, scenario: &Scenario) -> Result {
     let gaps = scenario.coupling.iter().zip(scenario.rods.windows(2));
     for (gap, (stiffness, rods)) in gaps.enumerate() {
         let [one, other] = [softest(&rods[0]), softest(&rods[1])];
@@ -233,7 +234,7 @@ fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
             stiffness: one.stiffness.min(other.stiffness),
         };
         for (key, stiffness) in Key::COUPLING.into_iter().zip(stiffness) {
-            if let Some(item) = raw.given(key) {
+            if let Some(item) = entries.given(key) {
                 KAPPA.check(item.entry(gap), stiffness * natural_factor(key, both, 1.0))?;
             }
         }
@@ -241,10 +242,10 @@ fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
     Ok(())
 }
 
-fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
+fn dynamics(entries: &Entries, scenario: &Scenario) -> Result {
     let (scale, time) = (scenario.scale(), scenario.time());
     for (key, limit) in &DYNAMICS {
-        let Some(item) = raw.given(*key) else {
+        let Some(item) = entries.given(*key) else {
             continue;
         };
         let natural = natural_factor(*key, scale, time);
@@ -258,8 +259,9 @@ fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
 }
 
 /// Masses that follow from sections.
-fn masses(raw: &Raw, scenario: &Scenario) -> Result {
-    let (Some(size), Some(density)) = (material::size(raw), raw.given(Key::MassDensity)) else {
+fn masses(entries: &Entries, scenario: &Scenario) -> Result {
+    let (Some(size), Some(density)) = (material::size(entries), entries.given(Key::MassDensity))
+    else {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.time());
@@ -278,14 +280,14 @@ fn masses(raw: &Raw, scenario: &Scenario) -> Result {
     Ok(())
 }
 
-fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
+fn in_time(entries: &Entries, scenario: &Scenario) -> Result {
     let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
-    if let Some(item) = raw.given(Key::OutputInterval) {
+    if let Some(item) = entries.given(Key::OutputInterval) {
         // Rounding of the quotient must not count as an output.
         let outputs = (dynamics.duration / dynamics.output_interval).floor();
         OUTPUTS.check(item, outputs)?;
     }
-    let list = |key, name| raw.given(key).and_then(|item: Item| item.list(name));
+    let list = |key, name| entries.given(key).and_then(|item: Item| item.list(name));
     for (key, at) in [
         (Key::GravityInTime, &dynamics.gravity.at),
         (Key::TipForceInTime, &dynamics.tip_force.at),

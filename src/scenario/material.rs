@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::Profile;
+use super::entries::Entries;
 use super::error::Result;
+use super::item::Item;
 use super::key::Key;
-use super::raw::{Item, Raw};
 use super::section::{Outline, Property, Radii, Section};
 use super::value::MAGNITUDES;
 
@@ -26,30 +27,30 @@ pub(super) struct Sections {
 }
 
 /// The entry with the size of the sections.
-pub(super) fn size<'r>(raw: &'r Raw) -> Option<Item<'r>> {
-    let given = |key| raw.given(key);
+pub(super) fn size<'r>(entries: &'r Entries) -> Option<Item<'r>> {
+    let given = |key| entries.given(key);
     given(Key::Diameter).or_else(|| given(Key::Thickness))
 }
 
 impl Sections {
     /// Reads the table; `None` if there is none.
-    pub(super) fn read(raw: &Raw, rods: usize) -> Result<Option<Sections>> {
-        if TABLE.iter().all(|&key| raw.given(key).is_none()) {
+    pub(super) fn read(entries: &Entries, rods: usize) -> Result<Option<Sections>> {
+        if TABLE.iter().all(|&key| entries.given(key).is_none()) {
             return Ok(None);
         }
         for key in Key::COUPLE.into_iter().chain(Key::FORCE) {
-            if let Some(item) = raw.given(key) {
+            if let Some(item) = entries.given(key) {
                 let why =
                     "[section] gives the stiffnesses: leave out either [stiffness] or [section]";
                 return Err(item.refuse(why));
             }
         }
-        let quantity = |key| raw.item(key)?.quantity(rods);
-        let (outline, sides) = outline(raw)?;
+        let quantity = |key| entries.item(key)?.quantity(rods);
+        let (outline, sides) = outline(entries)?;
         let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
         let young = quantity(Key::Young)?;
-        let poisson = poisson(raw.item(Key::Poisson)?, rods)?;
-        let given = raw.given(Key::MassDensity);
+        let poisson = poisson(entries.item(Key::Poisson)?, rods)?;
+        let given = entries.given(Key::MassDensity);
         let has_mass = given.is_some();
         let mass_density = match given {
             Some(item) => item.quantity(rods)?,
@@ -66,18 +67,18 @@ impl Sections {
             sections: (0..rods).map(section).collect(),
             has_mass,
         };
-        sections.check(raw)?;
+        sections.check(entries)?;
         Ok(Some(sections))
     }
 
     /// Refuses stiffnesses and masses that are too large or too small, and flat sections of
     /// auxetic materials, for which Cowper's formula has no meaning.
-    fn check(&self, raw: &Raw) -> Result<()> {
-        let Some(item) = size(raw) else {
+    fn check(&self, entries: &Entries) -> Result<()> {
+        let Some(item) = size(entries) else {
             return Ok(());
         };
         for (rod, section) in self.sections.iter().enumerate() {
-            raw.item(Key::Poisson)?.entry(rod).ensure(
+            entries.item(Key::Poisson)?.entry(rod).ensure(
                 section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
                 "gives a shear factor that is not between 0 and 1, as Cowper's formula fails for \
                  so flat a section with a negative ratio: choose a larger one, or give the \
@@ -135,16 +136,16 @@ impl Sections {
 }
 
 /// The outline, and the keys of its two sides.
-fn outline(raw: &Raw) -> Result<(Outline, [Key; 2])> {
-    let item = raw.item(Key::SectionShape)?;
+fn outline(entries: &Entries) -> Result<(Outline, [Key; 2])> {
+    let item = entries.item(Key::SectionShape)?;
     let sides = [Key::Width, Key::Thickness];
-    let (outline, sides, others) = match item.node().text() {
+    let (outline, sides, others) = match item.value.as_str() {
         Some("circle") => (Outline::Circle, [Key::Diameter; 2], &sides[..]),
         Some("ellipse") => (Outline::Ellipse, sides, &[Key::Diameter][..]),
         Some("rectangle") => (Outline::Rectangle, sides, &[Key::Diameter][..]),
         _ => return Err(item.refuse("must be \"circle\", \"ellipse\" or \"rectangle\"")),
     };
-    match others.iter().find_map(|&key| raw.given(key)) {
+    match others.iter().find_map(|&key| entries.given(key)) {
         None => Ok((outline, sides)),
         Some(other) => Err(other.refuse(
             "a circle has a diameter; an ellipse and a rectangle have a width (along d2) and a \

@@ -9,23 +9,22 @@ mod entries;
 mod error;
 mod excerpt;
 mod form;
+mod item;
 mod key;
 mod limits;
 mod material;
-mod node;
 mod part;
 mod profile;
-mod raw;
 mod read;
 mod schedule;
 mod schema;
 mod section;
+mod source;
 mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
-pub(crate) use entries::{resolve, with_overrides};
 pub use error::{Place, ScenarioError};
 #[cfg(feature = "cli")]
 pub(crate) use excerpt::printable;
@@ -41,8 +40,8 @@ pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Radii, Section};
 pub use tip::{Clamp, HeldTip};
-/// A value as it can be written.
-pub use toml::Value;
+/// Values as they can be written.
+pub use toml::{Table, Value};
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
