@@ -8,7 +8,7 @@ use super::Scenario;
 use super::entries::Entries;
 use super::error::ScenarioError;
 use super::excerpt::line_of;
-use crate::memory::Request;
+use crate::memory;
 
 /// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
 pub(crate) const MOST_BYTES: u64 = 64 << 20;
@@ -86,8 +86,7 @@ pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(ScenarioError::in_file(file, None, problem));
     }
-    (Request::text(&bytes).weigh())
-        .map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    memory::text(&bytes).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
