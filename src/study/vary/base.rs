@@ -32,18 +32,27 @@ impl Base {
 
     /// The same from a text; messages call it `file`.
     pub fn of_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
+        Base::new(&Entries::of_text(&text, &file)?, overrides, true)
+    }
+
+    /// The same from entries; settings of methods are unknown keys unless they are allowed.
+    pub(crate) fn new(
+        entries: &Entries,
+        overrides: &[String],
+        of_methods: bool,
+    ) -> Result<Self, VaryError> {
         let mut knobs = Knobs::default();
         let mut of_scenario = Vec::new();
         for given in overrides {
             match given.split_once('=') {
-                Some((path, value)) if path.trim().starts_with("method.") => {
+                Some((path, value)) if of_methods && path.trim().starts_with("method.") => {
                     let (knob, value) = setting(path.trim(), value.trim())?;
                     knobs.set(knob, value)?;
                 }
                 _ => of_scenario.push(given.clone()),
             }
         }
-        let entries = Entries::of_text(&text, &file)?.replaced(&of_scenario)?;
+        let entries = entries.replaced(&of_scenario)?;
         Ok(Base {
             scenario: entries.check()?,
             entries,
