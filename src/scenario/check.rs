@@ -2,14 +2,16 @@
 //! Limits on combinations of values are in `limits`.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::dynamics::{OUTPUTS, round_inertia};
 use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
 use super::item::Item;
 use super::key::Key;
-use super::material::Sections;
-use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
+use super::material;
+use super::section::{Property, Section};
+use super::{Dynamics, Profile, Radii, Rod, Scenario, Start, Units, limits, tip};
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
@@ -26,48 +28,42 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> Result<Scenario> {
-        check(self)
+        let name = name(self.item(Key::Name)?)?;
+        let units = Units {
+            length: self.given(Key::UnitLength).map(unit).transpose()?,
+            force: self.given(Key::UnitForce).map(unit).transpose()?,
+        };
+        let rods = self.item(Key::Rods)?.whole(MOST_RODS)?;
+        let sections = material::sections(self, rods)?;
+        let rods = veins(self, rods, sections.as_deref())?;
+        let joined = self.item(Key::Joined)?.switch()?;
+        let coupling = coupling(self, rods.len() - 1)?;
+        let gravity = self.item(Key::Gravity)?.vector()?;
+        let tip_force = self.item(Key::TipForce)?.vector()?;
+        let item = self.item(Key::TipMoment)?;
+        let tip_moment = item.vector()?;
+        on_one_rod(item, rods.len(), &[tip_moment])?;
+        let held_tip = tip::held(self, &rods, joined)?;
+        let tolerance = tolerance(self.item(Key::Tolerance)?)?;
+        let loads = [gravity, tip_force, tip_moment];
+        let dynamics = dynamics(self, &rods, sections.as_deref(), loads)?;
+        let scenario = Scenario {
+            name,
+            units,
+            rods,
+            radii: sections.map(Radii::of).unwrap_or_default(),
+            joined,
+            coupling,
+            gravity,
+            tip_force,
+            tip_moment,
+            held_tip,
+            tolerance,
+            dynamics,
+        };
+        limits::check(self, &scenario)?;
+        Ok(scenario)
     }
-}
-
-fn check(entries: &Entries) -> Result<Scenario> {
-    let name = name(entries.item(Key::Name)?)?;
-    let units = Units {
-        length: entries.given(Key::UnitLength).map(unit).transpose()?,
-        force: entries.given(Key::UnitForce).map(unit).transpose()?,
-    };
-    let rods = entries.item(Key::Rods)?.whole(MOST_RODS)?;
-    let sections = Sections::read(entries, rods)?;
-    let rods = veins(entries, rods, sections.as_ref())?;
-    let joined = entries.item(Key::Joined)?.switch()?;
-    let coupling = coupling(entries, rods.len() - 1)?;
-    let gravity = entries.item(Key::Gravity)?.vector()?;
-    let tip_force = entries.item(Key::TipForce)?.vector()?;
-    let item = entries.item(Key::TipMoment)?;
-    let tip_moment = item.vector()?;
-    on_one_rod(item, rods.len(), &[tip_moment])?;
-    let held_tip = tip::held(entries, &rods, joined)?;
-    let tolerance = tolerance(entries.item(Key::Tolerance)?)?;
-    let loads = [gravity, tip_force, tip_moment];
-    let dynamics = dynamics(entries, &rods, sections.as_ref(), loads)?;
-    let scenario = Scenario {
-        name,
-        units,
-        rods,
-        radii: sections
-            .map(|sections| sections.radii())
-            .unwrap_or_default(),
-        joined,
-        coupling,
-        gravity,
-        tip_force,
-        tip_moment,
-        held_tip,
-        tolerance,
-        dynamics,
-    };
-    limits::check(entries, &scenario)?;
-    Ok(scenario)
 }
 
 fn name(item: Item) -> Result<String> {
@@ -94,7 +90,7 @@ fn unit(item: Item) -> Result<String> {
     Ok(unit.trim().to_string())
 }
 
-fn veins(entries: &Entries, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>> {
+fn veins(entries: &Entries, rods: usize, sections: Option<&[Arc<Section>]>) -> Result<Vec<Rod>> {
     let length = entries.item(Key::Length)?.one_each(rods)?;
     let angle = angles(entries.item(Key::Fan)?, rods)?;
     let quantity = |key| entries.item(key)?.quantity(rods);
@@ -103,7 +99,12 @@ fn veins(entries: &Entries, rods: usize, sections: Option<&Sections>) -> Result<
     };
     let stretch = quantity(Key::RestStretch)?;
     let (couple, force) = match sections {
-        Some(sections) => (sections.couple(), sections.force()),
+        Some(sections) => {
+            let of = |kind: fn(usize) -> Property| {
+                [0, 1, 2].map(|axis| material::profiles(sections, kind(axis)))
+            };
+            (of(Property::Couple), of(Property::Force))
+        }
         None => (triple(Key::COUPLE)?, triple(Key::FORCE)?),
     };
     let rest = triple(Key::REST)?;
@@ -183,18 +184,19 @@ fn tolerance(item: Item) -> Result<f64> {
 fn dynamics(
     entries: &Entries,
     rods: &[Rod],
-    sections: Option<&Sections>,
+    sections: Option<&[Arc<Section>]>,
     loads: [[f64; 3]; 3],
 ) -> Result<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
-    let of_sections = sections.and_then(Sections::density);
+    let sections = sections.filter(|_| entries.is_given(Key::MassDensity));
+    let of_sections = |property| sections.map(|all| material::profiles(all, property));
     let density = match entries.given(Key::Density) {
         Some(item) => {
             let why = "section.mass_density is given, too: leave one of them out";
-            item.ensure(of_sections.is_none(), why)?;
+            item.ensure(sections.is_none(), why)?;
             Some(item.quantity(rods.len())?)
         }
-        None => of_sections,
+        None => of_sections(Property::Density),
     };
     let preset = match density {
         Some(density) => Dynamics::of_density(rods, density),
@@ -208,7 +210,7 @@ fn dynamics(
     };
     let duration = number(Key::Duration, preset.duration)?;
     let section = rotary_inertia(entries, &preset.density)?;
-    let section = section.or_else(|| sections.and_then(Sections::rotary_inertia));
+    let section = section.or_else(|| of_sections(Property::RotaryInertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = entries.item(Key::InternalDamping)?.number()?;
     let output_interval = match entries.given(Key::OutputInterval) {

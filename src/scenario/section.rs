@@ -215,8 +215,8 @@ impl Outline {
 pub struct Radii(Vec<Arc<Section>>);
 
 impl Radii {
-    pub(super) fn of(sections: &[Arc<Section>]) -> Self {
-        Radii(sections.to_vec())
+    pub(super) fn of(sections: Vec<Arc<Section>>) -> Self {
+        Radii(sections)
     }
 
     /// The sections; none where stiffnesses are given in place of them.
