@@ -26,7 +26,7 @@ struct Source {
     /// The text; that of a dictionary is made on demand.
     text: OnceLock<String>,
     file: String,
-    /// Its entries; `None` if they cannot be read.
+    /// Its entries, made when some are replaced; `None` if they cannot be read.
     entries: OnceLock<Option<Entries>>,
 }
 
@@ -58,11 +58,15 @@ impl Source {
             return Ok(base.scenario().clone());
         }
         let check = |entries: &Entries| entries.replaced(overrides)?.check();
-        let document = self.document.as_ref();
-        let direct = self.entries.get_or_init(|| match document {
+        let read = || match &self.document {
             Some(document) => document.entries(),
             None => Entries::of_text(self.text(), &self.file).ok(),
-        });
+        };
+        let direct = match overrides {
+            [] => read().as_ref().map(check),
+            // They are kept for more replacements.
+            _ => self.entries.get_or_init(read).as_ref().map(check),
+        };
         if let Some(Ok(found)) = direct.as_ref().map(check) {
             return Ok(found);
         }

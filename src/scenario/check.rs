@@ -291,14 +291,13 @@ fn clamped(item: Item, rods: usize) -> Result<bool> {
 }
 
 fn start(item: Item, clamped: bool) -> Result<Start> {
-    match item.value.as_str() {
-        Some("released") => Ok(Start::Released),
-        Some("at-rest") if clamped => Ok(Start::AtRest),
-        Some("at-rest") => Err(item
-            .refuse("a rod with a free base has no equilibrium to start from: use \"released\"")),
-        _ => Err(item.refuse(
-            "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
-             (in equilibrium under the loads at time 0)",
-        )),
-    }
+    let start = item.word(
+        "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
+         (in equilibrium under the loads at time 0)",
+    )?;
+    item.ensure(
+        clamped || start == Start::Released,
+        "a rod with a free base has no equilibrium to start from: use \"released\"",
+    )?;
+    Ok(start)
 }

@@ -221,9 +221,10 @@ impl Entries {
         }
     }
 
-    /// Whether a factor changes any of its numbers, as far as it has some.
+    /// Whether a factor changes any of its numbers, or is refused.
     pub(crate) fn is_scalable(&self, part: Part) -> bool {
-        self.value_at(part).is_none_or(is_scalable)
+        let times = |factor| self.changed(part, Value::Float(factor));
+        times(1.0) != times(2.0) || times(1.0).is_err()
     }
 
     /// The whole value of a key after a part of it is replaced.
@@ -324,18 +325,6 @@ fn multiply(value: &mut Value, factor: f64) -> std::result::Result<(), String> {
             "{} is no number to be scaled: write numbers first",
             shorten(&other.to_string())
         )),
-    }
-}
-
-/// Whether [`multiply`] changes it, or refuses it.
-fn is_scalable(value: &Value) -> bool {
-    match value {
-        Value::Array(list) => list.iter().any(is_scalable),
-        Value::Table(table) => {
-            let mut lists = table.iter().filter(|(name, _)| *name != "at");
-            lists.any(|(_, list)| is_scalable(list))
-        }
-        single => number(single).is_none_or(|number| number != 0.0 && number.is_finite()),
     }
 }
 

@@ -7,7 +7,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 
 use super::section::{Outline, Property, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
+use super::{Key, Profile, Rod, Scenario, Schedule, ascending};
 
 /// The sections of a scenario, and what else is theirs.
 struct Sections<'a> {
@@ -113,10 +113,7 @@ impl Scenario {
             Key::Duration => number(dynamics.duration),
             Key::OutputInterval => number(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
-            Key::Start => json!(match dynamics.start {
-                Start::Released => "released",
-                Start::AtRest => "at-rest",
-            }),
+            Key::Start => json!(dynamics.start),
             Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
             Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
             Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
@@ -158,11 +155,7 @@ impl Sections<'_> {
             quantity(self.sections.iter().map(|section| of(section)))
         };
         Some(match key {
-            Key::SectionShape => json!(match outline {
-                Outline::Circle => "circle",
-                Outline::Ellipse => "ellipse",
-                Outline::Rectangle => "rectangle",
-            }),
+            Key::SectionShape => json!(outline),
             Key::Diameter if outline == Outline::Circle => of(|section| &section.width),
             Key::Width | Key::Thickness if outline == Outline::Circle => return None,
             Key::Width => of(|section| &section.width),

@@ -34,11 +34,11 @@ impl Limit {
         )))
     }
 
-    /// The same for the extremes of a profile of each rod, times `natural`.
-    fn check_profiles(&self, item: Item, profiles: &[Profile], natural: f64) -> Result {
+    /// The same for the extremes of a profile of each rod, in this unit.
+    fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result {
         for (index, profile) in profiles.iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
-                self.check(item.entry(index), value * natural)?;
+                self.check(item.entry(index), value / unit)?;
             }
         }
         Ok(())
@@ -148,7 +148,7 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result {
         (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
     ] {
         if let Some(item) = entries.given(key) {
-            limit.check(item, norm(load) * largest_factor(key, &scenario.rods))?;
+            limit.check(item, norm(load) / smallest_unit(key, &scenario.rods))?;
         }
     }
     coupling(entries, scenario)?;
@@ -166,19 +166,10 @@ fn softest(rod: &Rod) -> Scale {
     }
 }
 
-/// The factor that makes a quantity of this key dimensionless in these units, with times
-/// in units of `time`.
-fn natural_factor(key: Key, scale: Scale, time: f64) -> f64 {
-    let [length, force, times] = key.dimension();
-    scale.per(length, force) / time.powi(times)
-}
-
-/// The largest such factor of all rods.
-fn largest_factor(key: Key, rods: &[Rod]) -> f64 {
-    let factors = rods
-        .iter()
-        .map(|rod| natural_factor(key, softest(rod), 1.0));
-    factors.fold(0.0, f64::max)
+/// The smallest unit of a quantity of this key, which has no times, of all rods.
+fn smallest_unit(key: Key, rods: &[Rod]) -> f64 {
+    let units = rods.iter().map(|rod| softest(rod).unit(key, 1.0));
+    units.fold(f64::INFINITY, f64::min)
 }
 
 fn norm([x, y, z]: [f64; 3]) -> f64 {
@@ -199,7 +190,7 @@ fn rods(entries: &Entries, rods: &[Rod]) -> Result {
     let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
     for (index, rod) in rods.iter().enumerate() {
         let scale = softest(rod);
-        let natural = |key, value| value * natural_factor(key, scale, 1.0);
+        let natural = |key, value| value / scale.unit(key, 1.0);
         for (key, stiffness) in Key::COUPLE.into_iter().zip(&rod.couple_stiffness) {
             check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
         }
@@ -235,7 +226,7 @@ fn coupling(entries: &Entries, scenario: &Scenario) -> Result {
         };
         for (key, stiffness) in Key::COUPLING.into_iter().zip(stiffness) {
             if let Some(item) = entries.given(key) {
-                KAPPA.check(item.entry(gap), stiffness * natural_factor(key, both, 1.0))?;
+                KAPPA.check(item.entry(gap), stiffness / both.unit(key, 1.0))?;
             }
         }
     }
@@ -248,12 +239,12 @@ fn dynamics(entries: &Entries, scenario: &Scenario) -> Result {
         let Some(item) = entries.given(*key) else {
             continue;
         };
-        let natural = natural_factor(*key, scale, time);
+        let unit = scale.unit(*key, time);
         let Form::Quantity(_) = key.form() else {
-            limit.check(item, item.number()? * natural)?;
+            limit.check(item, item.number()? / unit)?;
             continue;
         };
-        limit.check_profiles(item, &item.quantity(scenario.rods.len())?, natural)?;
+        limit.check_profiles(item, &item.quantity(scenario.rods.len())?, unit)?;
     }
     Ok(())
 }
@@ -275,7 +266,7 @@ fn masses(entries: &Entries, scenario: &Scenario) -> Result {
             &dynamics.rotary_inertia,
         ),
     ] {
-        limit.check_profiles(item, profiles, natural_factor(key, scale, time))?;
+        limit.check_profiles(item, profiles, scale.unit(key, time))?;
     }
     Ok(())
 }
@@ -306,9 +297,9 @@ fn in_time(entries: &Entries, scenario: &Scenario) -> Result {
         (Key::TipMomentInTime, &dynamics.tip_moment, TIP_MOMENT),
     ] {
         if let Some(list) = list(key, "value") {
-            let factor = largest_factor(key, rods);
+            let unit = smallest_unit(key, rods);
             for (index, &value) in load.value.iter().enumerate() {
-                limit.check(list.entry(index), norm(value) * factor)?;
+                limit.check(list.entry(index), norm(value) / unit)?;
             }
         }
     }

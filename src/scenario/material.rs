@@ -94,14 +94,13 @@ fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
 /// The outline, and the keys of its two sides.
 fn outline(entries: &Entries) -> Result<(Outline, [Key; 2])> {
     let item = entries.item(Key::SectionShape)?;
-    let sides = [Key::Width, Key::Thickness];
-    let (outline, sides, others) = match item.value.as_str() {
-        Some("circle") => (Outline::Circle, [Key::Diameter; 2], &sides[..]),
-        Some("ellipse") => (Outline::Ellipse, sides, &[Key::Diameter][..]),
-        Some("rectangle") => (Outline::Rectangle, sides, &[Key::Diameter][..]),
-        _ => return Err(item.refuse("must be \"circle\", \"ellipse\" or \"rectangle\"")),
+    let outline = item.word("must be \"circle\", \"ellipse\" or \"rectangle\"")?;
+    let (sides, diameter) = ([Key::Width, Key::Thickness], [Key::Diameter; 2]);
+    let (sides, others) = match outline {
+        Outline::Circle => (diameter, sides),
+        Outline::Ellipse | Outline::Rectangle => (sides, diameter),
     };
-    match others.iter().find_map(|&key| entries.given(key)) {
+    match others.into_iter().find_map(|key| entries.given(key)) {
         None => Ok((outline, sides)),
         Some(other) => Err(other.refuse(
             "a circle has a diameter; an ellipse and a rectangle have a width (along d2) and a \

@@ -83,9 +83,7 @@ impl Scenario {
 
     /// The natural unit of a quantity of this key.
     pub(crate) fn unit(&self, key: Key) -> f64 {
-        let [length, force, time] = key.dimension();
-        let scale = self.scale();
-        scale.length.powi(length) * scale.force().powi(force) * self.time().powi(time)
+        self.scale().unit(key, self.time())
     }
 
     /// T: the natural unit of time, sqrt(rho L^4/A).
@@ -181,10 +179,10 @@ impl Scale {
         self.stiffness / self.length
     }
 
-    /// The factor that converts a quantity to these units, if its own unit is a product of
-    /// powers of length and force with these exponents.
-    fn per(&self, length: i32, force: i32) -> f64 {
-        self.length.powi(2 * force - length) / self.stiffness.powi(force)
+    /// Unit of a quantity of this key, with this unit of time.
+    fn unit(&self, key: Key, time: f64) -> f64 {
+        let [length, force, times] = key.dimension();
+        self.length.powi(length) * self.force().powi(force) * time.powi(times)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Converts values as written to numbers, for every form that a key can have.
 
+use std::str::FromStr;
+
 use super::entries::number;
 use super::error::Result;
 use super::item::Item;
@@ -24,6 +26,12 @@ const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1
 impl<'e> Item<'e> {
     pub(super) fn text(&self) -> Result<&'e str> {
         (self.value.as_str()).ok_or_else(|| self.refuse("must be text in quotes"))
+    }
+
+    /// One of the words that `allowed` names.
+    pub(super) fn word<T: FromStr>(&self, allowed: &str) -> Result<T> {
+        let word = self.value.as_str().and_then(|word| word.parse().ok());
+        word.ok_or_else(|| self.refuse(allowed))
     }
 
     pub(super) fn switch(&self) -> Result<bool> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Entries, Form, Key, Part, Scenario, Value};
+use crate::scenario::{self, Entries, Form, Key, Scenario};
 
 /// A scenario with some entries replaced, into which numbers are substituted.
 #[derive(Clone, Debug)]
@@ -169,18 +169,12 @@ impl Base {
                     "where knots are cannot change by a little: the grids have nodes there",
                 );
             }
-            let Some(entry) = self.entry(part) else {
+            if self.entries.value_at(part).is_none() {
                 return refuse(
                     "is not in the scenario: write it there first; indices count from 0",
                 );
-            };
-            let value = match entry {
-                _ if part.scale => Some(1.0),
-                Value::Float(value) => Some(*value),
-                Value::Integer(value) => Some(*value as f64),
-                _ => None,
-            };
-            match value {
+            }
+            match self.entries.number_at(part) {
                 Some(value) if !value.is_finite() => {
                     return refuse("is infinite, and cannot change by a little");
                 }
@@ -192,16 +186,12 @@ impl Base {
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
     }
 
-    fn entry(&self, part: Part) -> Option<&Value> {
-        self.entries.value_at(part)
-    }
-
     /// The same keys, or one for each entry if they are a list or a profile.
     pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
         let [Target::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
         };
-        match self.entry(*part) {
+        match self.entries.value_at(*part) {
             Some(value) => (part.numbers(value).into_iter())
                 .map(|part| Keys(vec![Target::Entry(part)]))
                 .collect(),
