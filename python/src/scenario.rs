@@ -67,7 +67,7 @@ impl Source {
             // They are kept for more replacements.
             _ => self.entries.get_or_init(read).as_ref().map(check),
         };
-        if let Some(Ok(found)) = direct.as_ref().map(check) {
+        if let Some(Ok(found)) = direct {
             return Ok(found);
         }
         let found = Entries::of_text(self.text(), &self.file).and_then(|all| check(&all));
