@@ -4,7 +4,6 @@
 //! otherwise crash the process. The estimates are the largest amounts measured in whole
 //! runs of the program, files and figures included.
 
-use std::fmt;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -68,164 +67,97 @@ fn group_limit(root: &Path, groups: &str) -> Option<u64> {
     limits.filter_map(|file| bytes(&file)).min()
 }
 
-/// A request that needs memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// A leaf on a grid.
-    Grid {
-        /// Rods.
-        rods: usize,
-        /// Segments a rod.
-        segments: usize,
-    },
-    /// Branches of equilibria on a grid, which is refined twice.
-    Branches {
-        /// Rods.
-        rods: usize,
-        /// Segments a rod.
-        segments: usize,
-    },
-    /// The matrices of a shooting method.
-    Shooting {
-        /// Rods.
-        rods: usize,
-        /// Intervals.
-        intervals: usize,
-    },
-    /// A result at stations that are asked for.
-    Stations {
-        /// Rods.
-        rods: usize,
-        /// Stations of each, but for its base.
-        stations: usize,
-    },
-    /// The rows of a map.
-    Map {
-        /// Cells.
-        cells: usize,
-        /// Methods in each.
-        methods: usize,
-    },
-    /// A scenario as text.
-    Scenario {
-        /// Its length.
-        bytes: usize,
-        /// What it takes when parsed.
-        parsed: u64,
-    },
-}
+/// A request that would take more memory than it may: what it is, and what to request in its place.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}, or raise the limit on memory")]
+pub struct TooMuch(String);
 
-impl Request {
-    /// An estimate of the bytes it takes at most.
-    pub fn bytes(self) -> u64 {
-        let product = |factors: [usize; 3], each: u64| {
-            let factors = factors.into_iter().map(|factor| factor as u64);
-            factors.fold(each, u64::saturating_mul)
-        };
-        match self {
-            // Measured: 1750 for one rod of many segments and 2700 for many rods of few; 5600 for
-            // one rod with eigenvalues, which take up to 52 fields.
-            Request::Grid { rods, segments } => {
-                product([rods, segments.saturating_add(1), 1], 6_000)
-            }
-            Request::Branches { rods, segments } => product([rods, segments, 1], 27_000),
-            // Measured: five matrices of (12 N)^2 numbers per interval.
-            Request::Shooting { rods, intervals } => {
-                product([rods, rods, intervals.saturating_add(1)], 5 * 144 * 8)
-            }
-            // Measured: 580 for tables, 700 with those of modes, however many; 920 for a page, 1240
-            // for that of a motion.
-            Request::Stations { rods, stations } => {
-                product([rods, stations.saturating_add(1), 1], 1_250)
-            }
-            Request::Map { cells, methods } => product([cells, methods, 1], 1_000),
-            Request::Scenario { parsed, .. } => parsed,
-        }
-    }
-
-    /// The request to parse this text. What tables and keys take is counted; from 39 to 660
-    /// bytes a byte are measured, 72 of long lists.
-    pub fn text(text: &[u8]) -> Request {
-        let each = |byte: &u8| match byte {
-            b',' => 260,
-            b'[' => 360,
-            b'{' => 960,
-            b'=' | b':' => 1_560,
-            _ => 60,
-        };
-        let within = |byte: &u8| byte.is_ascii_alphanumeric() || b"_-+.".contains(byte);
-        let words = text.split(|byte| !within(byte));
-        // Every part of a dotted key is a table.
-        let dots = words.map(
-            |word| match word.iter().filter(|byte| **byte == b'.').count() {
-                1 if str::from_utf8(word).is_ok_and(|word| word.parse::<f64>().is_ok()) => 0,
-                dots => dots as u64,
-            },
-        );
-        let parsed = text.iter().map(each).sum::<u64>() + 1_400 * dots.sum::<u64>();
-        Request::Scenario {
-            bytes: text.len(),
-            parsed,
-        }
-    }
-
-    /// Checks that it takes no more than is [`allowed`].
-    pub fn weigh(self) -> Result<(), TooMuch> {
-        let (needed, allowed) = (self.bytes(), allowed());
-        match needed > allowed {
-            true => Err(TooMuch {
-                request: self,
-                allowed,
-            }),
-            false => Ok(()),
-        }
+/// Refuses what takes this product of numbers, in bytes, if that is more than is [`allowed`].
+fn check(factors: &[usize], instead: &str, what: impl FnOnce() -> String) -> Result<(), TooMuch> {
+    let factors = factors.iter().map(|&factor| factor as u64);
+    let (needed, allowed) = (factors.fold(1, u64::saturating_mul), allowed());
+    match needed > allowed {
+        true => Err(TooMuch(format!(
+            "{} would take about {} of memory, and {} are allowed: {instead}",
+            what(),
+            size(needed),
+            size(allowed)
+        ))),
+        false => Ok(()),
     }
 }
 
-/// A request that would take more memory than it may.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{request} would take about {} of memory, and {} are allowed: {}, or raise the limit on memory",
-    size(.request.bytes()), size(*.allowed), .request.instead()
-)]
-pub struct TooMuch {
-    /// The request.
-    pub request: Request,
-    /// Bytes it may take.
-    pub allowed: u64,
+const SMALLER_GRID: &str = "use fewer rods or segments";
+
+/// A leaf on a grid.
+pub(crate) fn grid(rods: usize, segments: usize) -> Result<(), TooMuch> {
+    // Measured: 1750 for one rod of many segments and 2700 for many rods of few; 5600 for
+    // one rod with eigenvalues, which take up to 52 fields.
+    let nodes = segments.saturating_add(1);
+    check(&[rods, nodes, 6_000], SMALLER_GRID, || {
+        format!("{rods} rods of {segments} segments")
+    })
 }
 
-impl Request {
-    fn instead(self) -> &'static str {
-        match self {
-            Request::Grid { .. } | Request::Branches { .. } => "use fewer rods or segments",
-            Request::Shooting { .. } => {
-                "use fewer rods or intervals, or the method semi-implicit, which has no such matrices"
-            }
-            Request::Stations { .. } => "ask for fewer stations",
-            Request::Map { .. } => "lower the counts of the axes",
-            Request::Scenario { .. } => "write fewer entries",
-        }
-    }
+/// Branches of equilibria on a grid, which is refined twice.
+pub(crate) fn branches(rods: usize, segments: usize) -> Result<(), TooMuch> {
+    check(&[rods, segments, 27_000], SMALLER_GRID, || {
+        format!("branches of {rods} rods of {segments} segments")
+    })
 }
 
-impl fmt::Display for Request {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Request::Grid { rods, segments } => write!(f, "{rods} rods of {segments} segments"),
-            Request::Branches { rods, segments } => {
-                write!(f, "branches of {rods} rods of {segments} segments")
-            }
-            Request::Shooting { rods, intervals } => {
-                write!(f, "shooting with {rods} rods, intervals: {intervals},")
-            }
-            Request::Stations { rods, stations } => {
-                write!(f, "{rods} rods with {stations} stations")
-            }
-            Request::Map { cells, methods } => write!(f, "{cells} cells by {methods} methods"),
-            Request::Scenario { bytes, .. } => write!(f, "a scenario of {bytes} bytes"),
-        }
-    }
+/// The matrices of a shooting method.
+pub(crate) fn shooting(rods: usize, intervals: usize) -> Result<(), TooMuch> {
+    // Measured: five matrices of (12 N)^2 numbers per interval.
+    let matrices = [rods, rods, intervals.saturating_add(1), 5 * 144 * 8];
+    let instead =
+        "use fewer rods or intervals, or the method semi-implicit, which has no such matrices";
+    check(&matrices, instead, || {
+        format!("shooting with {rods} rods, intervals: {intervals},")
+    })
+}
+
+/// A result at `stations` of each rod, besides its base, that are asked for.
+pub(crate) fn stations(rods: usize, stations: usize) -> Result<(), TooMuch> {
+    // Measured: 580 for tables, 700 with those of modes, however many; 920 for a page, 1240
+    // for that of a motion.
+    let nodes = stations.saturating_add(1);
+    check(&[rods, nodes, 1_250], "ask for fewer stations", || {
+        format!("{rods} rods with {stations} stations")
+    })
+}
+
+/// The rows of a map.
+pub(crate) fn map(cells: usize, methods: usize) -> Result<(), TooMuch> {
+    let instead = "lower the counts of the axes";
+    check(&[cells, methods, 1_000], instead, || {
+        format!("{cells} cells by {methods} methods")
+    })
+}
+
+/// A scenario as text, which is to be parsed. What tables and keys take is counted; from 39 to 660
+/// bytes a byte are measured, 72 of long lists.
+pub(crate) fn text(text: &[u8]) -> Result<(), TooMuch> {
+    let each = |byte: &u8| match byte {
+        b',' => 260,
+        b'[' => 360,
+        b'{' => 960,
+        b'=' | b':' => 1_560,
+        _ => 60,
+    };
+    let within = |byte: &u8| byte.is_ascii_alphanumeric() || b"_-+.".contains(byte);
+    let words = text.split(|byte| !within(byte));
+    // Every part of a dotted key is a table.
+    let dots = words.map(
+        |word| match word.iter().filter(|byte| **byte == b'.').count() {
+            1 if str::from_utf8(word).is_ok_and(|word| word.parse::<f64>().is_ok()) => 0,
+            dots => dots,
+        },
+    );
+    let parsed = text.iter().map(each).sum::<usize>() + 1_400 * dots.sum::<usize>();
+    check(&[parsed], "write fewer entries", || {
+        format!("a scenario of {} bytes", text.len())
+    })
 }
 
 const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
@@ -279,8 +211,8 @@ mod tests {
         }
         assert_eq!(size(5_700_000_000), "5.7 GB");
         assert_eq!(size(12), "12 bytes");
-        let [rods, segments] = [usize::MAX; 2];
-        assert_eq!(Request::Grid { rods, segments }.bytes(), u64::MAX);
+        let most = grid(usize::MAX, usize::MAX).unwrap_err();
+        assert!(most.0.contains(&size(u64::MAX)), "{most}");
     }
 
     #[test]

@@ -51,20 +51,12 @@ impl Document {
 
     /// Its entries; `None` if a key is unknown: parsing the text gives the reason.
     pub fn entries(&self) -> Option<Entries> {
-        let mut entries = Entries::default();
-        let top = self.top.iter().map(|entry| ("", entry));
         let tables = self.tables.iter();
-        let inner =
-            tables.flat_map(|(table, entries)| entries.iter().map(|it| (table.as_str(), it)));
-        for (table, (name, value)) in top.chain(inner) {
-            if !entries.insert(table, name, value.clone()) {
-                return None;
-            }
-        }
-        let mut tables = self.tables.iter();
-        tables
-            .all(|(table, _)| Entries::has_table(table))
-            .then_some(entries)
+        let tables = tables.map(|(key, table)| {
+            let table = table.iter().cloned().collect();
+            (key.clone(), Value::Table(table))
+        });
+        Entries::of_table(self.top.iter().cloned().chain(tables).collect()).ok()
     }
 
     /// Its text: first the entries outside of tables, then the tables, one entry per line.

@@ -26,7 +26,7 @@ struct Source {
     /// The text; that of a dictionary is made on demand.
     text: OnceLock<String>,
     file: String,
-    /// Its entries, made when some are replaced; `None` if they cannot be parsed.
+    /// Its entries, made when some are replaced; `None` if they cannot be read.
     entries: OnceLock<Option<Entries>>,
 }
 
@@ -47,33 +47,9 @@ impl Source {
         })
     }
 
-    fn entries(&self) -> Option<&Entries> {
-        let read = || match &self.document {
-            Some(document) => document.entries(),
-            None => Entries::of_text(self.text()),
-        };
-        self.entries.get_or_init(read).as_ref()
-    }
-
-    /// The checked scenario, without parsing the text where possible; if it is refused the
-    /// text is parsed for the reason. If it is `known`, all its keys have been checked.
-    fn checked(
-        &self,
-        py: Python,
-        overrides: &[String],
-        known: bool,
-    ) -> PyResult<scenario::Scenario> {
-        let direct = match (overrides, &self.document) {
-            ([], Some(document)) => document.entries().and_then(|all| all.scenario()),
-            ([_, ..], document) if known || document.is_some() => {
-                let replaced = self.entries().and_then(|all| all.replaced(overrides));
-                replaced.and_then(|all| all.scenario())
-            }
-            _ => None,
-        };
-        if let Some(found) = direct {
-            return Ok(found);
-        }
+    /// The checked scenario. A dictionary becomes a text where it is refused, so that the reason has
+    /// a line.
+    fn checked(&self, py: Python, overrides: &[String]) -> PyResult<scenario::Scenario> {
         // Settings of methods are not entries of the scenario, but are kept with it.
         let of_method = |entry: &String| entry.trim_start().starts_with("method.");
         if overrides.iter().any(of_method) {
@@ -81,7 +57,20 @@ impl Source {
             let base = base.map_err(|error| vary_error(py, error))?;
             return Ok(base.scenario().clone());
         }
-        let found = scenario::Scenario::from_toml_with(self.text(), &self.file, overrides);
+        let check = |entries: &Entries| entries.replaced(overrides)?.check();
+        let read = || match &self.document {
+            Some(document) => document.entries(),
+            None => Entries::of_text(self.text(), &self.file).ok(),
+        };
+        let direct = match overrides {
+            [] => read().as_ref().map(check),
+            // They are kept for more replacements.
+            _ => self.entries.get_or_init(read).as_ref().map(check),
+        };
+        if let Some(Ok(found)) = direct {
+            return Ok(found);
+        }
+        let found = Entries::of_text(self.text(), &self.file).and_then(|all| check(&all));
         found.map_err(|error| scenario_error(py, &error))
     }
 }
@@ -98,7 +87,7 @@ impl Scenario {
         file: Option<String>,
     ) -> PyResult<Self> {
         let file = file.unwrap_or_else(|| TEXT.into());
-        Scenario::of(py, Source::of_text(text, file).into(), overrides, false)
+        Scenario::of(py, Source::of_text(text, file).into(), overrides)
     }
 
     /// A scenario from a file.
@@ -117,13 +106,13 @@ impl Scenario {
             file: TEXT.into(),
             entries: OnceLock::new(),
         };
-        Scenario::of(py, source.into(), overrides, false)
+        Scenario::of(py, source.into(), overrides)
     }
 
     /// The same with more entries replaced.
     fn replaced(&self, py: Python, overrides: Vec<String>) -> PyResult<Self> {
         let overrides = [self.overrides.clone(), overrides].concat();
-        Scenario::of(py, self.source.clone(), overrides, true)
+        Scenario::of(py, self.source.clone(), overrides)
     }
 
     #[getter]
@@ -169,8 +158,8 @@ impl Scenario {
 }
 
 impl Scenario {
-    fn of(py: Python, source: Arc<Source>, overrides: Vec<String>, known: bool) -> PyResult<Self> {
-        let checked = source.checked(py, &overrides, known)?;
+    fn of(py: Python, source: Arc<Source>, overrides: Vec<String>) -> PyResult<Self> {
+        let checked = source.checked(py, &overrides)?;
         Ok(Scenario {
             source,
             overrides,

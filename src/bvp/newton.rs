@@ -14,7 +14,7 @@ use super::intervals::{
 use super::march::March;
 use super::solution::{Correction, Log, Neutral, Reason};
 use super::trajectory::{Nodes, Trajectory};
-use crate::memory::Request;
+use crate::memory;
 use crate::shape::equally_spaced;
 use glam::DVec3;
 
@@ -100,8 +100,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             }
             None => choose_intervals(equations, near)?,
         };
-        let (rods, intervals) = (equations.rods(), nodes.states.len());
-        Request::Shooting { rods, intervals }.weigh()?;
+        memory::shooting(equations.rods(), nodes.states.len())?;
         let first = &mut nodes.states[0];
         for j in 0..equations.rods() {
             let rod = RodState::read(first, j);

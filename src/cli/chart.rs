@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::kit::*;
 use super::relax::possible_value;
 use crate::report::words::contender;
-use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
+use crate::study::{self, Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
 use crate::{files, relax};
 
 /// Measure every method over its own accuracy, and chart time against true error.
@@ -50,11 +50,10 @@ impl Chart {
             let why = "a chart runs over all tolerances; it is that of --rods";
             return Err(format!("--tolerance: {why}").into());
         }
-        let leaves = self
-            .rods
-            .iter()
-            .map(|rods| job.with(&format!("leaf.rods={rods}")));
-        let leaves = leaves.collect::<Result<Vec<_>, _>>()?;
+        let rods: Keys = "leaf.rods".parse()?;
+        let leaf = |&count: &usize| Ok(job.base.at(&[(&rods, count as f64)])?.scenario);
+        let leaves: Result<Vec<_>, VaryError> = self.rods.iter().map(leaf).collect();
+        let leaves = leaves?;
         let mut options = ChartOptions {
             seconds: self.seconds,
             ..ChartOptions::default()

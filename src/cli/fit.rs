@@ -50,7 +50,7 @@ impl Fit {
     }
 
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
-        let base = job.base()?;
+        let base = job.base.clone();
         let mut data = Data::default();
         let rods = base.scenario().rods.len();
         for file in &self.data {

@@ -17,10 +17,10 @@ use super::{Refusal, Status, note};
 pub struct Job<'r> {
     pub(super) request: &'r Request,
     pub scenario: Scenario,
-    pub(super) base: Option<Base>,
+    /// The same, as a base for varied numbers.
+    pub base: Base,
     pub folder: PathBuf,
     pub selection: Selection,
-    pub(super) text: String,
     pub(super) file: String,
     pub(super) source: String,
     /// Whether several run in parallel.
@@ -42,20 +42,6 @@ pub struct Delivered {
 }
 
 impl Job<'_> {
-    /// The scenario as a base for varied numbers.
-    pub fn base(&self) -> Result<Base, Refusal> {
-        let base = self.base.clone();
-        base.ok_or_else(|| "this verb does not vary its scenario".into())
-    }
-
-    /// The scenario with one more entry overridden.
-    pub fn with(&self, entry: &str) -> Result<Scenario, Refusal> {
-        let overrides = [self.request.overrides.as_slice(), &[entry.into()]].concat();
-        Ok(Scenario::from_toml_with(
-            &self.text, &self.file, &overrides,
-        )?)
-    }
-
     /// Its progress line; hidden if scenarios run in parallel, which share one.
     pub fn progress(&self) -> ProgressLine {
         ProgressLine::new(&self.scenario.name, !self.parallel)

@@ -91,7 +91,7 @@ impl Map {
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let folder = &job.folder;
         let request = MapRequest::new(
-            job.base()?,
+            job.base.clone(),
             self.vary.clone(),
             self.methods.clone(),
             self.request.tolerance,
@@ -196,9 +196,8 @@ impl Map {
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
-            line.show(|time| {
-                let time = time_left(time, fraction_of(finished, cells));
-                format!("{finished} of {cells} cells, {time}")
+            line.update(fraction_of(finished, cells), || {
+                format!("{finished} of {cells} cells")
             });
             failed.is_none()
         });

@@ -28,9 +28,7 @@ use crate::scenario::printable;
 
 /// What verbs are made of.
 mod kit {
-    pub(super) use super::progress::{
-        ProgressLine, duration, fraction_between, fraction_of, time_left,
-    };
+    pub(super) use super::progress::{ProgressLine, duration, fraction_between, fraction_of};
     pub(super) use super::request::{Delivered, Job, Request, VerbTraits, words};
     pub(super) use super::{Refusal, Status};
     pub(super) use clap::{Args, ValueHint};

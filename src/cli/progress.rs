@@ -62,20 +62,6 @@ impl ProgressLine {
     /// Shows a message with the elapsed time and, if the completed fraction of the phase is
     /// known, the remaining time.
     pub fn update(&mut self, fraction: Option<f64>, message: impl FnOnce() -> String) {
-        let phase_start = self.phase_start;
-        self.show(|elapsed| {
-            let left = remaining(elapsed.saturating_sub(phase_start), fraction);
-            format!("{}, {:.0} s{left}", message(), elapsed.as_secs_f64())
-        });
-    }
-
-    /// Begins another phase: fractions refer to it from now on.
-    pub fn next_phase(&mut self) {
-        self.phase_start = self.start.elapsed();
-    }
-
-    /// Shows a message made from the elapsed time.
-    pub fn show(&mut self, message: impl FnOnce(Duration) -> String) {
         let elapsed = self.start.elapsed();
         if !self.shown || elapsed < LONG_RUN {
             return;
@@ -87,15 +73,15 @@ impl ProgressLine {
                 .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
                 .with_prefix(self.scenario.clone())
         });
-        bar.set_message(message(elapsed));
+        let left = remaining(elapsed.saturating_sub(self.phase_start), fraction);
+        let (message, elapsed) = (message(), elapsed.as_secs_f64());
+        bar.set_message(format!("{message}, {elapsed:.0} s{left}"));
     }
-}
 
-/// The elapsed time of a run and an estimate of the remaining time, given the completed
-/// fraction.
-pub fn time_left(elapsed: Duration, fraction: Option<f64>) -> String {
-    let left = remaining(elapsed, fraction);
-    format!("{:.0} s{left}", elapsed.as_secs_f64())
+    /// Begins another phase: fractions refer to it from now on.
+    pub fn next_phase(&mut self) {
+        self.phase_start = self.start.elapsed();
+    }
 }
 
 /// An estimate of the remaining time, to follow the elapsed time; empty if unknown.
@@ -211,19 +197,19 @@ mod tests {
     use super::*;
 
     fn after_10_s(fraction: Option<f64>) -> String {
-        time_left(Duration::from_secs(10), fraction)
+        remaining(Duration::from_secs(10), fraction)
     }
 
     #[test]
     fn the_remaining_time_is_shown_where_it_is_known() {
-        assert_eq!(after_10_s(Some(0.25)), "10 s, 30 s left");
-        assert_eq!(after_10_s(Some(1.0)), "10 s, 0 s left");
-        assert_eq!(after_10_s(Some(0.001)), "10 s, 3 h left");
+        assert_eq!(after_10_s(Some(0.25)), ", 30 s left");
+        assert_eq!(after_10_s(Some(1.0)), ", 0 s left");
+        assert_eq!(after_10_s(Some(0.001)), ", 3 h left");
         for unknown in [None, Some(0.0), Some(-0.1), Some(1.5), Some(f64::NAN)] {
-            assert_eq!(after_10_s(unknown), "10 s");
+            assert_eq!(after_10_s(unknown), "");
         }
-        assert_eq!(after_10_s(fraction_of(3, 4)), "10 s, 4 s left");
-        assert_eq!(after_10_s(fraction_of(0, 0)), "10 s");
+        assert_eq!(after_10_s(fraction_of(3, 4)), ", 4 s left");
+        assert_eq!(after_10_s(fraction_of(0, 0)), "");
     }
 
     #[test]

@@ -140,8 +140,8 @@ impl Relax {
         let mut line = job.progress();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         if !self.sensitivity.is_empty() {
-            let (base, keys) = (job.base()?, &self.sensitivity);
-            let found = study::relax_with_sensitivities(&base, keys, &options, &mut |progress| {
+            let (base, keys) = (&job.base, &self.sensitivity);
+            let found = study::relax_with_sensitivities(base, keys, &options, &mut |progress| {
                 line.update_solver(progress, tolerance);
             });
             return found.map_err(|error| match error {

@@ -16,12 +16,12 @@ use crate::files::{self, Kind, Selection, Written};
 use crate::memory;
 use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
-use crate::scenario::Scenario;
+use crate::scenario::Entries;
 use crate::study::Base;
 use crate::words::UnknownWord;
 
 pub use super::job::{Delivered, Job};
-use super::progress::{ProgressLine, fraction_of, time_left};
+use super::progress::{ProgressLine, fraction_of};
 use super::{Refusal, Status, name_options, note, refuse, show, show_report};
 
 /// What every verb is asked.
@@ -144,10 +144,7 @@ impl Request {
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
                 let all = self.scenarios.len();
-                line.show(|time| {
-                    let time = time_left(time, fraction_of(count, all));
-                    format!("{count} of {all}, {time}")
-                });
+                line.update(fraction_of(count, all), || format!("{count} of {all}"));
             }
             done
         };
@@ -270,23 +267,21 @@ impl Request {
             Some("-") => ("standard input".into(), standard_input()?),
             _ => (path.display().to_string(), crate::scenario::text(path)?),
         };
-        let base = match traits.varies {
-            true => Some(Base::of_text(text.clone(), file.clone(), &self.overrides)?),
-            false => None,
-        };
-        let scenario = match &base {
-            Some(base) => base.scenario().clone(),
-            None => Scenario::from_toml_with(&text, &file, &self.overrides)?,
-        };
+        let base = Base::new(
+            &Entries::of_text(&text, &file)?,
+            &self.overrides,
+            traits.varies,
+        )?;
+        let scenario = base.scenario().clone();
         if let Some(stations) = selection.stations {
-            let rods = scenario.rods.len();
-            memory::Request::Stations { rods, stations }.weigh()?;
+            memory::stations(scenario.rods.len(), stations)?;
         }
         let folder = match &self.out {
             Some(out) if self.single() => out.clone(),
             out => {
+                // Names of scenarios are names of folders.
                 let out = out.as_deref().unwrap_or(Path::new("out"));
-                out.join(folder_name(&scenario.name))
+                out.join(&scenario.name)
             }
         };
         let source = match path.to_str() {
@@ -310,7 +305,6 @@ impl Request {
             base,
             folder,
             selection: selection.clone(),
-            text,
             file,
             source,
             parallel: traits.parallel && !self.single(),
@@ -330,40 +324,4 @@ fn standard_input() -> Result<String, Refusal> {
         .take(crate::scenario::MOST_BYTES + 1)
         .read_to_end(&mut bytes)?;
     Ok(crate::scenario::utf8(bytes, "standard input")?)
-}
-
-/// The scenario's name as the name of a single folder, whatever characters it has.
-fn folder_name(name: &str) -> String {
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.+ ".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
-    let folder: String = name.trim().chars().map(plain).collect();
-    match folder.as_str() {
-        "" => "leaf".into(),
-        _ if folder.starts_with('.') => folder.replacen('.', "_", 1),
-        _ => folder,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn folders_stay_below_out() {
-        for (name, folder) in [
-            ("fig04", "fig04"),
-            ("../../etc", "_._.._etc"),
-            ("..", "_."),
-            ("a/b", "a_b"),
-            ("", "leaf"),
-            ("Blatt 3, süß", "Blatt 3_ süß"),
-        ] {
-            assert_eq!(folder_name(name), folder);
-        }
-    }
 }

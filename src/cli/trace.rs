@@ -75,9 +75,9 @@ impl Trace {
         }
     }
 
-    fn trace_request(&self, job: &Job, vary: &Vary) -> Result<TraceRequest, Refusal> {
-        Ok(TraceRequest {
-            base: job.base()?,
+    fn trace_request(&self, job: &Job, vary: &Vary) -> TraceRequest {
+        TraceRequest {
+            base: job.base.clone(),
             vary: vary.clone(),
             switch: self.switch,
             keep_unstable: self.keep_unstable,
@@ -85,12 +85,12 @@ impl Trace {
             tolerance: self.request.tolerance,
             most_points: self.points,
             cross_section: self.cross_section,
-        })
+        }
     }
 
     fn boundary(&self, job: &Job, along: &Vary, across: &Vary) -> Result<Delivered, Refusal> {
         let request = BoundaryRequest {
-            trace: self.trace_request(job, along)?,
+            trace: self.trace_request(job, along),
             across: across.clone(),
             map: self.map,
         };
@@ -124,7 +124,7 @@ impl Trace {
     }
 
     fn one(&self, job: &Job, vary: &Vary) -> Result<Delivered, Refusal> {
-        let request = self.trace_request(job, vary)?;
+        let request = self.trace_request(job, vary);
         let free = request.base.scenario().held_tip.is_none();
         if let Some(show) = self.show.iter().find(|show| free && show.is_reaction()) {
             return Err(

@@ -1,7 +1,7 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
 use crate::leaf::{Grid, State};
-use crate::memory::Request;
+use crate::memory;
 use crate::newton::Stop;
 use crate::relax::level::{Level, positions};
 use crate::relax::options::MAX_NODES;
@@ -79,7 +79,7 @@ impl Run<'_, '_> {
         let allowed = self.segments().is_none()
             && segments <= FINEST
             && rods * segments <= MAX_NODES
-            && (Request::Grid { rods, segments }).weigh().is_ok()
+            && memory::grid(rods, segments).is_ok()
             && !self.beyond_rounding(segments);
         allowed.then_some(grid)
     }

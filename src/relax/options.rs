@@ -104,7 +104,7 @@ pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
 }
 
 /// A request that cannot be met.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RelaxError {
     /// The tolerance is out of range.
     #[error(
@@ -139,7 +139,7 @@ pub enum RelaxError {
     },
     /// Too much memory.
     #[error(transparent)]
-    Memory(TooMuch),
+    Memory(#[from] TooMuch),
     /// The explicit method has no stable time step for rigid rods.
     #[error(
         "method = explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"

@@ -1,7 +1,7 @@
 //! Segments of the coarsest grid, as requested or as needed.
 
 use crate::leaf::Leaf;
-use crate::memory::Request;
+use crate::memory;
 use crate::relax::method::Method;
 use crate::relax::methods::moment;
 use crate::relax::options::{MAX_NODES, RelaxError};
@@ -63,7 +63,7 @@ pub fn check_segments(
             nodes,
         });
     }
-    (Request::Grid { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+    memory::grid(rods, segments)?;
     Ok(segments)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
-use crate::memory::Request;
+use crate::memory;
 use crate::newton::{Stop, Work};
 use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
@@ -34,8 +34,7 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     if let Some(stations) = options.stations {
-        let rods = scenario.rods.len();
-        (Request::Stations { rods, stations }.weigh()).map_err(RelaxError::Memory)?;
+        memory::stations(scenario.rods.len(), stations)?;
     }
     let found = relax_once(scenario, options, progress)?;
     let Some(parts) = options.stations else {

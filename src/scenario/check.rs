@@ -2,14 +2,16 @@
 //! Limits on combinations of values are in `limits`.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::dynamics::{OUTPUTS, round_inertia};
-use super::entries::MOST_RODS;
+use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
+use super::item::Item;
 use super::key::Key;
-use super::material::Sections;
-use super::raw::{Item, Raw};
-use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
+use super::material;
+use super::section::{Property, Section};
+use super::{Dynamics, Profile, Radii, Rod, Scenario, Start, Units, limits, tip};
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
@@ -20,44 +22,48 @@ const TOLERANCE_LEAST: f64 = 1e-12;
 /// An error of a tenth of the length is no accuracy.
 const TOLERANCE_MOST: f64 = 0.1;
 
-pub(super) fn check(raw: &Raw) -> Result<Scenario> {
-    let name = name(raw.item(Key::Name)?)?;
-    let units = Units {
-        length: raw.given(Key::UnitLength).map(unit).transpose()?,
-        force: raw.given(Key::UnitForce).map(unit).transpose()?,
-    };
-    let rods = raw.item(Key::Rods)?.whole(MOST_RODS)?;
-    let sections = Sections::read(raw, rods)?;
-    let rods = veins(raw, rods, sections.as_ref())?;
-    let joined = raw.item(Key::Joined)?.switch()?;
-    let coupling = coupling(raw, rods.len() - 1)?;
-    let gravity = raw.item(Key::Gravity)?.vector()?;
-    let tip_force = raw.item(Key::TipForce)?.vector()?;
-    let item = raw.item(Key::TipMoment)?;
-    let tip_moment = item.vector()?;
-    on_one_rod(item, rods.len(), &[tip_moment])?;
-    let held_tip = tip::held(raw, &rods, joined)?;
-    let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
-    let loads = [gravity, tip_force, tip_moment];
-    let dynamics = dynamics(raw, &rods, sections.as_ref(), loads)?;
-    let scenario = Scenario {
-        name,
-        units,
-        rods,
-        radii: sections
-            .map(|sections| sections.radii())
-            .unwrap_or_default(),
-        joined,
-        coupling,
-        gravity,
-        tip_force,
-        tip_moment,
-        held_tip,
-        tolerance,
-        dynamics,
-    };
-    limits::check(raw, &scenario)?;
-    Ok(scenario)
+impl Entries {
+    /// The checked scenario.
+    ///
+    /// # Errors
+    /// If an entry that is needed is missing, or a value is not allowed.
+    pub fn check(&self) -> Result<Scenario> {
+        let name = name(self.item(Key::Name)?)?;
+        let units = Units {
+            length: self.given(Key::UnitLength).map(unit).transpose()?,
+            force: self.given(Key::UnitForce).map(unit).transpose()?,
+        };
+        let rods = self.item(Key::Rods)?.whole(MOST_RODS)?;
+        let sections = material::sections(self, rods)?;
+        let rods = veins(self, rods, sections.as_deref())?;
+        let joined = self.item(Key::Joined)?.switch()?;
+        let coupling = coupling(self, rods.len() - 1)?;
+        let gravity = self.item(Key::Gravity)?.vector()?;
+        let tip_force = self.item(Key::TipForce)?.vector()?;
+        let item = self.item(Key::TipMoment)?;
+        let tip_moment = item.vector()?;
+        on_one_rod(item, rods.len(), &[tip_moment])?;
+        let held_tip = tip::held(self, &rods, joined)?;
+        let tolerance = tolerance(self.item(Key::Tolerance)?)?;
+        let loads = [gravity, tip_force, tip_moment];
+        let dynamics = dynamics(self, &rods, sections.as_deref(), loads)?;
+        let scenario = Scenario {
+            name,
+            units,
+            rods,
+            radii: sections.map(Radii::of).unwrap_or_default(),
+            joined,
+            coupling,
+            gravity,
+            tip_force,
+            tip_moment,
+            held_tip,
+            tolerance,
+            dynamics,
+        };
+        limits::check(self, &scenario)?;
+        Ok(scenario)
+    }
 }
 
 fn name(item: Item) -> Result<String> {
@@ -84,16 +90,21 @@ fn unit(item: Item) -> Result<String> {
     Ok(unit.trim().to_string())
 }
 
-fn veins(raw: &Raw, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>> {
-    let length = raw.item(Key::Length)?.one_each(rods)?;
-    let angle = angles(raw.item(Key::Fan)?, rods)?;
-    let quantity = |key| raw.item(key)?.quantity(rods);
+fn veins(entries: &Entries, rods: usize, sections: Option<&[Arc<Section>]>) -> Result<Vec<Rod>> {
+    let length = entries.item(Key::Length)?.one_each(rods)?;
+    let angle = angles(entries.item(Key::Fan)?, rods)?;
+    let quantity = |key| entries.item(key)?.quantity(rods);
     let triple = |[first, second, third]: [Key; 3]| -> Result<[Vec<Profile>; 3]> {
         Ok([quantity(first)?, quantity(second)?, quantity(third)?])
     };
     let stretch = quantity(Key::RestStretch)?;
     let (couple, force) = match sections {
-        Some(sections) => (sections.couple(), sections.force()),
+        Some(sections) => {
+            let of = |kind: fn(usize) -> Property| {
+                [0, 1, 2].map(|axis| material::profiles(sections, kind(axis)))
+            };
+            (of(Property::Couple), of(Property::Force))
+        }
         None => (triple(Key::COUPLE)?, triple(Key::FORCE)?),
     };
     let rest = triple(Key::REST)?;
@@ -119,20 +130,20 @@ fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
             .map(|n| step * (2.0 * n as f64 - odd - rods as f64))
             .collect()
     };
-    match item.node().text() {
+    match item.value.as_str() {
         Some("paper") => Ok(fan(0.0)),
         Some("symmetric") => Ok(fan(1.0)),
-        None if item.node().length().is_some() => item.one_each(rods),
+        None if item.value.is_array() => item.one_each(rods),
         _ => Err(item.refuse(format_args!(
             "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
         ))),
     }
 }
 
-fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
+fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
     for (axis, key) in Key::COUPLING.into_iter().enumerate() {
-        let stiffness = raw.item(key)?.one_each(gaps)?;
+        let stiffness = entries.item(key)?.one_each(gaps)?;
         for (gap, stiffness) in coupling.iter_mut().zip(stiffness) {
             gap[axis] = stiffness;
         }
@@ -171,46 +182,47 @@ fn tolerance(item: Item) -> Result<f64> {
 
 /// The table `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
 fn dynamics(
-    raw: &Raw,
+    entries: &Entries,
     rods: &[Rod],
-    sections: Option<&Sections>,
+    sections: Option<&[Arc<Section>]>,
     loads: [[f64; 3]; 3],
 ) -> Result<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
-    let of_sections = sections.and_then(Sections::density);
-    let density = match raw.given(Key::Density) {
+    let sections = sections.filter(|_| entries.is_given(Key::MassDensity));
+    let of_sections = |property| sections.map(|all| material::profiles(all, property));
+    let density = match entries.given(Key::Density) {
         Some(item) => {
             let why = "section.mass_density is given, too: leave one of them out";
-            item.ensure(of_sections.is_none(), why)?;
+            item.ensure(sections.is_none(), why)?;
             Some(item.quantity(rods.len())?)
         }
-        None => of_sections,
+        None => of_sections(Property::Density),
     };
     let preset = match density {
         Some(density) => Dynamics::of_density(rods, density),
         None => Dynamics::default_for(rods),
     }
     .with_loads(gravity, tip_force, tip_moment);
-    let number = |key, default| raw.given(key).map_or(Ok(default), |item| item.number());
-    let load = |key, default| match raw.given(key) {
+    let number = |key, default| entries.given(key).map_or(Ok(default), |item| item.number());
+    let load = |key, default| match entries.given(key) {
         Some(item) => item.vectors_in_time(),
         None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
-    let section = rotary_inertia(raw, &preset.density)?;
-    let section = section.or_else(|| sections.and_then(Sections::rotary_inertia));
+    let section = rotary_inertia(entries, &preset.density)?;
+    let section = section.or_else(|| of_sections(Property::RotaryInertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
-    let internal_damping = raw.item(Key::InternalDamping)?.number()?;
-    let output_interval = match raw.given(Key::OutputInterval) {
+    let internal_damping = entries.item(Key::InternalDamping)?.number()?;
+    let output_interval = match entries.given(Key::OutputInterval) {
         Some(item) => output_interval(item, duration)?,
         None => duration / OUTPUTS,
     };
-    let clamped = clamped(raw.item(Key::Clamped)?, rods.len())?;
-    let start = start(raw.item(Key::Start)?, clamped)?;
+    let clamped = clamped(entries.item(Key::Clamped)?, rods.len())?;
+    let start = start(entries.item(Key::Start)?, clamped)?;
     let gravity = load(Key::GravityInTime, preset.gravity)?;
     let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
     let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
-    if let Some(item) = raw.given(Key::TipMomentInTime) {
+    if let Some(item) = entries.given(Key::TipMomentInTime) {
         on_one_rod(item, rods.len(), &tip_moment.value)?;
     }
     Ok(Dynamics {
@@ -225,7 +237,7 @@ fn dynamics(
         gravity,
         tip_force,
         tip_moment,
-        rest: match raw.given(Key::RestInTime) {
+        rest: match entries.given(Key::RestInTime) {
             Some(item) => item.factors_in_time()?,
             None => preset.rest,
         },
@@ -233,10 +245,13 @@ fn dynamics(
     })
 }
 
-fn rotary_inertia(raw: &Raw, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
+fn rotary_inertia(entries: &Entries, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
     let quantity = |item: Item| item.quantity(density.len());
-    let inertia = raw.given(Key::RotaryInertia).map(quantity).transpose()?;
-    let Some(item) = raw.given(Key::SectionRadius) else {
+    let inertia = entries
+        .given(Key::RotaryInertia)
+        .map(quantity)
+        .transpose()?;
+    let Some(item) = entries.given(Key::SectionRadius) else {
         return Ok(inertia);
     };
     item.ensure(
@@ -276,14 +291,13 @@ fn clamped(item: Item, rods: usize) -> Result<bool> {
 }
 
 fn start(item: Item, clamped: bool) -> Result<Start> {
-    match item.node().text() {
-        Some("released") => Ok(Start::Released),
-        Some("at-rest") if clamped => Ok(Start::AtRest),
-        Some("at-rest") => Err(item
-            .refuse("a rod with a free base has no equilibrium to start from: use \"released\"")),
-        _ => Err(item.refuse(
-            "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
-             (in equilibrium under the loads at time 0)",
-        )),
-    }
+    let start = item.word(
+        "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
+         (in equilibrium under the loads at time 0)",
+    )?;
+    item.ensure(
+        clamped || start == Start::Released,
+        "a rod with a free base has no equilibrium to start from: use \"released\"",
+    )?;
+    Ok(start)
 }

@@ -1,6 +1,7 @@
 //! The motion of a leaf: its mass, damping and duration, and loads that change in time.
 
 use super::{Profile, Rod, Scale, Schedule, ascending};
+use crate::words::words;
 
 /// Radius of the section over the length of the longest rod: half of it, the radius of
 /// gyration, is that of the relaxation.
@@ -12,14 +13,15 @@ const DURATION: f64 = 10.0;
 /// Outputs in that time.
 pub(super) const OUTPUTS: f64 = 100.0;
 
-/// Where a motion begins, at time 0 and without velocity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// In the shape from which a relaxation starts: arcs that meet in the tip,
-    /// or the rest shape of free rods.
-    Released,
-    /// In the equilibrium under the loads and with the rest shape of time 0.
-    AtRest,
+words! {
+    /// Where a motion begins, at time 0 and without velocity.
+    pub enum Start {
+        /// In the shape from which a relaxation starts: arcs that meet in the tip,
+        /// or the rest shape of free rods.
+        Released = "released",
+        /// In the equilibrium under the loads and with the rest shape of time 0.
+        AtRest = "at-rest",
+    }
 }
 
 /// How a leaf moves. All quantities are in the units of the scenario, with

@@ -1,17 +1,17 @@
 //! The entries of a scenario as values, and replacements of whole entries or parts of
 //! them ([`Part`]). A scenario with other numbers is made from these without parsing its
-//! text again.
+//! text again, which is only looked at for the places of errors.
 
 use std::sync::{Arc, LazyLock};
 
-use toml::{Table, Value};
+use toml::de::DeValue;
+use toml::{Spanned, Table, Value};
 
-use super::error::{Place, ScenarioError};
+use super::error::{Place, Result, ScenarioError};
 use super::excerpt::shorten;
-use super::form::from_json;
-use super::key::{Form, Key, LeftOut};
-use super::node::number;
+use super::key::{Form, Key, LeftOut, nearest};
 use super::part::Part;
+use super::source::{Source, not_toml, span_of, value_of};
 
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.
@@ -20,176 +20,183 @@ pub const MOST_RODS: usize = 100_000;
 /// The entries given in a scenario, by their keys.
 ///
 /// ```
-/// use leafdyn::scenario::{Entries, Value};
+/// use leafdyn::scenario::Entries;
 ///
-/// let mut entries = Entries::default();
-/// assert!(entries.insert("leaf", "rods", Value::Integer(1)));
-/// assert!(!entries.insert("leaf", "rod", Value::Integer(1)), "no key");
-/// assert!(entries.scenario().is_none(), "not all that is needed");
+/// let text = "name = 'rod'\nleaf = { rods = 1, length = 1.0, fan = [0.0] }";
+/// let entries = Entries::of_text(text, "rod.toml")?;
+/// assert!(entries.check().is_err(), "not all that is needed");
+/// assert!(entries.replaced(&["leaf.rod=2".into()]).is_err(), "no key");
+/// # Ok::<(), leafdyn::scenario::ScenarioError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Entries([Option<Arc<Value>>; Key::COUNT]);
-
-impl Default for Entries {
-    fn default() -> Self {
-        Entries([const { None }; Key::COUNT])
-    }
+pub struct Entries {
+    entries: [Option<Arc<Entry>>; Key::COUNT],
+    pub(super) source: Arc<Source>,
 }
 
-/// An override with the whole value of its key.
-pub(crate) struct Override {
-    pub given: String,
-    pub key: Key,
-    pub value: String,
-}
-
-/// Turns overrides of parts of entries of the scenario in `text` into overrides of whole
-/// entries. Errors in the text itself are found elsewhere.
-pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
-    let mut resolved: Vec<Override> = Vec::new();
-    let mut entries: Option<Entries> = None;
-    for given in overrides {
-        let refuse = |problem: String| {
-            let given = shorten(given);
-            ScenarioError {
-                place: Place::Set { given },
-                key: None,
-                problem,
-            }
-        };
-        let Some((path, value)) = given.split_once('=') else {
-            let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
-            return Err(refuse(problem.into()));
-        };
-        let part = Part::parse(path).map_err(refuse)?;
-        let whole = match part.is_whole() {
-            true => value.trim().to_string(),
-            false => {
-                let about = |why: String| ScenarioError {
-                    key: Some(part.key),
-                    ..refuse(format!("{part}: {why}"))
-                };
-                let entries = entries.get_or_insert_with(|| Entries::readable(text, &resolved));
-                let value = value.trim();
-                let new = value_of(value).ok_or(format!("{} is no value", shorten(value)));
-                let whole = new.and_then(|new| entries.changed(part, new));
-                whole.map_err(about)?.to_string()
-            }
-        };
-        if let (Some(entries), Some(value)) = (&mut entries, value_of(&whole)) {
-            entries.put(part.key, value);
-        }
-        resolved.push(Override {
-            given: given.clone(),
-            key: part.key,
-            value: whole,
-        });
-    }
-    Ok(resolved)
-}
-
-/// The scenario in `text` as TOML, with entries overridden.
-pub(crate) fn with_overrides(text: &str, overrides: &[String]) -> Option<String> {
-    let toml = from_json(text, "").and_then(Result::ok);
-    let text = toml.as_deref().unwrap_or(text);
-    let mut document = text.parse::<toml::Table>().ok()?;
-    for given in resolve(text, overrides).ok()? {
-        let value = value_of(&given.value)?;
-        match given.key.parts() {
-            ("", name) => document.insert(name.into(), value),
-            (table, name) => {
-                let empty = || Value::Table(toml::Table::new());
-                let table = document.entry(table).or_insert_with(empty);
-                table.as_table_mut()?.insert(name.into(), value)
-            }
-        };
-    }
-    Some(document.to_string())
+#[derive(Debug)]
+struct Entry {
+    value: Value,
+    /// The override `KEY=VALUE` that it is from; `None`: from the source.
+    given: Option<String>,
 }
 
 impl Entries {
-    /// Adds an entry of a table, whose name is empty for entries at the top; returns whether
-    /// there is such a key.
-    pub fn insert(&mut self, table: &str, name: &str, value: Value) -> bool {
-        let key = Key::from_parts(table, name);
-        if let Some(key) = key {
-            self.put(key, value);
+    /// The entries in a text, TOML or JSON; messages call it `file`.
+    ///
+    /// # Errors
+    /// If it cannot be parsed, or has an unknown key.
+    pub fn of_text(text: &str, file: &str) -> Result<Self> {
+        let (source, table) = Source::parse(text, file)?;
+        Entries::of(source, table)
+    }
+
+    /// The entries in a table of the same form, without a text.
+    ///
+    /// # Errors
+    /// If it has an unknown key.
+    pub fn of_table(table: Table) -> Result<Self> {
+        Entries::of(Source::default(), table)
+    }
+
+    fn of(source: Source, table: Table) -> Result<Self> {
+        let mut entries = Entries {
+            entries: [const { None }; Key::COUNT],
+            source: source.into(),
+        };
+        entries.add("", table)?;
+        Ok(entries)
+    }
+
+    /// Adds the entries of a table, whose name is empty at the top.
+    fn add(&mut self, name: &str, table: Table) -> Result<()> {
+        for (key, value) in table {
+            if let Some(known) = Key::from_parts(name, &key) {
+                self.put(known, value, None);
+                continue;
+            }
+            let inner = Key::table(&key).filter(|_| name.is_empty());
+            match (inner, value) {
+                (Some(inner), Value::Table(table)) => self.add(inner, table)?,
+                (Some(inner), value) => return Err(self.source.refuse_value(inner, &value)),
+                (None, _) => {
+                    let path = [name, &key].join(".");
+                    let path = path.trim_start_matches('.');
+                    let meant = nearest(path).map(|key| format!(" (did you mean {key}?)"));
+                    let (path, meant) = (shorten(path), meant.unwrap_or_default());
+                    let allowed = Key::allowed_in(name).join(", ");
+                    let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
+                    return Err(self.source.refuse_key((name, &key), problem));
+                }
+            }
         }
-        key.is_some()
-    }
-
-    /// Whether scenarios have a table of this name.
-    pub fn has_table(name: &str) -> bool {
-        Key::table(name).is_some()
-    }
-
-    /// The entries of the scenario in `text`, which is checked elsewhere; `None` if it cannot
-    /// be parsed.
-    pub fn of_text(text: &str) -> Option<Self> {
-        let toml = from_json(text, "").and_then(Result::ok);
-        let text = toml.as_deref().unwrap_or(text);
-        Some(Entries::of(&text.parse().ok()?))
+        Ok(())
     }
 
     /// The same with entries or parts of them replaced, as in
-    /// [`Scenario::from_toml_with`](super::Scenario::from_toml_with); `None` if one cannot
-    /// be.
-    pub fn replaced(&self, overrides: &[String]) -> Option<Self> {
+    /// [`Scenario::from_toml_with`](super::Scenario::from_toml_with).
+    ///
+    /// # Errors
+    /// If one cannot be.
+    pub fn replaced(&self, overrides: &[String]) -> Result<Self> {
         let mut entries = self.clone();
         for given in overrides {
-            let (path, value) = given.split_once('=')?;
-            entries.set(Part::parse(path).ok()?, value_of(value.trim())?)?;
-        }
-        Some(entries)
-    }
-
-    /// The entries of the scenario in `text` with these overrides, as far as they can be
-    /// parsed.
-    fn readable(text: &str, overrides: &[Override]) -> Self {
-        let mut entries = Entries::of(&text.parse().unwrap_or_default());
-        for given in overrides {
-            if let Some(value) = value_of(&given.value) {
-                entries.put(given.key, value);
-            }
-        }
-        entries
-    }
-
-    fn of(document: &Table) -> Self {
-        let mut entries = Entries::default();
-        for key in Key::all() {
-            let written = match key.parts() {
-                ("", name) => document.get(name),
-                (table, name) => document.get(table).and_then(|table| table.get(name)),
+            let refuse = |problem: String| ScenarioError {
+                place: Place::Set {
+                    given: shorten(given),
+                },
+                key: None,
+                problem,
             };
-            if let Some(value) = written {
-                entries.put(key, value.clone());
-            }
+            let Some((path, text)) = given.split_once('=') else {
+                let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
+                return Err(refuse(problem.into()));
+            };
+            let part = Part::parse(path).map_err(refuse)?;
+            let text = text.trim();
+            let value = parse(text).map(|value| value_of(&value));
+            let value = match part.is_whole() {
+                true => value.map_err(|error| refuse(not_toml(&error)))?,
+                false => {
+                    let new = value.map_err(|_| format!("{} is no value", shorten(text)));
+                    // What is too large for a number is shown as it was given.
+                    let is_number = |new: &Value| number(new).is_none_or(|number| !number.is_nan());
+                    let new = new.map(|new| match is_number(&new) || text.contains("nan") {
+                        true => new,
+                        false => text.into(),
+                    });
+                    let whole = new.and_then(|new| entries.changed(part, new));
+                    whole.map_err(|why| ScenarioError {
+                        key: Some(part.key),
+                        ..refuse(format!("{part}: {why}"))
+                    })?
+                }
+            };
+            entries.put(part.key, value, Some(given.clone()));
         }
-        entries
+        Ok(entries)
     }
 
-    pub(super) fn given(&self) -> impl Iterator<Item = (Key, &Value)> {
-        Key::all().filter_map(|key| Some((key, self.0[key as usize].as_deref()?)))
+    /// The text that they are from, without overrides.
+    pub(crate) fn text(&self) -> &str {
+        &self.source.text
+    }
+
+    /// All that are given, as TOML.
+    pub(crate) fn to_toml(&self) -> String {
+        let mut document = Table::new();
+        for key in Key::all() {
+            let Some(entry) = &self.entries[key as usize] else {
+                continue;
+            };
+            let value = entry.value.clone();
+            match key.parts() {
+                ("", name) => document.insert(name.into(), value),
+                (table, name) => {
+                    let table = document.entry(table).or_insert_with(|| Table::new().into());
+                    let table = table.as_table_mut();
+                    table.and_then(|table| table.insert(name.into(), value))
+                }
+            };
+        }
+        document.to_string()
+    }
+
+    /// Where a part of an entry is written, and how.
+    pub(super) fn place(&self, part: Part, value: &Value) -> (Place, String) {
+        let entry = self.entries[part.key as usize].as_ref();
+        let Some(given) = entry.and_then(|entry| entry.given.as_ref()) else {
+            let spans = self.source.find(part.key.parts(), Some(part));
+            let found = self.source.shown(spans.as_ref(), value);
+            return (
+                self.source.place(spans.map(|spans| spans.value.start)),
+                found,
+            );
+        };
+        // The value of a part is not that of the whole entry.
+        let whole = given.split_once('=').filter(|(path, _)| {
+            let overridden = Part::parse(path);
+            overridden.is_ok_and(|overridden| overridden.is_whole())
+        });
+        let text = whole.map(|(_, text)| text.trim());
+        let found = text.and_then(|text| text.get(span_of(&parse(text).ok()?, part)));
+        let found = found.map_or_else(|| shorten(&value.to_string()), shorten);
+        let given = shorten(given);
+        (Place::Set { given }, found)
+    }
+
+    pub(super) fn is_given(&self, key: Key) -> bool {
+        self.entries[key as usize].is_some()
     }
 
     /// The value of a key, or its default.
-    fn get(&self, key: Key) -> Option<&Value> {
-        self.0[key as usize].as_deref().or_else(|| left_out(key))
+    pub(super) fn get(&self, key: Key) -> Option<&Value> {
+        let entry = self.entries[key as usize].as_deref();
+        entry.map(|entry| &entry.value).or_else(|| left_out(key))
     }
 
-    fn put(&mut self, key: Key, value: Value) {
-        self.0[key as usize] = Some(Arc::new(value));
-    }
-
-    /// Replaces a part by a value, as an override does; `None` if that is impossible.
-    pub(crate) fn set(&mut self, part: Part, value: Value) -> Option<()> {
-        let whole = match part.is_whole() {
-            true => value,
-            false => self.changed(part, value).ok()?,
-        };
-        self.put(part.key, whole);
-        Some(())
+    fn put(&mut self, key: Key, value: Value, given: Option<String>) {
+        self.entries[key as usize] = Some(Arc::new(Entry { value, given }));
     }
 
     pub(crate) fn value_at(&self, part: Part) -> Option<&Value> {
@@ -214,13 +221,14 @@ impl Entries {
         }
     }
 
-    /// Whether a factor changes any of its numbers, as far as it has some.
+    /// Whether a factor changes any of its numbers, or is refused.
     pub(crate) fn is_scalable(&self, part: Part) -> bool {
-        self.value_at(part).is_none_or(is_scalable)
+        let times = |factor| self.changed(part, Value::Float(factor));
+        times(1.0) != times(2.0) || times(1.0).is_err()
     }
 
     /// The whole value of a key after a part of it is replaced.
-    fn changed(&self, part: Part, new: Value) -> Result<Value, String> {
+    fn changed(&self, part: Part, new: Value) -> std::result::Result<Value, String> {
         let whole = self.get(part.key);
         let mut whole = whole
             .cloned()
@@ -250,7 +258,7 @@ impl Entries {
     }
 
     /// Turns a single number for all rods, or gaps, into a list.
-    fn spread(&self, part: Part, place: &mut Value) -> Result<(), String> {
+    fn spread(&self, part: Part, place: &mut Value) -> std::result::Result<(), String> {
         if number(place).is_some() {
             let rods = self.get(Key::Rods).and_then(Value::as_integer);
             let rods = rods.and_then(|rods| usize::try_from(rods).ok());
@@ -267,10 +275,10 @@ impl Entries {
 }
 
 /// The default value of a key that is left out, if it has one.
-pub(super) fn left_out(key: Key) -> Option<&'static Value> {
+fn left_out(key: Key) -> Option<&'static Value> {
     static VALUES: LazyLock<Vec<Option<Value>>> = LazyLock::new(|| {
         let value = |key: Key| match key.left_out() {
-            LeftOut::Means(text) => value_of(text),
+            LeftOut::Means(text) => parse(text).ok().map(|value| value_of(&value)),
             _ => None,
         };
         Key::all().map(value).collect()
@@ -278,18 +286,27 @@ pub(super) fn left_out(key: Key) -> Option<&'static Value> {
     VALUES[key as usize].as_ref()
 }
 
-/// What a text means as TOML.
-fn value_of(text: &str) -> Option<Value> {
-    let table = format!("it = {text}").parse::<toml::Table>();
-    match table {
-        Ok(mut table) => table.remove("it").filter(|_| table.is_empty()),
-        // What is no TOML is a text.
-        Err(_) => (!text.starts_with(['[', '{', '"', '\''])).then(|| Value::String(text.into())),
+/// Parses a value. What is no TOML is a text.
+fn parse(text: &str) -> std::result::Result<Spanned<DeValue<'_>>, toml::de::Error> {
+    match DeValue::parse(text) {
+        Err(_) if !text.is_empty() && !text.starts_with(['[', '{', '"', '\'']) => {
+            Ok(Spanned::new(0..text.len(), DeValue::String(text.into())))
+        }
+        parsed => parsed,
+    }
+}
+
+/// The number that a value is.
+pub(super) fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Float(float) => Some(*float),
+        Value::Integer(integer) => Some(*integer as f64),
+        _ => None,
     }
 }
 
 /// Multiplies every number; knots and times stay where they are.
-fn multiply(value: &mut Value, factor: f64) -> Result<(), String> {
+fn multiply(value: &mut Value, factor: f64) -> std::result::Result<(), String> {
     if let Some(number) = number(value) {
         *value = Value::Float(number * factor);
         return Ok(());
@@ -308,18 +325,6 @@ fn multiply(value: &mut Value, factor: f64) -> Result<(), String> {
             "{} is no number to be scaled: write numbers first",
             shorten(&other.to_string())
         )),
-    }
-}
-
-/// Whether [`multiply`] changes it, or refuses it.
-fn is_scalable(value: &Value) -> bool {
-    match value {
-        Value::Array(list) => list.iter().any(is_scalable),
-        Value::Table(table) => {
-            let mut lists = table.iter().filter(|(name, _)| *name != "at");
-            lists.any(|(_, list)| is_scalable(list))
-        }
-        single => number(single).is_none_or(|number| number != 0.0 && number.is_finite()),
     }
 }
 

@@ -30,16 +30,6 @@ impl ScenarioError {
             problem,
         }
     }
-
-    /// The error for a file that is not TOML itself, whose lines differ.
-    pub(super) fn without_line(mut self) -> Self {
-        if let Place::File { line, .. } = &mut self.place {
-            *line = None;
-        }
-        let end = self.problem.find('\n').unwrap_or(self.problem.len());
-        self.problem.truncate(end);
-        self
-    }
 }
 
 /// Where a value was written, or is missing.

@@ -6,10 +6,8 @@ use std::sync::Arc;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 
-use super::error::ScenarioError;
-use super::key::Range;
 use super::section::{Outline, Property, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
+use super::{Key, Profile, Rod, Scenario, Schedule, ascending};
 
 /// The sections of a scenario, and what else is theirs.
 struct Sections<'a> {
@@ -115,10 +113,7 @@ impl Scenario {
             Key::Duration => number(dynamics.duration),
             Key::OutputInterval => number(dynamics.output_interval),
             Key::Clamped => json!(dynamics.clamped),
-            Key::Start => json!(match dynamics.start {
-                Start::Released => "released",
-                Start::AtRest => "at-rest",
-            }),
+            Key::Start => json!(dynamics.start),
             Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
             Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
             Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
@@ -160,11 +155,7 @@ impl Sections<'_> {
             quantity(self.sections.iter().map(|section| of(section)))
         };
         Some(match key {
-            Key::SectionShape => json!(match outline {
-                Outline::Circle => "circle",
-                Outline::Ellipse => "ellipse",
-                Outline::Rectangle => "rectangle",
-            }),
+            Key::SectionShape => json!(outline),
             Key::Diameter if outline == Outline::Circle => of(|section| &section.width),
             Key::Width | Key::Thickness if outline == Outline::Circle => return None,
             Key::Width => of(|section| &section.width),
@@ -225,44 +216,6 @@ fn in_time<T: Copy + PartialEq>(
     let values = || schedule.value.iter().map(|&value| written(value));
     let table = || json!({ "at": schedule.at, name: values().collect::<Value>() });
     (*schedule != Schedule::constant(at_rest)).then(table)
-}
-
-/// Converts a scenario in JSON, or the `input` of a result, to TOML; `None` if the text
-/// is not a JSON object.
-pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, ScenarioError>> {
-    // No TOML begins like this.
-    if !text.trim_start().starts_with('{') {
-        return None;
-    }
-    let parsed = serde_json::from_str::<Value>(text).map_err(|error| {
-        let line = Some(error.line());
-        ScenarioError::in_file(file, line, format!("not valid JSON: {error}"))
-    });
-    Some(parsed.and_then(|mut document| {
-        let form = match document.get_mut("input") {
-            Some(input) => input.take(),
-            None => document,
-        };
-        let form = toml::Table::try_from(form);
-        let mut form = form.map_err(|error| {
-            ScenarioError::in_file(file, None, format!("is no scenario: {error}"))
-        })?;
-        for key in Key::all().filter(|key| key.form().range() == Range::PositiveOrInfinite) {
-            let (table, name) = key.parts();
-            let value = form.get_mut(table).and_then(|table| table.get_mut(name));
-            value.into_iter().for_each(restore_infinity);
-        }
-        Ok(form.to_string())
-    }))
-}
-
-/// Turns `"inf"`, for which JSON has no number, into the number.
-fn restore_infinity(value: &mut toml::Value) {
-    match value {
-        toml::Value::String(text) if text == "inf" => *value = toml::Value::Float(f64::INFINITY),
-        toml::Value::Array(list) => list.iter_mut().for_each(restore_infinity),
-        _ => (),
-    }
 }
 
 #[cfg(test)]

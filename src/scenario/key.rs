@@ -66,21 +66,10 @@ impl Form {
 struct Row {
     key: Key,
     path: &'static str,
-    /// Where the name begins in the path, after the table's name and a dot.
-    name: usize,
     description: &'static str,
     form: Form,
     dimension: [i32; 3],
     left_out: LeftOut,
-}
-
-const fn name(path: &str) -> usize {
-    let bytes = path.as_bytes();
-    let mut at = bytes.len();
-    while at > 0 && bytes[at - 1] != b'.' {
-        at -= 1;
-    }
-    at
 }
 
 /// Rows of the form `Key "path": form, [exponents of length, force, time], left out;`,
@@ -96,7 +85,6 @@ macro_rules! keys {
         const FORMAT: &[Row] = &[$(Row {
             key: Key::$key,
             path: $path,
-            name: name($path),
             description: concat!($($doc),+),
             form: $form,
             dimension: $dimension,
@@ -254,8 +242,7 @@ impl Key {
 
     /// Its table, empty at the top, and its name within that.
     pub(super) fn parts(self) -> (&'static str, &'static str) {
-        let Row { path, name, .. } = self.row();
-        (&path[..name.saturating_sub(1)], &path[*name..])
+        self.path().rsplit_once('.').unwrap_or(("", self.path()))
     }
 
     pub(crate) fn all() -> impl Iterator<Item = Key> {
@@ -277,8 +264,11 @@ impl Key {
 
     /// The table of this name, if any.
     pub(super) fn table(name: &str) -> Option<&'static str> {
-        let mut tables = Key::all().map(|key| key.parts().0);
-        tables.find(|table| *table == name && !name.is_empty())
+        let mut paths = Key::all().map(Key::path);
+        paths.find_map(|path| {
+            let (table, rest) = path.split_at_checked(name.len())?;
+            (table == name && rest.starts_with('.')).then_some(table)
+        })
     }
 
     /// The tables of the format, in its order.

@@ -2,10 +2,11 @@
 //! are a mistake, or no grid could resolve its shape. Only given values are checked;
 //! defaults are always within the limits.
 
+use super::entries::Entries;
 use super::error::ScenarioError;
+use super::item::Item;
 use super::key::{Form, Key};
 use super::material;
-use super::raw::{Item, Raw};
 use super::{Profile, Rod, Scale, Scenario, longest};
 
 type Result = std::result::Result<(), ScenarioError>;
@@ -33,11 +34,11 @@ impl Limit {
         )))
     }
 
-    /// The same for the extremes of a profile of each rod, times `natural`.
-    fn check_profiles(&self, item: Item, profiles: &[Profile], natural: f64) -> Result {
+    /// The same for the extremes of a profile of each rod, in this unit.
+    fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result {
         for (index, profile) in profiles.iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
-                self.check(item.entry(index), value * natural)?;
+                self.check(item.entry(index), value / unit)?;
             }
         }
         Ok(())
@@ -139,21 +140,21 @@ const TOO_MANY: &str =
 const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
-pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result {
-    rods(raw, &scenario.rods)?;
+pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result {
+    rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
         (Key::Gravity, scenario.gravity, GRAVITY),
         (Key::TipForce, scenario.tip_force, TIP_FORCE),
         (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
     ] {
-        if let Some(item) = raw.given(key) {
-            limit.check(item, norm(load) * largest_factor(key, &scenario.rods))?;
+        if let Some(item) = entries.given(key) {
+            limit.check(item, norm(load) / smallest_unit(key, &scenario.rods))?;
         }
     }
-    coupling(raw, scenario)?;
-    dynamics(raw, scenario)?;
-    masses(raw, scenario)?;
-    in_time(raw, scenario)
+    coupling(entries, scenario)?;
+    dynamics(entries, scenario)?;
+    masses(entries, scenario)?;
+    in_time(entries, scenario)
 }
 
 /// The length of a rod and its smallest bending stiffness anywhere along it.
@@ -165,19 +166,10 @@ fn softest(rod: &Rod) -> Scale {
     }
 }
 
-/// The factor that makes a quantity of this key dimensionless in these units, with times
-/// in units of `time`.
-fn natural_factor(key: Key, scale: Scale, time: f64) -> f64 {
-    let [length, force, times] = key.dimension();
-    scale.per(length, force) / time.powi(times)
-}
-
-/// The largest such factor of all rods.
-fn largest_factor(key: Key, rods: &[Rod]) -> f64 {
-    let factors = rods
-        .iter()
-        .map(|rod| natural_factor(key, softest(rod), 1.0));
-    factors.fold(0.0, f64::max)
+/// The smallest unit of a quantity of this key, which has no times, of all rods.
+fn smallest_unit(key: Key, rods: &[Rod]) -> f64 {
+    let units = rods.iter().map(|rod| softest(rod).unit(key, 1.0));
+    units.fold(f64::INFINITY, f64::min)
 }
 
 fn norm([x, y, z]: [f64; 3]) -> f64 {
@@ -185,8 +177,8 @@ fn norm([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-fn rods(raw: &Raw, rods: &[Rod]) -> Result {
-    let check = |key, index, limit: &Limit, value| match raw.given(key) {
+fn rods(entries: &Entries, rods: &[Rod]) -> Result {
+    let check = |key, index, limit: &Limit, value| match entries.given(key) {
         Some(item) => limit.check(item.entry(index), value),
         None => Ok(()),
     };
@@ -198,7 +190,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
     for (index, rod) in rods.iter().enumerate() {
         let scale = softest(rod);
-        let natural = |key, value| value * natural_factor(key, scale, 1.0);
+        let natural = |key, value| value / scale.unit(key, 1.0);
         for (key, stiffness) in Key::COUPLE.into_iter().zip(&rod.couple_stiffness) {
             check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
         }
@@ -206,7 +198,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
             check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
         }
         // Stiffnesses that are not given follow from the size of a section.
-        if let Some(item) = material::size(raw) {
+        if let Some(item) = material::size(entries) {
             let couple = rod.couple_stiffness.iter().map(Profile::min);
             let least = couple.fold(f64::INFINITY, f64::min);
             STIFFNESSES.check(item.entry(index), stiffest / least)?;
@@ -224,7 +216,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     Ok(())
 }
 
-fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
+fn coupling(entries: &Entries, scenario: &Scenario) -> Result {
     let gaps = scenario.coupling.iter().zip(scenario.rods.windows(2));
     for (gap, (stiffness, rods)) in gaps.enumerate() {
         let [one, other] = [softest(&rods[0]), softest(&rods[1])];
@@ -233,33 +225,34 @@ fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
             stiffness: one.stiffness.min(other.stiffness),
         };
         for (key, stiffness) in Key::COUPLING.into_iter().zip(stiffness) {
-            if let Some(item) = raw.given(key) {
-                KAPPA.check(item.entry(gap), stiffness * natural_factor(key, both, 1.0))?;
+            if let Some(item) = entries.given(key) {
+                KAPPA.check(item.entry(gap), stiffness / both.unit(key, 1.0))?;
             }
         }
     }
     Ok(())
 }
 
-fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
+fn dynamics(entries: &Entries, scenario: &Scenario) -> Result {
     let (scale, time) = (scenario.scale(), scenario.time());
     for (key, limit) in &DYNAMICS {
-        let Some(item) = raw.given(*key) else {
+        let Some(item) = entries.given(*key) else {
             continue;
         };
-        let natural = natural_factor(*key, scale, time);
+        let unit = scale.unit(*key, time);
         let Form::Quantity(_) = key.form() else {
-            limit.check(item, item.number()? * natural)?;
+            limit.check(item, item.number()? / unit)?;
             continue;
         };
-        limit.check_profiles(item, &item.quantity(scenario.rods.len())?, natural)?;
+        limit.check_profiles(item, &item.quantity(scenario.rods.len())?, unit)?;
     }
     Ok(())
 }
 
 /// Masses that follow from sections.
-fn masses(raw: &Raw, scenario: &Scenario) -> Result {
-    let (Some(size), Some(density)) = (material::size(raw), raw.given(Key::MassDensity)) else {
+fn masses(entries: &Entries, scenario: &Scenario) -> Result {
+    let (Some(size), Some(density)) = (material::size(entries), entries.given(Key::MassDensity))
+    else {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.time());
@@ -273,19 +266,19 @@ fn masses(raw: &Raw, scenario: &Scenario) -> Result {
             &dynamics.rotary_inertia,
         ),
     ] {
-        limit.check_profiles(item, profiles, natural_factor(key, scale, time))?;
+        limit.check_profiles(item, profiles, scale.unit(key, time))?;
     }
     Ok(())
 }
 
-fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
+fn in_time(entries: &Entries, scenario: &Scenario) -> Result {
     let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
-    if let Some(item) = raw.given(Key::OutputInterval) {
+    if let Some(item) = entries.given(Key::OutputInterval) {
         // Rounding of the quotient must not count as an output.
         let outputs = (dynamics.duration / dynamics.output_interval).floor();
         OUTPUTS.check(item, outputs)?;
     }
-    let list = |key, name| raw.given(key).and_then(|item: Item| item.list(name));
+    let list = |key, name| entries.given(key).and_then(|item: Item| item.list(name));
     for (key, at) in [
         (Key::GravityInTime, &dynamics.gravity.at),
         (Key::TipForceInTime, &dynamics.tip_force.at),
@@ -304,9 +297,9 @@ fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
         (Key::TipMomentInTime, &dynamics.tip_moment, TIP_MOMENT),
     ] {
         if let Some(list) = list(key, "value") {
-            let factor = largest_factor(key, rods);
+            let unit = smallest_unit(key, rods);
             for (index, &value) in load.value.iter().enumerate() {
-                limit.check(list.entry(index), norm(value) * factor)?;
+                limit.check(list.entry(index), norm(value) / unit)?;
             }
         }
     }

@@ -9,23 +9,22 @@ mod entries;
 mod error;
 mod excerpt;
 mod form;
+mod item;
 mod key;
 mod limits;
 mod material;
-mod node;
 mod part;
 mod profile;
-mod raw;
 mod read;
 mod schedule;
 mod schema;
 mod section;
+mod source;
 mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
-pub(crate) use entries::{resolve, with_overrides};
 pub use error::{Place, ScenarioError};
 #[cfg(feature = "cli")]
 pub(crate) use excerpt::printable;
@@ -41,8 +40,8 @@ pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Radii, Section};
 pub use tip::{Clamp, HeldTip};
-/// A value as it can be written.
-pub use toml::Value;
+/// Values as they can be written.
+pub use toml::{Table, Value};
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
@@ -84,9 +83,7 @@ impl Scenario {
 
     /// The natural unit of a quantity of this key.
     pub(crate) fn unit(&self, key: Key) -> f64 {
-        let [length, force, time] = key.dimension();
-        let scale = self.scale();
-        scale.length.powi(length) * scale.force().powi(force) * self.time().powi(time)
+        self.scale().unit(key, self.time())
     }
 
     /// T: the natural unit of time, sqrt(rho L^4/A).
@@ -182,10 +179,10 @@ impl Scale {
         self.stiffness / self.length
     }
 
-    /// The factor that converts a quantity to these units, if its own unit is a product of
-    /// powers of length and force with these exponents.
-    fn per(&self, length: i32, force: i32) -> f64 {
-        self.length.powi(2 * force - length) / self.stiffness.powi(force)
+    /// Unit of a quantity of this key, with this unit of time.
+    fn unit(&self, key: Key, time: f64) -> f64 {
+        let [length, force, times] = key.dimension();
+        self.length.powi(length) * self.force().powi(force) * time.powi(times)
     }
 }
 

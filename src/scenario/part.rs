@@ -25,6 +25,16 @@ pub struct Part {
 }
 
 impl Part {
+    /// The whole value of a key.
+    pub(super) fn whole(key: Key) -> Part {
+        Part {
+            key,
+            list: None,
+            indices: [None; 2],
+            scale: false,
+        }
+    }
+
     /// Parses a part; an error says what is wrong.
     pub(crate) fn parse(text: &str) -> Result<Part, String> {
         let (scale, rest) = match text.trim().strip_prefix("scale:") {

@@ -4,13 +4,11 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use super::entries::{Entries, resolve};
+use super::Scenario;
+use super::entries::Entries;
 use super::error::ScenarioError;
 use super::excerpt::line_of;
-use super::form::from_json;
-use super::raw::Raw;
-use super::{Scenario, check};
-use crate::memory::Request;
+use crate::memory;
 
 /// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
 pub(crate) const MOST_BYTES: u64 = 64 << 20;
@@ -45,14 +43,8 @@ impl Scenario {
         file: &str,
         overrides: &[String],
     ) -> Result<Scenario, ScenarioError> {
-        let toml = from_json(text, file).transpose()?;
-        let read = toml.as_deref().unwrap_or(text);
-        let overrides = resolve(read, overrides)?;
-        let checked = Raw::parse(read, file, &overrides).and_then(|raw| check::check(&raw));
-        checked.map_err(|error| match toml {
-            Some(_) => error.without_line(),
-            None => error,
-        })
+        let entries = Entries::of_text(text, file)?;
+        entries.replaced(overrides)?.check()
     }
 
     /// Reads and checks the file at `path`.
@@ -63,14 +55,6 @@ impl Scenario {
     /// As [`Scenario::read`], with the entries `overrides` replaced.
     pub fn read_with(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
         Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
-    }
-}
-
-impl Entries {
-    /// Checks these entries; `None` if they are refused: [`Scenario::from_toml`] with the
-    /// same entries as text gives the reason.
-    pub fn scenario(&self) -> Option<Scenario> {
-        check::check(&Raw::of(self)).ok()
     }
 }
 
@@ -102,8 +86,7 @@ pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(ScenarioError::in_file(file, None, problem));
     }
-    (Request::text(&bytes).weigh())
-        .map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    memory::text(&bytes).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();

@@ -19,19 +19,21 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::{Profile, ascending};
+use crate::words::words;
 
 /// Steps between two knots in the search for extremes.
 const SAMPLES: usize = 16;
 
-/// The outline of a section.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outline {
-    /// A circle, whose width and thickness are the same.
-    Circle,
-    /// An ellipse with its width along d2 and its thickness along d3.
-    Ellipse,
-    /// A rectangle with the same sides.
-    Rectangle,
+words! {
+    /// The outline of a section.
+    pub enum Outline {
+        /// A circle, whose width and thickness are the same.
+        Circle = "circle",
+        /// An ellipse with its width along d2 and its thickness along d3.
+        Ellipse = "ellipse",
+        /// A rectangle with the same sides.
+        Rectangle = "rectangle",
+    }
 }
 
 /// A property that a section determines.
@@ -215,8 +217,8 @@ impl Outline {
 pub struct Radii(Vec<Arc<Section>>);
 
 impl Radii {
-    pub(super) fn of(sections: &[Arc<Section>]) -> Self {
-        Radii(sections.to_vec())
+    pub(super) fn of(sections: Vec<Arc<Section>>) -> Self {
+        Radii(sections)
     }
 
     /// The sections; none where stiffnesses are given in place of them.

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use glam::DQuat;
 
+use super::entries::Entries;
 use super::error::ScenarioError;
+use super::item::Item;
 use super::key::Key;
-use super::raw::{Item, Raw};
 use super::{Rod, longest};
 
 /// Largest distance of a held tip from the base, in lengths of the longest rod with its
@@ -43,22 +44,22 @@ impl Clamp {
 
 /// Reads `[tip]` of a leaf of these rods; `None` if the tips are free.
 pub(super) fn held(
-    raw: &Raw,
+    entries: &Entries,
     rods: &[Rod],
     joined: bool,
 ) -> Result<Option<HeldTip>, ScenarioError> {
-    let item = raw.item(Key::TipHeld)?;
+    let item = entries.item(Key::TipHeld)?;
     let word = item.text()?;
     let clamped = word == "clamped";
     item.ensure(
         clamped || ["free", "pinned"].contains(&word),
         "must be \"free\", \"pinned\" (the position is given) or \"clamped\" (the directions, too)",
     )?;
-    let of_clamps = [Key::TipAngles, Key::TipTwist].map(|key| raw.given(key));
+    let of_clamps = [Key::TipAngles, Key::TipTwist].map(|key| entries.given(key));
     if let Some(unused) = of_clamps.into_iter().flatten().find(|_| !clamped) {
         return Err(unused.refuse("belongs to a clamped tip: add tip.held = \"clamped\""));
     }
-    let position = raw.given(Key::TipPosition);
+    let position = entries.given(Key::TipPosition);
     if word == "free" {
         return match position {
             Some(position) => Err(position
@@ -75,19 +76,19 @@ pub(super) fn held(
     )?;
     let position = at.vector()?;
     check_reach(&at, position, rods)?;
-    if let Some(moment) = raw.given(Key::TipMoment) {
+    if let Some(moment) = entries.given(Key::TipMoment) {
         moment.ensure(
             moment.vector()? == [0.0; 3],
             "needs a free tip: leave out tip.held, or the moment",
         )?;
     }
-    let base = raw.item(Key::Clamped)?;
+    let base = entries.item(Key::Clamped)?;
     base.ensure(
         base.switch()?,
         "a tip that is held (tip.held) needs a base that is clamped",
     )?;
     let each = |key| {
-        let item = raw.item(key)?;
+        let item = entries.item(key)?;
         let angles = item.one_each(rods.len())?;
         item.ensure(
             angles

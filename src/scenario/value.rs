@@ -1,8 +1,11 @@
 //! Converts values as written to numbers, for every form that a key can have.
 
+use std::str::FromStr;
+
+use super::entries::number;
 use super::error::Result;
+use super::item::Item;
 use super::key::{Form, Range};
-use super::raw::Item;
 use super::{Profile, Schedule};
 
 /// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
@@ -22,16 +25,23 @@ const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1
 
 impl<'e> Item<'e> {
     pub(super) fn text(&self) -> Result<&'e str> {
-        (self.node().text()).ok_or_else(|| self.refuse("must be text in quotes"))
+        (self.value.as_str()).ok_or_else(|| self.refuse("must be text in quotes"))
+    }
+
+    /// One of the words that `allowed` names.
+    pub(super) fn word<T: FromStr>(&self, allowed: &str) -> Result<T> {
+        let word = self.value.as_str().and_then(|word| word.parse().ok());
+        word.ok_or_else(|| self.refuse(allowed))
     }
 
     pub(super) fn switch(&self) -> Result<bool> {
-        (self.node().switch()).ok_or_else(|| self.refuse("must be true or false"))
+        (self.value.as_bool()).ok_or_else(|| self.refuse("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
     pub(super) fn whole(&self, most: usize) -> Result<usize> {
-        let whole = self.node().whole();
+        let whole = self.value.as_integer();
+        let whole = whole.and_then(|whole| usize::try_from(whole).ok());
         let whole = whole.filter(|whole| (1..=most).contains(whole));
         whole.ok_or_else(|| {
             self.refuse(format_args!(
@@ -46,12 +56,13 @@ impl<'e> Item<'e> {
     }
 
     fn number_in(&self, range: Range) -> Result<f64> {
-        let value = self.node().number();
+        let value = number(self.value);
         let value = value.ok_or_else(|| self.refuse("must be a number"))?;
-        let too_large = "is not a number a computer can hold (the largest is 1.8e308)";
-        let value = value.map_err(|_| self.refuse(too_large))?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
         let problem = match value {
+            _ if value.is_nan() && !self.shown().contains("nan") => {
+                "is not a number a computer can hold (the largest is 1.8e308)"
+            }
             _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
             _ if positive && value <= 0.0 => "must be greater than 0",
             f64::INFINITY if range == Range::PositiveOrInfinite => return Ok(value),
@@ -79,7 +90,7 @@ impl<'e> Item<'e> {
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
     pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
-        if self.node().number().is_some() {
+        if number(self.value).is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {
@@ -97,7 +108,7 @@ impl<'e> Item<'e> {
 
     /// A profile for each of `rods` rods.
     pub(super) fn quantity(&self, rods: usize) -> Result<Vec<Profile>> {
-        if self.node().names().is_none() {
+        if !self.value.is_table() {
             let numbers = self.one_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
@@ -105,7 +116,7 @@ impl<'e> Item<'e> {
         let at = at.increasing(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
-        if (list.next()).is_none_or(|first| first.node().length().is_none()) {
+        if (list.next()).is_none_or(|first| !first.value.is_array()) {
             return Ok(vec![value.linear(&at)?; rods]);
         }
         let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
@@ -182,11 +193,11 @@ impl<'e> Item<'e> {
 
     /// The entries of a list; `needed` describes it in the error if it is not one.
     fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
-        let Some(length) = self.node().length() else {
+        let Some(list) = self.value.as_array() else {
             return Err(self.refuse(format_args!("must be {needed}")));
         };
         let whole = *self;
-        Ok((0..length).map(move |index| whole.entry(index)))
+        Ok((0..list.len()).map(move |index| whole.entry(index)))
     }
 
     /// The same for a list that must have `count` entries.

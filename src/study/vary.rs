@@ -35,7 +35,7 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer};
 
 use crate::branch::value_between;
-use crate::scenario::{Form, Key, Part, Scenario, ScenarioError, Value};
+use crate::scenario::{Form, Key, Part, Scenario, ScenarioError};
 
 /// Default number of values.
 const COUNT: usize = 11;
@@ -133,16 +133,6 @@ impl Target {
 
     fn text(self, value: f64) -> String {
         written(value, self.is_whole())
-    }
-
-    /// The value that this text denotes; none if a whole number would be too large.
-    fn value(self, value: f64) -> Option<Value> {
-        match self.is_whole() {
-            true => {
-                (value.fract() == 0.0 && value.abs() < 1e15).then_some(Value::Integer(value as i64))
-            }
-            false => Some(Value::Float(value)),
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
-use crate::memory::Request;
+use crate::memory;
 use crate::newton::Work;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
@@ -37,7 +37,7 @@ pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), Rela
         return Err(RelaxError::Intervals { found });
     }
     let intervals = intervals.unwrap_or(1);
-    (Request::Shooting { rods, intervals }.weigh()).map_err(RelaxError::Memory)
+    Ok(memory::shooting(rods, intervals)?)
 }
 
 /// Solves the boundary-value problem starting from a relaxed leaf, `rest`; if that is not at

@@ -18,7 +18,7 @@ const TEXT: &str = r#"
     shear_3 = 100
 "#;
 
-fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
+fn with(overrides: &[&str]) -> Result<Scenario> {
     let overrides: Vec<String> = overrides.iter().map(|given| given.to_string()).collect();
     Scenario::from_toml_with(TEXT, "three.toml", &overrides)
 }
@@ -85,41 +85,5 @@ fn slips_are_explained() {
         let message = with(&[given]).unwrap_err().to_string();
         assert!(message.contains(part), "{given}: {message}");
         assert!(message.len() < 300, "{message}");
-    }
-}
-
-/// Values without a text, as from a dictionary, give the same scenario as the text, also
-/// with overrides.
-#[test]
-fn entries_are_those_of_the_text() {
-    let texts = [
-        TEXT,
-        include_str!("../../../scenarios/paper/fig04.toml"),
-        include_str!("../../../scenarios/motion/curl.toml"),
-        include_str!("../../../scenarios/classic/twisted_strip.toml"),
-        include_str!("../../../scenarios/study/undulation.toml"),
-    ];
-    for text in texts {
-        let entries = Entries::of_text(text).unwrap();
-        let wanted = Scenario::from_toml(text).unwrap();
-        assert_eq!(entries.scenario().as_ref(), Some(&wanted));
-        let json = serde_json::to_string(&wanted).unwrap();
-        assert_eq!(Entries::of_text(&json).unwrap().scenario(), Some(wanted));
-    }
-    let given = "load.gravity=[0, 0, -3]; scale:stiffness.shear_2=2; name=other";
-    let given: Vec<String> = given.split("; ").map(String::from).collect();
-    let replaced = Entries::of_text(TEXT).unwrap().replaced(&given).unwrap();
-    let wanted = Scenario::from_toml_with(TEXT, "three.toml", &given).unwrap();
-    assert_eq!(replaced.scenario(), Some(wanted));
-    for (refused, by_text) in [
-        ("leaf.rods=0", true),
-        ("leaf.rod=1", true),
-        ("load.gravity[3]=1", true),
-        ("leaf.rods=3", false),
-    ] {
-        let replaced = Entries::of_text(TEXT).unwrap().replaced(&[refused.into()]);
-        let none = replaced.and_then(|all| all.scenario()).is_none();
-        assert_eq!(none, by_text, "{refused}");
-        assert_eq!(with(&[refused]).is_err(), by_text);
     }
 }

@@ -40,7 +40,7 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
         let shot = rest
             .at_rest()
             .then(|| bvp::solve(scenario, &asked, &mut |_| {}));
-        Ok((rest, shot))
+        Ok::<_, RelaxError>((rest, shot))
     });
     let (rest, shot) = found?;
     let answer = match shot {

@@ -9,7 +9,7 @@ use super::motion;
 use super::row::{MapMethod, MapRow};
 use crate::checksum::Checksum;
 use crate::limit::Limit;
-use crate::memory::Request;
+use crate::memory;
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
@@ -91,11 +91,7 @@ impl MapRequest {
         if methods.is_empty() {
             return refuse("no methods: name one at least".into());
         }
-        let weight = Request::Map {
-            cells: found,
-            methods: methods.len(),
-        };
-        (weight.weigh()).map_err(|why| MapRefused(why.to_string()))?;
+        memory::map(found, methods.len()).map_err(|why| MapRefused(why.to_string()))?;
         let request = MapRequest {
             base,
             axes,

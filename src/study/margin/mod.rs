@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::branch::{Equations, Family, Stuck, on_finer};
 use crate::leaf::{Field, Grid, State};
 use crate::limit::Limit;
-use crate::memory::Request;
+use crate::memory;
 use crate::relax::{
     Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, relax_on_grids,
 };
@@ -155,8 +155,8 @@ fn margin(
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
-    let (rods, segments) = (scenario.rods.len(), grid.segments());
-    (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+    let rods = scenario.rods.len();
+    memory::branches(rods, grid.segments()).map_err(RelaxError::Memory)?;
     let weight = weight(scenario);
     let directions = directions(scenario, rest);
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);

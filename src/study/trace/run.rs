@@ -8,7 +8,7 @@ use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
 use crate::branch::{Critical, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, switch};
 use crate::leaf::Grid;
-use crate::memory::Request;
+use crate::memory;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax};
 use crate::scenario::{Key, Part, Scenario};
 use crate::study::Target;
@@ -147,8 +147,7 @@ fn first_equilibrium(
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
 fn check_grid(family: &Family, wanted: Option<usize>, least: usize) -> Result<usize, RelaxError> {
     let segments = check_segments(family.first(), wanted, least)?;
-    let rods = family.first().rods();
-    (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+    memory::branches(family.first().rods(), segments)?;
     Ok(segments)
 }
 

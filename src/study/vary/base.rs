@@ -3,18 +3,15 @@
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Entries, Form, Key, Part, Scenario, Value, resolve, with_overrides};
+use crate::scenario::{self, Entries, Form, Key, Scenario};
 
-/// A scenario as text with some entries replaced, into which numbers are substituted.
+/// A scenario with some entries replaced, into which numbers are substituted.
 #[derive(Clone, Debug)]
 pub struct Base {
-    text: String,
-    file: String,
+    entries: Entries,
     overrides: Vec<String>,
     knobs: Knobs,
     scenario: Scenario,
-    /// The parsed text and overrides; none if numbers are larger than values can be.
-    entries: Option<Entries>,
 }
 
 /// A scenario and the settings of methods at one point.
@@ -35,25 +32,32 @@ impl Base {
 
     /// The same from a text; messages call it `file`.
     pub fn of_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
+        Base::new(&Entries::of_text(&text, &file)?, overrides, true)
+    }
+
+    /// The same from entries; settings of methods are unknown keys unless they are allowed.
+    pub(crate) fn new(
+        entries: &Entries,
+        overrides: &[String],
+        of_methods: bool,
+    ) -> Result<Self, VaryError> {
         let mut knobs = Knobs::default();
         let mut of_scenario = Vec::new();
         for given in overrides {
             match given.split_once('=') {
-                Some((path, value)) if path.trim().starts_with("method.") => {
+                Some((path, value)) if of_methods && path.trim().starts_with("method.") => {
                     let (knob, value) = setting(path.trim(), value.trim())?;
                     knobs.set(knob, value)?;
                 }
                 _ => of_scenario.push(given.clone()),
             }
         }
-        let scenario = Scenario::from_toml_with(&text, &file, &of_scenario)?;
+        let entries = entries.replaced(&of_scenario)?;
         Ok(Base {
-            entries: Entries::of_text(&text).and_then(|all| all.replaced(&of_scenario)),
-            text,
-            file,
+            scenario: entries.check()?,
+            entries,
             overrides: of_scenario,
             knobs,
-            scenario,
         })
     }
 
@@ -69,7 +73,7 @@ impl Base {
 
     /// The text of the scenario's file.
     pub fn text(&self) -> &str {
-        &self.text
+        self.entries.text()
     }
 
     /// The entries replaced, without the settings of methods.
@@ -80,7 +84,7 @@ impl Base {
     /// The number that the scenario has at these keys, if it is one and the same for all of them.
     pub fn number(&self, keys: &Keys) -> Option<f64> {
         let mut numbers = keys.targets().iter().map(|target| match target {
-            Target::Entry(part) => self.entries.as_ref()?.number_at(*part),
+            Target::Entry(part) => self.entries.number_at(*part),
             Target::Knob(_) => None,
         });
         let first = numbers.next()??;
@@ -93,13 +97,12 @@ impl Base {
     /// If the scenario is then invalid, or has no such entry.
     pub fn with(&self, keys: &Keys, value: f64) -> Result<Base, VaryError> {
         let Varied { scenario, knobs } = self.at(&[(keys, value)])?;
-        let entries = overriding(&[(keys, value)]);
+        let given = overriding(&[(keys, value)]);
         Ok(Base {
-            entries: (self.entries.as_ref()).and_then(|all| all.replaced(&entries)),
-            overrides: [&self.overrides[..], &entries].concat(),
+            entries: self.entries.replaced(&given)?,
+            overrides: [&self.overrides[..], &given].concat(),
             knobs,
             scenario,
-            ..self.clone()
         })
     }
 
@@ -117,27 +120,26 @@ impl Base {
                 }
             }
         }
-        if let Some(scenario) = self.changed(values) {
-            return Ok(Varied { scenario, knobs });
-        }
-        let overrides = [&self.overrides[..], &overriding(values)].concat();
         // An entry that does not exist does so at no value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
         let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
-        if !targets.any(adds) {
-            resolve(&self.text, &overrides).map_err(|error| VaryError::Key(error.to_string()))?;
-        }
+        let adds = targets.any(adds);
+        let entries = self.entries.replaced(&overriding(values));
+        let entries = entries.map_err(|error| match adds {
+            true => VaryError::Scenario(error),
+            false => VaryError::Key(error.to_string()),
+        })?;
         Ok(Varied {
-            scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
+            scenario: entries.check()?,
             knobs,
         })
     }
 
     /// Refuses factors with which nothing varies.
     fn check_factor(&self, keys: &Keys) -> Result<(), VaryError> {
-        let fixed = |target: &Target| match (target, &self.entries) {
-            (Target::Entry(part), Some(entries)) => part.scale && !entries.is_scalable(*part),
-            _ => false,
+        let fixed = |target: &Target| match target {
+            Target::Entry(part) => part.scale && !self.entries.is_scalable(*part),
+            Target::Knob(_) => false,
         };
         match keys.targets().iter().all(fixed) {
             true => Err(VaryError::Key(format!(
@@ -145,20 +147,6 @@ impl Base {
             ))),
             false => Ok(()),
         }
-    }
-
-    /// The scenario with these values, from the entries without parsing the text again;
-    /// none if it is invalid: parsing the text gives the reason.
-    pub(super) fn changed(&self, values: &[(&Keys, f64)]) -> Option<Scenario> {
-        let mut entries = self.entries.clone()?;
-        for (keys, value) in values {
-            for &target in keys.targets() {
-                if let Target::Entry(part) = target {
-                    entries.set(part, target.value(*value)?)?;
-                }
-            }
-        }
-        entries.scenario()
     }
 
     /// The number at these keys: one with respect to which derivatives exist, the
@@ -181,18 +169,12 @@ impl Base {
                     "where knots are cannot change by a little: the grids have nodes there",
                 );
             }
-            let Some(entry) = self.entry(part) else {
+            if self.entries.value_at(part).is_none() {
                 return refuse(
                     "is not in the scenario: write it there first; indices count from 0",
                 );
-            };
-            let value = match entry {
-                _ if part.scale => Some(1.0),
-                Value::Float(value) => Some(*value),
-                Value::Integer(value) => Some(*value as f64),
-                _ => None,
-            };
-            match value {
+            }
+            match self.entries.number_at(part) {
                 Some(value) if !value.is_finite() => {
                     return refuse("is infinite, and cannot change by a little");
                 }
@@ -204,16 +186,12 @@ impl Base {
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
     }
 
-    fn entry(&self, part: Part) -> Option<&Value> {
-        self.entries.as_ref()?.value_at(part)
-    }
-
     /// The same keys, or one for each entry if they are a list or a profile.
     pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
         let [Target::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
         };
-        match self.entry(*part) {
+        match self.entries.value_at(*part) {
             Some(value) => (part.numbers(value).into_iter())
                 .map(|part| Keys(vec![Target::Entry(part)]))
                 .collect(),
@@ -223,8 +201,8 @@ impl Base {
 
     /// The scenario with these values, as TOML.
     pub(crate) fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
-        let overrides = [&self.overrides[..], &overriding(values)].concat();
-        with_overrides(&self.text, &overrides)
+        let changed = self.entries.replaced(&overriding(values)).ok()?;
+        Some(changed.to_toml())
     }
 }
 

@@ -158,39 +158,6 @@ fn refusals_name_key_and_reason() {
     }
 }
 
-/// All features of the format, in three scenarios: no two of these tables can be combined.
-const SECTION: &str = r#"
-name = "section"
-leaf = { rods = 1, length = 2, fan = [0.1], joined = true }
-units = { length = "cm" }
-section = { shape = "circle", diameter = { at = [0, 0.5, 1], value = [0.3, 0.2, 0.1] }, young = 1e3, poisson = [0.3], mass_density = 2 }
-load = { tip_moment = [0, 0.5, 0] }
-dynamics = { tip_moment = { at = [0, 1], value = [[0, 0, 0], [0, 1, 0]] }, clamped = true, duration = 10, output_interval = 0.1 }
-"#;
-const SIDES: &str = r#"
-name = "sides"
-leaf = { rods = 2, length = 1, fan = "paper" }
-section = { shape = "ellipse", width = [0.3, 0.4], thickness = 0.2, young = [1.0, 2.0] }
-rest = { twist = 0.1, bend_2 = [0, 1], bend_3 = { at = [0, 1], value = [[1, 2], [3, 4]] }, stretch = 1.1 }
-tip = { held = "clamped", position = [0.9, 0, 0], angles = [0.1, -0.1], twist = 0.5 }
-"#;
-const MOVING: &str = r#"
-name = "moving"
-leaf = { rods = 2, length = [1, 0.5], fan = "symmetric", joined = false }
-stiffness = { torsion = 1, bending_2 = [1, 2], bending_3 = { at = [0, 1], value = [1, 0.5] }, axial = inf, shear_2 = [inf, 100], shear_3 = 100 }
-coupling = { x = 1, y = [2], z = 0 }
-load = { gravity = [0, 0, -1], tip_force = [0, 0.1, 0] }
-solve = { tolerance = 1e-7 }
-
-[dynamics]
-density = { at = [0, 1], value = [1, 0.5] }
-section_radius = [0.1, 0.2]
-external_damping = 0.5
-internal_damping = 0.01
-gravity = { at = [0, 1], value = [[0, 0, -1], [0, 0, -2]] }
-tip_force = { at = [0], value = [[0, 0, 0]] }
-rest = { at = [0, 2], factor = [1, 2] }
-"#;
 #[test]
 fn a_factor_of_nothing_is_refused() {
     let base = base(&["load.gravity=[0,0,0]", "stiffness.axial=inf"]).unwrap();
@@ -202,59 +169,6 @@ fn a_factor_of_nothing_is_refused() {
     // Joined to one that changes, it takes part.
     let both = "scale:load.gravity+scale:leaf.length";
     assert!(at(&base, &[(both, 2.0)]).is_ok());
-}
-
-const HEAVY: &str = r#"
-name = "heavy"
-leaf = { rods = 1, length = 1, fan = [0] }
-stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
-dynamics = { density = 1, rotary_inertia = [0.01] }
-"#;
-
-/// A number substituted into the entries is equivalent to one written into the text: equal
-/// scenarios, or both invalid, for every key.
-#[test]
-fn a_number_put_into_the_entries_is_that_of_the_text() {
-    // The first is the key itself.
-    let parts =
-        " [0] [1] [2] .value[0] .value[1] .value[0][1] .value[1][2] .at[0] .at[1] .factor[1]";
-    let finite = [
-        0.0,
-        -0.0,
-        1.0,
-        2.0,
-        0.3,
-        1.0 / 3.0,
-        -1.0,
-        7.5,
-        1e-60,
-        1e300,
-        1e-7,
-    ];
-    let values = [&finite[..], &[f64::INFINITY, f64::NAN]].concat();
-    for key in Key::all() {
-        let mut equal = 0;
-        let texts = [TEXT, SECTION, SIDES, MOVING, HEAVY];
-        let bases = texts.map(|text| Base::of_text(text.into(), "test.toml".into(), &[]).unwrap());
-        let keys = ["", "scale:"].into_iter().flat_map(|scale| {
-            let paths = parts.split(' ');
-            paths.map(move |part| format!("{scale}{}{part}", key.path()))
-        });
-        let keys = keys.filter_map(|path| path.parse::<Keys>().ok());
-        for (keys, base) in keys.flat_map(|keys| bases.iter().map(move |base| (keys.clone(), base)))
-        {
-            for &value in &values {
-                let given = format!("{keys}={}", keys.text(value));
-                let one = std::slice::from_ref(&given);
-                let text = Scenario::from_toml_with(base.text(), "test.toml", one);
-                let direct = base.changed(&[(&keys, value)]);
-                equal += usize::from(direct.is_some());
-                assert_eq!(direct, text.ok(), "{given} in {}", base.scenario().name);
-            }
-        }
-        let takes_none = matches!(key.form(), Form::Text | Form::Switch);
-        assert_eq!(equal == 0, takes_none, "{}: {equal}", key.path());
-    }
 }
 
 /// Several numbers substituted one after the other, also into a base that has some already.
