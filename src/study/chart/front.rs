@@ -19,20 +19,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_on_the_front_is_beaten() {
-        let points = [
-            (1.0, 1e-2), // on it: fastest
-            (2.0, 1e-2), // slower, no better
-            (2.0, 1e-4), // on it
-            (3.0, 1e-3), // slower and worse than the one before
-            (5.0, 1e-9), // on it: most accurate
-            (9.0, 1e-9), // as accurate, slower
-        ];
-        assert_eq!(front(&points, 0.0), [true, false, true, false, true, false]);
-        assert_eq!(front(&[], 0.0), [false; 0]);
-    }
-
-    #[test]
     fn of_equal_points_one_is_on_the_front_and_small_errors_are_equal() {
         assert_eq!(front(&[(1.0, 1e-3); 3], 0.0), [true, false, false]);
         let points = [(1.0, 1e-13), (2.0, 1e-15), (3.0, 0.0)];

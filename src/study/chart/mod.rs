@@ -11,6 +11,7 @@ mod run;
 mod scaling;
 mod timing;
 
+use run::Runs;
 use thiserror::Error;
 
 pub use peers::{Peer, PeerRow};
@@ -68,13 +69,16 @@ pub fn chart(
     options: &ChartOptions,
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> Result<Chart, ChartError> {
-    let cells = plan::cells(scenario, &options.contenders);
+    let each = |&who: &Contender| {
+        let knobs = who.knobs().into_iter();
+        knobs.map(move |knob| Runs::new(scenario, who, knob))
+    };
+    let mut all: Vec<Runs> = options.contenders.iter().flat_map(each).collect();
     let (reference, rows, rounds) = on_one_thread(options.seconds, || {
-        let (measured, rounds) = timing::measure(&cells, options.seconds, progress);
-        let found = reference::find(scenario, rows::stations(&measured))?;
+        let rounds = timing::measure(&mut all, options.seconds, progress);
+        let found = reference::find(scenario, rows::stations(&all))?;
         let (reference, answer) = found.unzip();
-        let rows = rows::rows(scenario, &cells, &measured, answer.as_ref());
-        Ok((reference, rows, rounds))
+        Ok((reference, rows::rows(&all, answer.as_ref()), rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);

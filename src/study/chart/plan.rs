@@ -1,11 +1,10 @@
-//! The contents of a chart: contenders, their accuracy settings, and the cells.
+//! The contents of a chart: contenders and their accuracy settings.
 
 use std::fmt;
 
 use serde::{Serialize, Serializer};
 
 use crate::relax::Method;
-use crate::scenario::Scenario;
 use crate::words::read_and_write;
 
 /// A method for an equilibrium, with one setting for its accuracy.
@@ -94,27 +93,6 @@ impl fmt::Display for Setting {
             Setting::Segments(segments) => write!(f, "segments={segments}"),
         }
     }
-}
-
-/// One point of a chart: a leaf, a contender, and its setting.
-#[derive(Clone, Copy, Debug)]
-pub struct Cell<'s> {
-    pub scenario: &'s Scenario,
-    pub contender: Contender,
-    pub knob: Setting,
-}
-
-/// All settings of these contenders.
-pub fn cells<'s>(scenario: &'s Scenario, contenders: &[Contender]) -> Vec<Cell<'s>> {
-    let cells = contenders.iter().flat_map(|&contender| {
-        let knobs = contender.knobs().into_iter();
-        knobs.map(move |knob| Cell {
-            scenario,
-            contender,
-            knob,
-        })
-    });
-    cells.collect()
 }
 
 #[cfg(test)]

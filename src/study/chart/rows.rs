@@ -1,12 +1,13 @@
 //! Rows of a chart from the results of runs: true errors, and runs that ended in another
 //! equilibrium.
 
-use super::plan::{Cell, Contender};
+use super::plan::Contender;
 use super::reference::Reference;
-use super::timing::{Measured, Spread};
+use super::run::Runs;
+use super::timing::Spread;
 use super::{Ending, Row};
 use crate::relax::{Method, Outcome};
-use crate::scenario::{Scenario, longest};
+use crate::scenario::longest;
 use crate::study::judge::{Answer, common};
 
 /// Errors above this are not due to discretisation if the run's own estimate is
@@ -17,8 +18,8 @@ const MUCH_LESS: f64 = 0.5;
 /// Stations required of the reference: those of all runs, so that
 /// nothing has to be interpolated. The stations of runs on one grid are usually among those of
 /// the others; only those that are not are added.
-pub fn stations(measured: &[Measured]) -> Vec<f64> {
-    let runs = || measured.iter().filter_map(Measured::answer);
+pub fn stations(all: &[Runs]) -> Vec<f64> {
+    let runs = || all.iter().filter_map(Runs::answer);
     let Some(fewest) = runs().min_by_key(|run| run.stations.len()) else {
         return Vec::new();
     };
@@ -31,75 +32,47 @@ pub fn stations(measured: &[Measured]) -> Vec<f64> {
     wanted
 }
 
-/// A cell, the measurement in it, and its distance from the reference,
-/// relative to the longest rod.
-struct Judged<'a> {
-    cell: &'a Cell<'a>,
-    measured: &'a Measured,
-    error: Option<f64>,
-}
-
-/// The rows of cells of one leaf.
-pub fn rows(
-    scenario: &Scenario,
-    cells: &[Cell],
-    measured: &[Measured],
-    reference: Option<&Answer>,
-) -> Vec<Row> {
-    let unit = longest(&scenario.rods);
-    let judged = cells.iter().zip(measured).map(|(cell, measured)| {
-        let distance = reference.and_then(|it| measured.at_rest()?.distance(it));
-        Judged {
-            cell,
-            measured,
-            error: distance.map(|distance| distance / unit),
-        }
-    });
-    let judged: Vec<Judged> = judged.collect();
-    (0..judged.len())
-        .map(|i| row(&judged[i], is_elsewhere(i, &judged, unit)))
-        .collect()
+/// The rows of one leaf.
+pub fn rows(all: &[Runs], reference: Option<&Answer>) -> Vec<Row> {
+    let errors: Vec<Option<f64>> = all.iter().map(|runs| runs.error(reference)).collect();
+    let row = |i: usize| row(&all[i], errors[i], is_elsewhere(i, all, &errors));
+    (0..all.len()).map(row).collect()
 }
 
 /// Whether the error of a run is due to another equilibrium.
-fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
-    let this = &judged[i];
-    let (Some(answer), Some(error)) = (this.measured.at_rest(), this.error) else {
+fn is_elsewhere(i: usize, all: &[Runs], errors: &[Option<f64>]) -> bool {
+    let this = &all[i];
+    let (Some(answer), Some(error)) = (this.at_rest(), errors[i]) else {
         return false;
     };
     if error <= ELSEWHERE {
         return false;
     }
-    if !this.cell.contender.one_grid {
+    let unit = longest(&this.scenario.rods);
+    if !this.contender.one_grid {
         let estimate = answer.error_estimate.map(|estimate| estimate / unit);
         return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
     }
     // On one grid, without an error estimate: if a coarser grid is much more accurate,
     // or the next grid has nearly the same shape.
-    let alike = |other: &&Judged| other.cell.contender == this.cell.contender;
-    let mut coarser = judged[..i].iter().filter(alike);
-    if coarser.any(|it| it.error.is_some_and(|there| there < MUCH_LESS * error)) {
+    let alike = |other: &usize| all[*other].contender == this.contender;
+    let mut coarser = (0..i).filter(alike);
+    if coarser.any(|it| errors[it].is_some_and(|there| there < MUCH_LESS * error)) {
         return true;
     }
-    let finer = judged[i + 1..].iter().find(alike);
-    let finer = finer.and_then(|it| it.measured.at_rest());
-    let coarser = || judged[..i].iter().rfind(alike)?.measured.at_rest();
-    let next = finer.or_else(coarser);
+    let at_rest = |other: usize| all[other].at_rest();
+    let finer = (i + 1..all.len()).find(alike).and_then(at_rest);
+    let next = finer.or_else(|| (0..i).rfind(alike).and_then(at_rest));
     let apart = next.and_then(|next| answer.distance(next));
     apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
 }
 
-fn row(judged: &Judged, elsewhere: bool) -> Row {
-    let Judged {
-        cell,
-        measured,
-        error,
-    } = judged;
+fn row(runs: &Runs, error: Option<f64>, elsewhere: bool) -> Row {
     let blank = Row {
-        seconds: Spread::of(&measured.seconds),
-        ..Row::without_result(cell.contender, cell.knob, Ending::NotRun)
+        seconds: Spread::of(&runs.seconds),
+        ..Row::without_result(runs.contender, runs.knob, Ending::NotRun)
     };
-    let run = match &measured.found {
+    let run = match &runs.found {
         None => return blank,
         Some(Err(refusal)) => {
             return Row {
@@ -115,12 +88,12 @@ fn row(judged: &Judged, elsewhere: bool) -> Row {
         _ if elsewhere => Ending::OtherEquilibrium,
         outcome => Ending::Ended(outcome),
     };
-    let unit = longest(&cell.scenario.rods);
+    let unit = longest(&runs.scenario.rods);
     Row {
         steps: Some(run.work.steps),
         factorizations: Some(run.work.factorizations),
         force_evaluations: Some(run.work.force_evaluations),
-        true_error: *error,
+        true_error: error,
         error_estimate: run.error_estimate.map(|estimate| estimate / unit),
         ending,
         // An unknown number of negative eigenvalues is not a failure.
@@ -187,8 +160,8 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
 mod tests {
     use glam::DVec3;
 
-    use super::super::plan;
     use super::*;
+    use crate::scenario::Scenario;
     use crate::study::judge::tests::rod;
 
     const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
@@ -215,24 +188,30 @@ mod tests {
         }
     }
 
-    fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Measured {
-        Measured {
-            found: Some(Ok(answer(outcome, shift, estimate))),
-            seconds: vec![1.0],
-        }
+    type Found = Option<Result<Answer, crate::relax::RelaxError>>;
+
+    fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Found {
+        Some(Ok(answer(outcome, shift, estimate)))
     }
 
-    /// The rows of a contender with these results at its first settings, and none
-    /// at the others.
-    fn judged(contender: &str, mut measured: Vec<Measured>) -> Vec<Row> {
-        let scenario = scenario();
-        let cells = plan::cells(&scenario, &[contender.parse().unwrap()]);
-        measured.resize_with(cells.len(), || Measured {
-            found: None,
-            seconds: Vec::new(),
-        });
-        let reference = answer(Outcome::Converged, 0.0, None);
-        rows(&scenario, &cells, &measured, Some(&reference))
+    /// The runs of a contender with these results at its first settings.
+    fn runs(scenario: &Scenario, contender: Contender, found: Vec<Found>) -> Vec<Runs<'_>> {
+        let runs = contender.knobs().into_iter().zip(found);
+        runs.map(|(knob, found)| Runs {
+            found,
+            seconds: vec![1.0],
+            ..Runs::new(scenario, contender, knob)
+        })
+        .collect()
+    }
+
+    /// Their rows, and those of its other settings, which are not run.
+    fn judged(contender: &str, found: Vec<Found>) -> Vec<Row> {
+        let (scenario, contender) = (scenario(), contender.parse::<Contender>().unwrap());
+        let mut runs = runs(&scenario, contender, found);
+        let rest = contender.knobs().into_iter().skip(runs.len());
+        runs.extend(rest.map(|knob| Runs::new(&scenario, contender, knob)));
+        rows(&runs, Some(&answer(Outcome::Converged, 0.0, None)))
     }
 
     fn words(rows: &[Row]) -> Vec<&'static str> {
@@ -307,12 +286,17 @@ mod tests {
 
     #[test]
     fn the_reference_is_wanted_where_a_run_has_stations_of_its_own() {
+        let scenario = scenario();
         let with = |stations: &[f64]| {
-            let mut measured = found(Outcome::Converged, 0.0, None);
-            if let Some(Ok(run)) = &mut measured.found {
-                run.stations = stations.to_vec();
+            let run = Answer {
+                stations: stations.to_vec(),
+                ..answer(Outcome::Converged, 0.0, None)
+            };
+            let contender = Contender::ALL[0];
+            Runs {
+                found: Some(Ok(run)),
+                ..Runs::new(&scenario, contender, contender.knobs()[0])
             }
-            measured
         };
         let nested = [with(&[0.0, 0.25, 0.5, 0.75, 1.0]), with(&STATIONS)];
         assert_eq!(stations(&nested), STATIONS);

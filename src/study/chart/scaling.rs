@@ -1,11 +1,11 @@
 //! Cost against the number of veins, at a fixed accuracy.
 
-use super::plan::{Cell, Contender, SEGMENTS, Setting};
+use super::plan::{Contender, SEGMENTS, Setting};
 use super::reference;
-use super::run::run;
+use super::run::Runs;
 use super::{ChartError, ChartOptions, Ending, Row, Turn, on_one_thread, rows, timing};
 use crate::relax::{MAX_NODES, Method, Outcome, RelaxError, check_tolerance};
-use crate::scenario::{Scenario, longest};
+use crate::scenario::Scenario;
 use crate::study::judge::Answer;
 use serde::Serialize;
 
@@ -95,7 +95,7 @@ fn measure(
     let leaves: Vec<Leaf> = leaves.collect::<Result<_, RelaxError>>()?;
     // From few veins to many: if a contender takes too long for one leaf,
     // it is not tried on larger ones.
-    let (mut cells, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut all, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for &contender in &options.contenders {
         for leaf in &leaves {
             let knob = match (contender.one_grid, leaf.grid) {
@@ -106,19 +106,14 @@ fn measure(
                     continue;
                 }
             };
-            cells.push(Cell {
-                scenario: leaf.scenario,
-                contender,
-                knob,
-            });
+            all.push(Runs::new(leaf.scenario, contender, knob));
             of_leaf.push(leaf);
         }
     }
-    let (measured, _) = timing::measure(&cells, options.seconds, progress);
-    for ((cell, leaf), measured) in cells.iter().zip(of_leaf).zip(measured) {
-        let (scenario, reference) = (leaf.scenario, leaf.reference.as_ref());
-        let rods = scenario.rods.len();
-        let row = rows::rows(scenario, &[*cell], &[measured], reference);
+    timing::measure(&mut all, options.seconds, progress);
+    for (runs, leaf) in all.into_iter().zip(of_leaf) {
+        let rods = leaf.scenario.rods.len();
+        let row = rows::rows(&[runs], leaf.reference.as_ref());
         rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
     let order = |contender| Contender::ALL.iter().position(|other| *other == contender);
@@ -129,21 +124,15 @@ fn measure(
 /// The coarsest single grid whose error is within the tolerance.
 fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Option<usize> {
     let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
+    let grids = Contender {
+        method: Method::default(),
+        one_grid: true,
+    };
     let accurate = |&segments: &usize| {
-        let cell = Cell {
-            scenario,
-            contender: Contender {
-                method: Method::default(),
-                one_grid: true,
-            },
-            knob: Setting::Segments(segments),
-        };
-        let Ok((answer, _)) = run(&cell) else {
-            return false;
-        };
-        let distance = answer.distance(reference);
-        let within = |distance: f64| distance / longest(&scenario.rods) <= tolerance;
-        answer.at_rest() && distance.is_some_and(within)
+        let mut run = Runs::new(scenario, grids, Setting::Segments(segments));
+        run.found = Some(run.once().map(|(answer, _)| answer));
+        let error = run.error(Some(reference));
+        error.is_some_and(|error| error <= tolerance)
     };
     SEGMENTS.into_iter().take_while(fits).find(accurate)
 }

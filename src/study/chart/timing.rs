@@ -1,17 +1,15 @@
-//! Fair timing: all cells take turns, so that a varying load of the machine affects
+//! Fair timing: all settings take turns, so that a varying load of the machine affects
 //! them equally.
 
 use serde::{Serialize, Serializer};
 
-use super::plan::{Cell, Contender};
-use super::run::run;
-use crate::relax::RelaxError;
-use crate::study::judge::Answer;
+use super::plan::Contender;
+use super::run::Runs;
 
 /// Runs that take longer, in seconds, are slow: they are not repeated.
 const SLOW: f64 = 1.0;
 
-/// Shorter runs, in seconds, follow one that is not measured: those of the other cells have
+/// Shorter runs, in seconds, follow one that is not measured: those of the others have
 /// displaced their code and data from the processor's caches.
 const SHORT: f64 = 0.01;
 
@@ -32,27 +30,6 @@ pub struct Turn {
     pub round: usize,
     /// Number of rounds, as far as known.
     pub rounds: usize,
-}
-
-/// A cell after all rounds.
-pub struct Measured {
-    /// The result of the first run. `None`: it was not run, since a coarser one of
-    /// its contender took too long.
-    pub found: Option<Result<Answer, RelaxError>>,
-    /// Seconds of each run, ascending.
-    pub seconds: Vec<f64>,
-}
-
-impl Measured {
-    /// The answer, unless the run was refused or not made.
-    pub fn answer(&self) -> Option<&Answer> {
-        self.found.as_ref()?.as_ref().ok()
-    }
-
-    /// The answer, if the leaf is at rest.
-    pub fn at_rest(&self) -> Option<&Answer> {
-        self.answer().filter(|run| run.at_rest())
-    }
 }
 
 /// The spread of repeated measurements, in seconds.
@@ -114,78 +91,70 @@ pub fn serialize_spread<S: Serializer>(
     }
 }
 
-/// Runs all cells once, in order, and those that are not slow [`FEWEST`] times;
+/// Runs all settings once, in order, and those that are not slow [`FEWEST`] times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
-/// Cells of one contender are ordered by cost: if one takes longer than
-/// the budget (or [`SLOW`]), those after it are not run. Also returns the number
-/// of rounds.
-pub fn measure(
-    cells: &[Cell],
-    budget: f64,
-    progress: &mut (dyn FnMut(&Turn) + Send),
-) -> (Vec<Measured>, usize) {
-    let mut run = |cell: &Cell, round: usize, rounds: usize| {
+/// Settings of one contender are ordered by cost: if one takes longer than
+/// the budget (or [`SLOW`]), those after it are not run. Returns the number of rounds.
+pub fn measure(all: &mut [Runs], budget: f64, progress: &mut (dyn FnMut(&Turn) + Send)) -> usize {
+    let mut run = |runs: &Runs, round: usize, rounds: usize| {
         progress(&Turn {
-            rods: cell.scenario.rods.len(),
-            contender: cell.contender,
-            knob: cell.knob,
+            rods: runs.scenario.rods.len(),
+            contender: runs.contender,
+            knob: runs.knob,
             round,
             rounds,
         });
-        run(cell)
+        runs.once()
     };
     let longest = budget.max(SLOW);
     let mut too_slow = Vec::new();
-    let mut measured: Vec<Measured> = Vec::with_capacity(cells.len());
-    for cell in cells {
-        let mut seconds = Vec::new();
-        let found = (!too_slow.contains(&cell.contender)).then(|| {
-            let (run, time) = run(cell, 1, FEWEST)?;
-            seconds.push(time);
+    for runs in all.iter_mut() {
+        if too_slow.contains(&runs.contender) {
+            continue;
+        }
+        runs.found = Some(run(runs, 1, FEWEST).map(|(answer, time)| {
+            runs.seconds.push(time);
             if time > longest {
-                too_slow.push(cell.contender);
+                too_slow.push(runs.contender);
             }
-            Ok(run)
-        });
-        measured.push(Measured { found, seconds });
+            answer
+        }));
     }
-    let mut run_again = |measured: &mut Measured, cell: &Cell, round: usize, rounds: usize| {
-        if measured.seconds[0] < SHORT {
-            let _ = run(cell, round, rounds);
+    let mut run_again = |runs: &mut Runs, round: usize, rounds: usize| {
+        if runs.seconds[0] < SHORT {
+            let _ = run(runs, round, rounds);
         }
         // It succeeded before, and does so again.
-        if let Ok((_, time)) = run(cell, round, rounds) {
-            measured.seconds.push(time);
+        if let Ok((_, time)) = run(runs, round, rounds) {
+            runs.seconds.push(time);
         }
     };
-    let is_fast = |cell: &Measured| cell.seconds.first().is_some_and(|&time| time < SLOW);
+    let is_fast = |runs: &Runs| runs.seconds.first().is_some_and(|&time| time < SLOW);
     for round in 1..FEWEST {
-        for (cell, measured) in cells.iter().zip(&mut measured) {
-            if is_fast(measured) {
-                run_again(measured, cell, round + 1, FEWEST);
-            }
+        for runs in all.iter_mut().filter(|runs| is_fast(runs)) {
+            run_again(runs, round + 1, FEWEST);
         }
     }
-    let share = budget / measured.iter().filter(|cell| is_fast(cell)).count().max(1) as f64;
-    let repeats: Vec<usize> = (measured.iter())
-        .map(|cell| repeats(&cell.seconds, share))
+    let share = budget / all.iter().filter(|runs| is_fast(runs)).count().max(1) as f64;
+    let repeats: Vec<usize> = (all.iter())
+        .map(|runs| repeats(&runs.seconds, share))
         .collect();
     let rest = repeats.iter().copied().max().unwrap_or(0);
     for round in 0..rest {
-        for ((cell, measured), repeats) in cells.iter().zip(&mut measured).zip(&repeats) {
+        for (runs, repeats) in all.iter_mut().zip(&repeats) {
             if runs_in(round, *repeats, rest) {
-                run_again(measured, cell, FEWEST + round + 1, FEWEST + rest);
+                run_again(runs, FEWEST + round + 1, FEWEST + rest);
             }
         }
     }
-    for cell in &mut measured {
-        cell.seconds.sort_by(f64::total_cmp);
+    for runs in all {
+        runs.seconds.sort_by(f64::total_cmp);
     }
-    (measured, FEWEST + rest)
+    FEWEST + rest
 }
 
 /// Number of further runs after the first few, within a `share` of the time: none for a slow
-/// cell. The first run may be disturbed; the fastest one is used.
+/// one. The first run may be disturbed; the fastest one is used.
 fn repeats(seconds: &[f64], share: f64) -> usize {
     let shortest = seconds.iter().copied().reduce(f64::min);
     match shortest {
@@ -197,7 +166,7 @@ fn repeats(seconds: &[f64], share: f64) -> usize {
     }
 }
 
-/// Whether a cell with so many `repeats` runs in this round: they are spread evenly over all
+/// Whether a setting with so many `repeats` runs in this round: they are spread evenly over all
 /// `rounds`.
 fn runs_in(round: usize, repeats: usize, rounds: usize) -> bool {
     (round + 1) * repeats / rounds > round * repeats / rounds

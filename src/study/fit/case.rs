@@ -120,7 +120,7 @@ impl CaseAt {
     /// The components of an experiment.
     fn compared<'v>(&'v self, of: &Observed, veins: &mut Vec<Option<Vein<'v>>>) -> Vec<Component> {
         let mut components = Vec::new();
-        for measured in &of.measured {
+        for measured in &of.experiment.measured {
             components.push(Component {
                 experiment: of.number,
                 what: Compared::Result(measured.quantity),
@@ -128,7 +128,7 @@ impl CaseAt {
                 model: self.result(measured.quantity),
                 sd: measured.sd,
                 free: false,
-                origin: of.origin.clone(),
+                origin: of.experiment.origin.clone(),
             });
         }
         for traced in &of.traced {

@@ -31,29 +31,22 @@ const CLEARLY: f64 = 0.5;
 /// Excess below the minimum, in variances, that indicates a better minimum.
 pub(super) const BETTER: f64 = 0.1;
 
-/// The end of a profile on one side.
-pub(super) enum Side {
-    /// At this distance from the minimum.
-    At(f64),
-    /// Not within a factor of ten, nor before a bound.
-    Open,
-    /// Leaves cannot be followed to it.
-    Lost,
-}
-
-/// The ends of an interval as determined by a few points around a minimum.
-pub(super) enum Ends {
-    /// They are those of the quadratic approximation,
-    Quadratic,
-    /// or not, below and above; as errors, approximate distances that are not confirmed.
-    Searched([Result<Side, f64>; 2]),
-}
+/// The distance from the minimum at which a profile ends on one side. `None` if it does not within
+/// a factor of ten, nor before a bound, or if leaves cannot be followed to its end.
+pub(super) type Reach = Option<f64>;
 
 /// Residuals at a point near a minimum.
 type Known = (DVector<f64>, Point);
 
-/// The ends of an interval from a few points around the minimum; `None` if there are none.
-pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Option<Ends> {
+/// The ends of an interval below and above, from a few points around the minimum; as errors,
+/// approximate distances that are not confirmed. `None` if they are those of the quadratic
+/// approximation.
+pub(super) fn ends(
+    near: &Neighbourhood,
+    k: usize,
+    first: f64,
+    half: f64,
+) -> Option<[Result<Reach, f64>; 2]> {
     let stats = near.stats;
     let slopes = near.slopes();
     let along = stats.conditional(k);
@@ -62,7 +55,9 @@ pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Opt
         let expected = stats.quantile.powi(2);
         let off = |above: f64| (above / expected - 1.0).abs();
         let change = &along * first;
-        let up = near.residuals(stats.point, &near.moved(&change)).ok()?;
+        let Ok(up) = near.residuals(stats.point, &near.moved(&change)) else {
+            return Some([Err(half), Err(half)]);
+        };
         // By reflection, to second order.
         let linear = &stats.jacobian * change;
         let down = &up.0 - &linear - &linear;
@@ -72,7 +67,7 @@ pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Opt
             (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * QUADRATIC)
         };
         if sides.iter().all(clear) {
-            return Some(Ends::Quadratic);
+            return None;
         }
         known = Some(up);
     }
@@ -102,12 +97,8 @@ pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Opt
     };
     let down = distance(-1.0, theta - low, None);
     let up = distance(1.0, high - theta, known);
-    let same =
-        |side: &Result<Side, f64>| matches!(side, Ok(Side::At(distance)) if *distance == first);
-    Some(match same(&down) && same(&up) && half <= OPEN {
-        true => Ends::Quadratic,
-        false => Ends::Searched([down, up]),
-    })
+    let quadratic = half <= OPEN && down == Ok(Some(first)) && up == Ok(Some(first));
+    (!quadratic).then_some([down, up])
 }
 
 /// Search for the end of a profile on one side: along a parabola from the minimum, which
@@ -144,16 +135,16 @@ struct Correction {
 struct Failed;
 
 /// The result at a point: the end if this is it, or none, if another point follows.
-type Next = Result<Option<Side>, Failed>;
+type Next = Result<Option<Reach>, Failed>;
 
 impl Search<'_, '_, '_, '_> {
     /// Finds the end; `known` is the point at the first guess.
     ///
     /// # Errors
     /// The approximate distance of the end, if the search does not converge.
-    fn run(mut self, mut known: Option<Known>) -> Result<Side, f64> {
+    fn run(mut self, mut known: Option<Known>) -> Result<Reach, f64> {
         if self.most <= 0.0 {
-            return Ok(Side::Open);
+            return Ok(None);
         }
         let mut lost = 0;
         for step in 0..FEW {
@@ -167,7 +158,7 @@ impl Search<'_, '_, '_, '_> {
             };
             match self.evaluate(step == 0, found) {
                 Ok(None) => {}
-                Ok(Some(side)) => return Ok(side),
+                Ok(Some(end)) => return Ok(end),
                 Err(Failed) => break,
             }
         }
@@ -213,10 +204,10 @@ impl Search<'_, '_, '_, '_> {
             return Err(Failed);
         }
         if self.distance >= self.most && least.straight < wanted {
-            return Ok(Some(Side::Open));
+            return Ok(Some(None));
         }
         if first && (least.above / wanted - 1.0).abs() < QUADRATIC {
-            return Ok(Some(Side::At(self.distance)));
+            return Ok(Some(Some(self.distance)));
         }
         let gain = least.straight - least.above;
         let stagnates = self.there.is_some() && gain > STAGNATION * self.last.gain;
@@ -225,7 +216,7 @@ impl Search<'_, '_, '_, '_> {
             self.there = Some(self.near.slopes_at(point).map_err(|_| Failed)?);
             least = self.least(&residuals)?;
             if self.settled(&least) {
-                return Ok(Some(Side::At(self.distance)));
+                return Ok(Some(Some(self.distance)));
             }
         }
         if stagnates {

@@ -4,25 +4,19 @@
 use std::collections::HashMap;
 
 use super::FitError;
-use super::data::{Data, Experiment, Measured, Origin, Traced};
+use super::data::{Data, Experiment, Measured, Traced};
 use crate::study::Keys;
-
-/// Numbers of the scenario during an experiment.
-type Settings = Vec<(Keys, f64)>;
 
 /// An experiment with the points traced on its veins.
 pub(super) struct Observed {
     /// Its position among all.
     pub number: usize,
-    pub name: String,
-    pub origin: Option<Origin>,
-    pub measured: Vec<Measured>,
+    pub experiment: Experiment,
     pub traced: Vec<Traced>,
 }
 
-/// The conditions of one experiment or of several, and what was observed under them.
+/// One experiment or several under the same conditions.
 pub(super) struct Case {
-    pub settings: Settings,
     /// At least one.
     pub observed: Vec<Observed>,
     /// Whether it differs from the other cases by loads only: it then has the same
@@ -31,21 +25,30 @@ pub(super) struct Case {
 }
 
 impl Case {
-    fn new(settings: Settings) -> Case {
-        let mut targets = settings.iter().flat_map(|it| it.0.targets());
+    fn new(first: Observed) -> Case {
+        let settings = first.experiment.settings.iter();
+        let mut targets = settings.flat_map(|it| it.0.targets());
         let loaded_only = targets.all(|target| {
             let key = target.key();
             key.is_some_and(|key| key.path().starts_with("load."))
         });
         Case {
+            observed: vec![first],
             loaded_only,
-            settings,
-            observed: Vec::new(),
         }
     }
 
+    fn first(&self) -> &Experiment {
+        &self.observed[0].experiment
+    }
+
+    /// Numbers of the scenario under its conditions.
+    pub fn settings(&self) -> &[(Keys, f64)] {
+        &self.first().settings
+    }
+
     pub fn measured(&self) -> impl Iterator<Item = &Measured> + Clone {
-        self.observed.iter().flat_map(|it| &it.measured)
+        self.observed.iter().flat_map(|it| &it.experiment.measured)
     }
 
     pub fn traced(&self) -> impl Iterator<Item = &Traced> {
@@ -54,13 +57,13 @@ impl Case {
 
     /// The name of its first experiment.
     pub fn name(&self) -> &str {
-        self.observed.first().map_or("", |it| &it.name)
+        &self.first().name
     }
 
     /// The position of its first experiment in the data as the beginning of a message, if it
     /// has one.
     pub fn place(&self) -> String {
-        let origin = self.observed.first().and_then(|it| it.origin.as_ref());
+        let origin = self.first().origin.as_ref();
         origin.map_or_else(String::new, |origin| format!("{origin}: "))
     }
 }
@@ -70,36 +73,33 @@ impl Case {
 pub(super) fn cases(data: Data) -> Result<Vec<Case>, FitError> {
     let mut cases: Vec<Case> = Vec::new();
     let mut known = HashMap::new();
-    for (observed, settings) in observed(data)? {
-        let bits = settings.iter().map(|(keys, value)| {
+    for observed in observed(data)? {
+        let bits = observed.experiment.settings.iter().map(|(keys, value)| {
             // Names identify keys.
             (keys.to_string(), value.to_bits())
         });
         let case = *known.entry(bits.collect::<Vec<_>>()).or_insert(cases.len());
-        if case == cases.len() {
-            cases.push(Case::new(settings));
+        match cases.get_mut(case) {
+            Some(case) => case.observed.push(observed),
+            None => cases.push(Case::new(observed)),
         }
-        cases[case].observed.push(observed);
     }
     Ok(cases)
 }
 
-/// The experiments with data, and their settings.
-fn observed(data: Data) -> Result<Vec<(Observed, Settings)>, FitError> {
-    let observed = |experiment: Experiment| {
-        let observed = Observed {
-            number: 0,
-            name: experiment.name,
-            origin: experiment.origin,
-            measured: experiment.measured,
-            traced: Vec::new(),
-        };
-        (observed, experiment.settings)
+/// The experiments with data.
+fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
+    let observed = |experiment: Experiment| Observed {
+        number: 0,
+        experiment,
+        traced: Vec::new(),
     };
     let mut all: Vec<_> = data.experiments.into_iter().map(observed).collect();
     let mut named = HashMap::new();
-    for (place, (observed, _)) in all.iter().enumerate() {
-        named.entry(observed.name.clone()).or_insert(place);
+    for (place, observed) in all.iter().enumerate() {
+        named
+            .entry(observed.experiment.name.clone())
+            .or_insert(place);
     }
     let mut plain = None;
     for traced in data.traced {
@@ -120,10 +120,10 @@ fn observed(data: Data) -> Result<Vec<(Observed, Settings)>, FitError> {
                 all.len() - 1
             }),
         };
-        all[place].0.traced.push(traced);
+        all[place].traced.push(traced);
     }
-    all.retain(|(it, _)| !it.measured.is_empty() || !it.traced.is_empty());
-    for (number, (observed, _)) in all.iter_mut().enumerate() {
+    all.retain(|it| !it.experiment.measured.is_empty() || !it.traced.is_empty());
+    for (number, observed) in all.iter_mut().enumerate() {
         observed.number = number;
     }
     Ok(all)

@@ -39,12 +39,6 @@ pub(super) fn fit(
         // Away from a minimum, the data may be insensitive to other combinations.
         _ => Vec::new(),
     };
-    let keys: Vec<String> = coordinates
-        .iter()
-        .map(|free| free.keys.to_string())
-        .collect();
-    let logs: Vec<bool> = coordinates.iter().map(|free| free.log).collect();
-    let units: Vec<f64> = coordinates.iter().map(|free| free.unit).collect();
     let outcome = match end {
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
@@ -69,9 +63,9 @@ pub(super) fn fit(
         correlations: stats.correlations(),
         undetermined: open
             .iter()
-            .map(|open| words::map(open, &keys, &units))
+            .map(|open| words::map(open, coordinates))
             .collect(),
-        says: words::sentences(&parameters, &open, (&logs, &units)),
+        says: words::sentences(&parameters, &open, coordinates),
         parameters,
         chi_squared: match stats.known {
             true => stats.residuals.norm_squared(),
@@ -232,7 +226,7 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
                 Compared::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
             };
             FitResidual {
-                experiment: observed[component.experiment].name.clone(),
+                experiment: observed[component.experiment].experiment.name.clone(),
                 what: component.what.column(),
                 rod,
                 sigma,
@@ -263,7 +257,7 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
                 curves: curves.clone(),
                 traced: traced.map(|traced| (traced.rod, traced.at)).collect(),
             };
-            leaves.push((observed.number, observed.name.clone(), leaf));
+            leaves.push((observed.number, observed.experiment.name.clone(), leaf));
         }
     }
     leaves.sort_by_key(|(number, ..)| *number);

@@ -3,7 +3,7 @@
 
 use nalgebra::DVector;
 
-use super::end::{BETTER, Ends, QUADRATIC, Side, ends};
+use super::end::{BETTER, QUADRATIC, Reach, ends};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
 use super::neighbourhood::Neighbourhood;
@@ -74,16 +74,12 @@ fn parameter(
     }
     let (low, high) = (parameter.low, parameter.high);
     let half = stats.quantile * stats.deviation(k).0;
-    let mut sides = [Side::At(half), Side::At(half)];
+    let mut sides = [Some(half), Some(half)];
     let (deviation, along) = shape.deviation(k);
     let first = shape.quantile * deviation;
-    let few = near.and_then(|near| ends(near, k, first, half));
-    let few = match few {
-        Some(Ends::Quadratic) => None,
-        Some(Ends::Searched(found)) => Some(found),
-        None if half > OPEN || near.is_some() || !straight(shape, &along, first) => {
-            Some([Err(half), Err(half)])
-        }
+    let few = match near {
+        Some(near) => ends(near, k, first, half),
+        None if half > OPEN || !straight(shape, &along, first) => Some([Err(half), Err(half)]),
         None => None,
     };
     if let Some(found) = few {
@@ -96,18 +92,13 @@ fn parameter(
             };
         }
     }
-    let end = |side: &Side, sign: f64, bound: f64, given: Option<f64>| match side {
-        Side::At(reach) => {
-            let end = theta + sign * reach;
-            match (bound - end) * sign < 0.0 {
-                // Outside the possible or permitted range.
-                true => given,
-                false => Some(free.value(end)),
-            }
-        }
-        Side::Open | Side::Lost => given,
+    let end = |side: Reach, sign: f64, bound: f64, given: Option<f64>| {
+        let end = side.map(|reach| theta + sign * reach);
+        // Outside the possible or permitted range.
+        let inside = end.filter(|end| (bound - end) * sign >= 0.0);
+        inside.map_or(given, |end| Some(free.value(end)))
     };
-    let [down, up] = &sides;
+    let [down, up] = sides;
     parameter.low = end(down, -1.0, free.bounds[0], low);
     parameter.high = end(up, 1.0, free.bounds[1], high);
     let near = |end: Option<f64>| end.is_some_and(|end| (free.of(end) - theta).abs() <= OPEN);
@@ -145,7 +136,7 @@ fn profile(
     k: usize,
     (first, along): (f64, &DVector<f64>),
     progress: &mut dyn FnMut(usize, f64),
-) -> Result<Side, Point> {
+) -> Result<Reach, Point> {
     let sign = first.signum();
     let [low, high] = stats.model.coordinates[k].bounds;
     let to_bound = match sign < 0.0 {
@@ -162,7 +153,7 @@ fn profile(
     let mut lost = 0;
     for _ in 0..PROFILE_STEPS {
         if most <= 0.0 {
-            return Ok(Side::Open);
+            return Ok(None);
         }
         let from = nearest.as_ref().unwrap_or(stats.point);
         let start = (stats.model).moved(&from.theta, sign * (reach - inside.0), along);
@@ -177,7 +168,7 @@ fn profile(
         let Some((least, End::Converged, _)) = least else {
             lost += 1;
             if lost > MOST_LOST {
-                return Ok(Side::Lost);
+                return Ok(None);
             }
             reach = 0.5 * (inside.0 + reach);
             continue;
@@ -188,7 +179,7 @@ fn profile(
         }
         let root = above.max(0.0).sqrt();
         if (root / stats.quantile - 1.0).abs() < PROFILE_ACCURACY {
-            return Ok(Side::At(reach));
+            return Ok(Some(reach));
         }
         match root < stats.quantile {
             true => {
@@ -198,7 +189,7 @@ fn profile(
             false => outside = Some((reach, root)),
         }
         reach = match outside {
-            None if reach >= most => return Ok(Side::Open),
+            None if reach >= most => return Ok(None),
             None => {
                 let factor = stats.quantile / root.max(0.3 * stats.quantile);
                 (reach * factor * 1.05).min(most)
@@ -210,8 +201,5 @@ fn profile(
             }
         };
     }
-    Ok(match outside {
-        Some((end, _)) => Side::At(end),
-        None => Side::Lost,
-    })
+    Ok(outside.map(|(end, _)| end))
 }

@@ -112,7 +112,7 @@ impl<'a> Model<'a> {
             }
             let both =
                 |(keys, _): &&(Keys, f64)| coordinates.iter().any(|free| free.keys.overlaps(keys));
-            if let Some((keys, _)) = case.settings.iter().find(both) {
+            if let Some((keys, _)) = case.settings().iter().find(both) {
                 let place = case.place();
                 let why = format!("{place}{keys} is set by the experiment, and free");
                 return Err(FitError::Data(why));
@@ -130,7 +130,7 @@ impl<'a> Model<'a> {
     }
 
     pub(super) fn values<'s>(&'s self, case: &'s Case, theta: &[f64]) -> Vec<(&'s Keys, f64)> {
-        let settings = case.settings.iter().map(|(keys, value)| (keys, *value));
+        let settings = case.settings().iter().map(|(keys, value)| (keys, *value));
         let free = self.coordinates.iter().zip(theta);
         settings
             .chain(free.map(|(free, theta)| (&free.keys, free.value(*theta))))

@@ -65,8 +65,10 @@ impl<'a> Vein<'a> {
             let slope = mask * slope;
             (slope.dot(x - seen), slope.length_squared(), x)
         };
-        // Newton's method without the curvature; then the secant method.
+        // Newton's method without the curvature, then the secant method; bisection where a step
+        // leaves the bracket of the zero.
         let mut sigma = self.nodes[best].0;
+        let (mut below, mut above) = (low, high);
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..ITERATIONS {
             let (value, squared, x) = rate(sigma);
@@ -77,76 +79,31 @@ impl<'a> Vein<'a> {
                 _ if squared > 0.0 => -value / squared,
                 _ => 0.0,
             };
-            // On a straight extension, the first step is exact.
-            let inside = (low..=high).contains(&(sigma + step));
-            let [base, tip] = [
-                low == 0.0 && sigma + step < low,
-                high == 1.0 && sigma + step > high,
-            ];
             if step.abs() < EXACT {
                 return (sigma, x);
             }
-            if !(inside || base || tip) || !step.is_finite() {
-                break;
+            match value < 0.0 {
+                true => below = sigma,
+                false => above = sigma,
             }
-            if base || tip {
-                let end = if base { low } else { high };
-                if sigma == end {
+            let next = sigma + step;
+            let ends = [(0.0, below, next < low), (1.0, above, next > high)];
+            let beyond = ends.iter().find(|(end, it, out)| *out && end == it);
+            before = Some((sigma, value));
+            sigma = match beyond {
+                // On a straight extension, the first step is exact.
+                Some((end, ..)) if sigma == *end => {
                     let beyond = end - value / squared;
                     return (beyond, self.point(beyond).0);
                 }
-                sigma = end;
-                before = None;
-                continue;
-            }
-            before = Some((sigma, value));
-            sigma += step;
+                Some((end, ..)) => {
+                    before = None;
+                    *end
+                }
+                None if (below..=above).contains(&next) => next,
+                None => 0.5 * (below + above),
+            };
         }
-        let found = self.bracketed(self.nodes[best].0, (low, high), &|sigma| {
-            let (value, squared, _) = rate(sigma);
-            (value, squared)
-        });
-        (found, self.point(found).0)
-    }
-
-    /// The same between two nodes next to the best, where the derivative changes its sign.
-    fn bracketed(
-        &self,
-        best: f64,
-        (mut low, mut high): (f64, f64),
-        rate: &dyn Fn(f64) -> (f64, f64),
-    ) -> f64 {
-        let ends = [low, high].map(|end| (end, rate(end)));
-        let [mut at_low, mut at_high] = ends.map(|(_, (value, _))| value);
-        for ((end, (value, squared)), beyond) in ends.into_iter().zip([at_low > 0.0, at_high < 0.0])
-        {
-            if beyond && (end == 0.0 || end == 1.0) {
-                return end - value / squared.max(f64::MIN_POSITIVE);
-            }
-        }
-        let mut sigma = best;
-        if at_low > 0.0 || at_high < 0.0 {
-            return sigma;
-        }
-        // Regula falsi; the value at the retained end is halved (Illinois).
-        for _ in 0..ITERATIONS {
-            let middle = low + (high - low) * at_low / (at_low - at_high);
-            if (middle - sigma).abs() < EXACT || !middle.is_finite() {
-                break;
-            }
-            sigma = middle;
-            let at_middle = rate(middle).0;
-            if at_middle == 0.0 {
-                break;
-            }
-            if at_middle < 0.0 {
-                (low, at_low) = (middle, at_middle);
-                at_high *= 0.5;
-            } else {
-                (high, at_high) = (middle, at_middle);
-                at_low *= 0.5;
-            }
-        }
-        sigma
+        (sigma, self.point(sigma).0)
     }
 }

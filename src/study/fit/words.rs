@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::free::Coordinate;
 use super::result::FitParameter;
 
 /// An undetermined combination: coordinates and their coefficients.
@@ -13,8 +14,8 @@ pub(super) struct Undetermined {
 }
 
 /// The combination in the form of the result.
-pub(super) fn map(open: &Undetermined, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
-    let part = |(k, part): &(usize, f64)| (keys[*k].clone(), rounded(part * units[*k]));
+pub(super) fn map(open: &Undetermined, free: &[Coordinate]) -> BTreeMap<String, f64> {
+    let part = |&(k, part): &(usize, f64)| (free[k].keys.to_string(), rounded(part * free[k].unit));
     open.parts.iter().map(part).collect()
 }
 
@@ -28,12 +29,11 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-/// A sentence for each number and each undetermined combination. `logs` are the numbers
-/// whose coordinate is a logarithm, `units` those of the other coordinates.
+/// A sentence for each number and each undetermined combination.
 pub(super) fn sentences(
     parameters: &[FitParameter],
     open: &[Undetermined],
-    (logs, units): (&[bool], &[f64]),
+    free: &[Coordinate],
 ) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
@@ -43,13 +43,13 @@ pub(super) fn sentences(
         };
         let half = 0.5 * (high - low);
         let key = &parameter.key;
-        said.push(match logs[k] {
+        said.push(match free[k].log {
             true => format!("{key}: to {}", percent(half / parameter.value.abs())),
             false => format!("{key}: to {half:.2e}"),
         });
     }
     for open in open {
-        said.push(sentence(open, parameters, (logs, units)));
+        said.push(sentence(open, parameters, free));
     }
     said
 }
@@ -62,13 +62,9 @@ fn percent(part: f64) -> String {
     }
 }
 
-fn sentence(
-    open: &Undetermined,
-    parameters: &[FitParameter],
-    (logs, units): (&[bool], &[f64]),
-) -> String {
+fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate]) -> String {
     let key = |k: usize| parameters[k].key.as_str();
-    let all_logs = open.parts.iter().all(|(k, _)| logs[*k]);
+    let all_logs = open.parts.iter().all(|(k, _)| free[*k].log);
     match open.parts.as_slice() {
         [(k, _)] if open.exactly => format!("{}: not at all", key(*k)),
         [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
@@ -83,9 +79,9 @@ fn sentence(
         }
         parts => {
             // Of numbers that are not logarithms the combination is the tangent.
-            let change = |(k, part): &(usize, f64)| match logs[*k] {
+            let change = |(k, part): &(usize, f64)| match free[*k].log {
                 true => format!("{} in proportion to t^{}", key(*k), short(*part)),
-                false => format!("{} by {} ln t", key(*k), digits(part * units[*k])),
+                false => format!("{} by {} ln t", key(*k), digits(part * free[*k].unit)),
             };
             let changes: Vec<String> = parts.iter().map(change).collect();
             let unseen = if open.exactly {
