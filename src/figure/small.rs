@@ -1,6 +1,7 @@
 //! Several leaves in small panels, seen by one camera, to one scale.
 
 use super::kit::*;
+use crate::report::numbers::short;
 
 const COLUMNS: usize = 4;
 /// Margin to the left and right of the panels.
@@ -57,7 +58,7 @@ impl<'s> SmallPanels<'s> {
 
     /// Formats the width of a square of the grid.
     pub fn grid_width(&self) -> String {
-        self.setting.format_length(self.step / self.setting.scale())
+        format!("{} {}", short(self.step), self.setting.unit())
     }
 
     fn cell(&self, index: usize) -> Cell {
