@@ -23,8 +23,7 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let shown: Vec<DrawnLeaf> = (boundary.curves.iter())
         .flat_map(|curve| (curve.beside.iter()).map(|leaf| DrawnLeaf::new(curve.kind, leaf)))
         .collect();
-    let longest = shown.iter().flat_map(|it| &it.leaf.curves);
-    let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
+    let longest = longest(shown.iter().flat_map(|it| &it.leaf.curves));
     let shapes: Vec<Veins> = (shown.iter())
         .map(|it| Veins::through(&it.curves, &it.tips, longest))
         .collect();
@@ -76,8 +75,7 @@ impl<'b> DrawnLeaf<'b> {
         let mut curves = leaf.curves.clone();
         let largest = curves.iter().flatten().zip(from.iter().flatten());
         let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
-        let longest = curves.iter().map(|curve| length(curve));
-        let visible = VISIBLE * longest.fold(0.0, f64::max);
+        let visible = VISIBLE * longest(&curves);
         let mut caption = "buckled".to_string();
         if 0.0 < largest && largest < visible {
             let factor = round_step(visible / largest);
@@ -86,8 +84,7 @@ impl<'b> DrawnLeaf<'b> {
             }
             caption += &format!(" ×{}", short(factor));
         }
-        let ends = curves.iter().take(leaf.tips.len());
-        let tips = ends.filter_map(|curve| curve.last().copied()).collect();
+        let tips = tips(&curves, leaf.tips.len() == 1);
         DrawnLeaf {
             leaf,
             caption,

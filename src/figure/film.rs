@@ -94,12 +94,10 @@ fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> 
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
     let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
-    let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
+    let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
     scene.draw_box(&mut page);
-    scene.draw_labels(&mut page);
-    scene.draw_names(&mut page, 36.0, true);
-    scene.draw_gravity(&mut page);
-    scene.draw_leaf(&mut page, veins, 0.75 * veins.line_width());
+    scene.draw_axes(&mut page, 36.0);
+    scene.draw_leaf(&mut page, veins, THINNER * veins.line_width());
     let corner = DVec2::new(10.0, 17.0);
     page.label(corner, text, TEXT_SIZE, Anchor::Start, INK);
     page

@@ -49,16 +49,15 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
         drawing.group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let when = format!("t = {}", short(time));
-            let under = |page: &mut Drawing, scene: &Scene, _| {
-                for (path, stroke) in paths.iter().zip(strokes).rev() {
-                    let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
-                    if path.len() > 1 {
-                        page.stroke(polyline(&path), stroke);
-                    }
-                }
-            };
             let caption = (letter.as_str(), when.as_str(), NOTE);
-            panels.draw_over(page, index, veins, View::Oblique, caption, under);
+            let scene = panels.begin(page, index, OBLIQUE, caption);
+            for (path, stroke) in paths.iter().zip(strokes).rev() {
+                let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
+                if path.len() > 1 {
+                    page.stroke(polyline(&path), stroke);
+                }
+            }
+            scene.draw_leaf(page, veins, THINNER * veins.line_width());
         });
     }
     drawing

@@ -149,8 +149,7 @@ pub fn write_indices(page: &mut Drawing, axes: &Axes, boundary: &Boundary, label
             continue;
         }
         let places = curves[c].places().into_iter();
-        let sides = places.map(|(at, normal)| Sides::of(&curves, c, at, normal));
-        let best = clearest(sides, |sides| {
+        let best = clearest(places.map(|place| Sides::of(&curves, c, place)), |sides| {
             let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
             room.fold(f64::INFINITY, f64::min)
         });
@@ -162,6 +161,9 @@ pub fn write_indices(page: &mut Drawing, axes: &Axes, boundary: &Boundary, label
         }
     }
 }
+
+/// A place on a curve: the point, the normal to the right, and the indices on both sides.
+type Place = (DVec2, DVec2, [usize; 2]);
 
 /// A curve on the page.
 struct Curve {
@@ -198,13 +200,13 @@ impl Curve {
         }
     }
 
-    /// Points on it, each with the normal that points to the right, from the middle outwards.
-    fn places(&self) -> Vec<(DVec2, DVec2)> {
+    /// Places on it, from the middle outwards.
+    fn places(&self) -> Vec<Place> {
         let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
         let whole: f64 = self.pieces.iter().map(|(ends, _)| length(ends)).sum();
         let spacing = STEP.max(whole / MOST_TRIED as f64);
         let (mut places, mut before) = (Vec::new(), 0.0);
-        for (ends, _) in &self.pieces {
+        for (ends, sides) in &self.pieces {
             let (own, step) = (length(ends), ends[1] - ends[0]);
             let normal = step.perp().normalize_or_zero();
             let normal = if normal.x < 0.0 { -normal } else { normal };
@@ -213,7 +215,7 @@ impl Curve {
                 let part = (k as f64 + 0.5) / count as f64;
                 let off = (before + part * own - 0.5 * whole).abs();
                 if normal.x > ACROSS {
-                    places.push((off, (ends[0] + part * step, normal)));
+                    places.push((off, (ends[0] + part * step, normal, *sides)));
                 }
             }
             before += own;
@@ -241,7 +243,7 @@ struct Sides {
 }
 
 impl Sides {
-    fn of(curves: &[Curve], c: usize, at: DVec2, normal: DVec2) -> Self {
+    fn of(curves: &[Curve], c: usize, (at, normal, sides): Place) -> Self {
         let label = |along: f64, sign: f64, text: String| {
             let size = size(&text);
             let reach = 0.5 * (size * normal.abs()).element_sum() + GAP;
@@ -249,9 +251,6 @@ impl Sides {
             let corner = middle - 0.5 * size;
             (Cell { corner, size }, text)
         };
-        let own = curves[c].crossings(at, normal);
-        let own = own.min_by(|(a, _), (b, _)| a.abs().total_cmp(&b.abs()));
-        let (_, sides) = own.unwrap_or((0.0, [0; 2]));
         if curves[c].fold {
             let (fewer, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
             let text = format!("{fewer} and {more} meet");
@@ -260,26 +259,26 @@ impl Sides {
                 curves: vec![c],
             };
         }
-        // From the curve outwards, while the next one is close and the indices between them agree.
-        let mut others: Vec<(f64, [usize; 2], usize)> = Vec::new();
-        for (k, other) in curves.iter().enumerate().filter(|(_, it)| !it.fold) {
-            let crossings = other.crossings(at, normal);
-            others.extend(crossings.map(|(along, it)| (along, it, k)));
-        }
-        others.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let others = curves
+            .iter()
+            .enumerate()
+            .filter(|(k, it)| *k != c && !it.fold);
+        let mut others: Vec<(f64, [usize; 2], usize)> = others
+            .flat_map(|(k, it)| {
+                it.crossings(at, normal)
+                    .map(move |(at, sides)| (at, sides, k))
+            })
+            .collect();
         let mut named = vec![c];
+        // From the curve outwards, while the next one is close and the indices between them agree.
         let mut outside = |sign: f64, out: usize| {
+            others.sort_by(|a, b| (sign * a.0).total_cmp(&(sign * b.0)));
             let (mut along, mut index) = (0.0, sides[out]);
-            let mut next = |&(at, it, k): &(f64, [usize; 2], usize)| {
-                let step = sign * (at - along);
-                if k != c && (0.0..NEIGHBOURS).contains(&step) && it[1 - out] == index {
-                    (along, index) = (at, it[out]);
-                    named.push(k);
+            for (at, it, k) in &others {
+                if (0.0..NEIGHBOURS).contains(&(sign * (at - along))) && it[1 - out] == index {
+                    (along, index) = (*at, it[out]);
+                    named.push(*k);
                 }
-            };
-            match sign > 0.0 {
-                true => others.iter().for_each(&mut next),
-                false => others.iter().rev().for_each(&mut next),
             }
             label(along, sign, format!("index {index}"))
         };

@@ -30,9 +30,8 @@ fn notes(equilibrium: &Equilibrium, veins: &Veins, setting: &Setting) -> Vec<Str
         None => (),
     }
     if let Some(error) = equilibrium.accuracy.error_estimate {
-        let (error, unit) = setting.in_unit(error / veins.unit);
-        let error = power_of_ten(error);
-        notes.push(format!("error of positions ≤ {error} {unit}"));
+        let error = power_of_ten(setting.scale() * (error / veins.unit));
+        notes.push(format!("error of positions ≤ {error} {}", setting.unit()));
     }
     notes.extend(veins.notes(setting));
     notes

@@ -32,14 +32,15 @@ impl Marker {
             Marker::Ring => {
                 return page.shape(circle(at, 3.4), WHITE, Some(Stroke::new(color, 1.4)));
             }
-            Marker::Cross => {
-                for arm in [DVec2::new(3.6, 3.6), DVec2::new(3.6, -3.6)] {
-                    page.line(at - arm, at + arm, Stroke::new(color, 1.7));
-                }
-                return;
-            }
+            Marker::Cross => return cross(page, at, 3.6, Stroke::new(color, 1.7)),
         };
         page.shape(path, color, Some(Stroke::new(WHITE, 0.8)));
+    }
+}
+
+fn cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
+    for arm in [DVec2::new(half, half), DVec2::new(half, -half)] {
+        page.line(at - arm, at + arm, stroke);
     }
 }
 
@@ -101,11 +102,7 @@ pub fn draw_gravity(
         page.stroke(circle(at, 6.0), stroke);
         match toward {
             true => page.shape(circle(at, 1.8), INK, None),
-            false => {
-                for arm in [DVec2::new(4.2, 4.2), DVec2::new(4.2, -4.2)] {
-                    page.line(at - arm, at + arm, stroke);
-                }
-            }
+            false => cross(page, at, 4.2, stroke),
         }
     } else {
         let (half, along) = (0.5 * ARROW * direction, direction.normalize());

@@ -8,7 +8,7 @@ use crate::scenario::Scenario;
 
 const MOST: usize = 12;
 /// A motion towards the viewer in one view is visible in the other.
-const VIEWS: [View; 2] = [View::Oblique, View::Front];
+const VIEWS: [View; 2] = [OBLIQUE, FRONT];
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
@@ -37,14 +37,13 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
             let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
             let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let at_rest = |page: &mut Drawing, scene: &Scene, width: f64| {
-                    for vein in &rest.veins {
-                        let path = vein.path(|point| scene.place(point));
-                        page.stroke(path, Stroke::new(FRAME, 0.6 * width));
-                    }
-                };
-                let place = VIEWS.len() * index + k;
-                panels.draw_over(page, place, veins, view, caption, at_rest);
+                let scene = panels.begin(page, VIEWS.len() * index + k, view, caption);
+                let width = THINNER * veins.line_width();
+                for vein in &rest.veins {
+                    let path = vein.path(|point| scene.place(point));
+                    page.stroke(path, Stroke::new(FRAME, 0.6 * width));
+                }
+                scene.draw_leaf(page, veins, width);
             }
         });
     }

@@ -49,9 +49,9 @@ impl Cell {
                 *free = free.min(place.distance_squared(point));
             }
         }
-        // The first of equally free ones.
-        let best = (0..4).fold(0, |best, k| if free[k] > free[best] { k } else { best });
-        places[best]
+        // The first of equally free ones, up to rounding.
+        let freer = |k: usize, best: usize| free[k] > (1.0 + 1e-9) * free[best];
+        places[(0..4).fold(0, |best, k| if freer(k, best) { k } else { best })]
     }
 
     pub fn middle(&self) -> DVec2 {

@@ -45,29 +45,28 @@ fn draw_flat(
     scale: f64,
     [across, up]: [usize; 2],
 ) {
-    let flatten = |point: DVec3| DVec2::new(point[across], point[up]);
-    let middle = flatten(0.5 * (veins.low + veins.high));
-    let half = 0.5 * cell.size / scale;
-    let (low, high) = (middle - half, middle + half);
+    let middle = 0.5 * (veins.low + veins.high);
+    let camera = Camera::new(DVec3::AXES[across], DVec3::AXES[up]);
+    let camera = camera.placed(scale, middle, cell.middle());
     let shown = setting.scale();
-    let axis = |which: usize, low: f64, high: f64| Axis {
-        tick_spacing: Some(TICK_DISTANCE),
-        ..Axis::linear(&setting.axis(which), shown * low, shown * high)
+    let axis = |which: usize, pixels: f64| {
+        let half = 0.5 * pixels / scale;
+        let (low, high) = (middle[which] - half, middle[which] + half);
+        Axis {
+            tick_spacing: Some(TICK_DISTANCE),
+            ..Axis::linear(&setting.axis(which), shown * low, shown * high)
+        }
     };
     let axes = Axes {
         cell,
-        across: axis(across, low.x, high.x),
-        up: axis(up, low.y, high.y),
+        across: axis(across, cell.size.x),
+        up: axis(up, cell.size.y),
     };
     axes.draw(page);
-    let place = |point: DVec3| {
-        let from_low = scale * (flatten(point) - low);
-        DVec2::new(cell.corner.x + from_low.x, cell.end().y - from_low.y)
-    };
+    let place = |point: DVec3| camera.place(point);
     // Veins farther from the viewer first.
-    let toward = DVec3::AXES[across].cross(DVec3::AXES[up]);
     let nearness = |vein: &Vein| {
-        let ends = vein.pieces.iter().map(|piece| toward.dot(piece[3]));
+        let ends = vein.pieces.iter().map(|piece| camera.toward.dot(piece[3]));
         ends.sum::<f64>() / vein.pieces.len().max(1) as f64
     };
     let mut order: Vec<&Vein> = veins.veins.iter().collect();
@@ -77,11 +76,7 @@ fn draw_flat(
         page.stroke(vein.path(place), stroke);
     }
     leaf_markers(page, veins, place);
-    if let Some(gravity) = setting.gravity {
-        let direction = DVec2::new(gravity[across], -gravity[up]);
-        let (points, toward) = (veins.points().map(place), toward.dot(gravity) > 0.0);
-        draw_gravity(page, cell, points, direction, toward);
-    }
+    camera.draw_gravity(page, setting.gravity, cell, veins.points().map(place));
 }
 
 /// Starts and lengths of columns and rows, and the pixels per length of the
@@ -150,12 +145,10 @@ impl Panels {
         );
         drawing.group("space", |page| {
             let bounds = surrounding_box(veins.low, veins.high);
-            let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
+            let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
             title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
-            scene.draw_labels(page);
-            scene.draw_names(page, 38.0, true);
-            scene.draw_gravity(page);
+            scene.draw_axes(page, 38.0);
             scene.draw_leaf(page, veins, veins.line_width());
         });
     }

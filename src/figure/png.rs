@@ -3,12 +3,14 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
+use glam::DVec2;
 use rayon::prelude::*;
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform,
+    FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Rect, Stroke as Pen, StrokeDash,
+    Transform,
 };
 
-use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, Color, DASHES, Drawing, Mark, Path, Step, Stroke};
 use super::font::Font;
 
 const SCALE: f64 = 2.0;
@@ -22,12 +24,13 @@ const BAND: u32 = 320;
 
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let [width, height] = size(drawing);
+    let shapes = shapes(drawing);
     let starts = (0..height).step_by(BAND as usize);
     let bands: Vec<Range<u32>> = starts.map(|at| at..(at + BAND).min(height)).collect();
     let together = bands.chunks(rayon::current_num_threads());
     let painted = together.flat_map(|some| -> Vec<Pixmap> {
         let each = some.par_iter().cloned();
-        each.map(|rows| paint_rows(drawing, rows)).collect()
+        each.map(|rows| paint_rows(&shapes, width, rows)).collect()
     });
     encode([width, height], painted, out)
 }
@@ -38,56 +41,75 @@ fn size(drawing: &Drawing) -> [u32; 2] {
 }
 
 pub fn paint(drawing: &Drawing) -> Pixmap {
-    paint_rows(drawing, 0..size(drawing)[1])
+    let [width, height] = size(drawing);
+    paint_rows(&shapes(drawing), width, 0..height)
 }
 
-fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
-    let mut canvas = Pixmap::new(size(drawing)[0], rows.end - rows.start)
-        .expect("a page has a width and a height");
+/// A path to be painted `before` pixels left of a place on the page, and then rotated about
+/// that place by `turn` degrees.
+struct Shape {
+    path: tiny_skia::Path,
+    fill: Option<Color>,
+    stroke: Option<Stroke>,
+    at: DVec2,
+    turn: f32,
+    before: f64,
+}
+
+fn shapes(drawing: &Drawing) -> Vec<Shape> {
+    let font = Font::embedded();
+    let shape = |mark: &Mark| match mark {
+        Mark::Group(_) | Mark::EndGroup => None,
+        Mark::Shape { path, fill, stroke } => Some(Shape {
+            path: outline(path)?,
+            fill: *fill,
+            stroke: *stroke,
+            at: DVec2::ZERO,
+            turn: 0.0,
+            before: 0.0,
+        }),
+        Mark::Label(label) => Some(Shape {
+            path: outline(&font.outline(&label.text, label.size))?,
+            fill: Some(label.color),
+            stroke: None,
+            at: label.at,
+            turn: if label.rotated { -90.0 } else { 0.0 },
+            before: match label.anchor {
+                Anchor::Start => 0.0,
+                Anchor::Middle => 0.5,
+                Anchor::End => 1.0,
+            } * font.width(&label.text, label.size),
+        }),
+    };
+    drawing.marks.iter().filter_map(shape).collect()
+}
+
+fn paint_rows(shapes: &[Shape], width: u32, rows: Range<u32>) -> Pixmap {
+    let height = rows.end - rows.start;
+    let mut canvas = Pixmap::new(width, height).expect("a page has a width and a height");
     // White.
     canvas.data_mut().fill(u8::MAX);
-    let font = Font::embedded();
-    let place = Transform::from_translate(0.0, -(rows.start as f32));
-    let place = place.pre_scale(SCALE as f32, SCALE as f32);
-    let [top, bottom] = [rows.start, rows.end].map(|row| f64::from(row) / SCALE);
-    for mark in &drawing.marks {
-        match mark {
-            Mark::Group(_) | Mark::EndGroup => (),
-            Mark::Shape { path, fill, stroke } => {
-                let rim = stroke.map_or(1.0, |stroke| 1.0 + stroke.width);
-                let mut above = path.iter().flat_map(|step| heights(*step));
-                let mut below = above.clone();
-                if above.all(|y| y + rim < top) || below.all(|y| y - rim > bottom) {
-                    continue;
-                }
-                let Some(path) = outline(path) else { continue };
-                if let Some(fill) = fill {
-                    fill_path(&mut canvas, &path, *fill, place);
-                }
-                if let Some(stroke) = stroke {
-                    stroke_path(&mut canvas, &path, stroke, place);
-                }
-            }
-            Mark::Label(label) => {
-                let far = 2.0 * label.size;
-                let outside = label.at.y + far < top || label.at.y - far > bottom;
-                if label.rotated || !outside {
-                    paint_label(&mut canvas, label, &font, place);
-                }
-            }
+    let page = Transform::from_translate(0.0, -(rows.start as f32));
+    let page = page.pre_scale(SCALE as f32, SCALE as f32);
+    for shape in shapes {
+        let path = &shape.path;
+        let place = page
+            .pre_translate(shape.at.x as f32, shape.at.y as f32)
+            .pre_rotate(shape.turn)
+            .pre_translate(-shape.before as f32, 0.0);
+        let rim = (SCALE * shape.stroke.map_or(1.0, |stroke| 1.0 + stroke.width)) as f32;
+        let outside = |it: Rect| it.bottom() + rim < 0.0 || it.top() - rim > height as f32;
+        if path.bounds().transform(place).is_some_and(outside) {
+            continue;
+        }
+        if let Some(color) = shape.fill {
+            canvas.fill_path(path, &ink(color), FillRule::Winding, place, None);
+        }
+        if let Some(stroke) = &shape.stroke {
+            stroke_path(&mut canvas, path, stroke, place);
         }
     }
     canvas
-}
-
-/// Heights of the points of a step, which bound it.
-fn heights(step: Step) -> impl Iterator<Item = f64> + Clone {
-    let heights = match step {
-        Step::Move(to) | Step::Line(to) => [Some(to.y), None, None],
-        Step::Cubic(a, b, to) => [a, b, to].map(|point| Some(point.y)),
-        Step::Close => [None; 3],
-    };
-    heights.into_iter().flatten()
 }
 
 /// The path; `None` if there is nothing to paint, as for a single point.
@@ -113,10 +135,6 @@ fn ink(Color(red, green, blue): Color) -> Paint<'static> {
     paint
 }
 
-fn fill_path(canvas: &mut Pixmap, path: &tiny_skia::Path, color: Color, transform: Transform) {
-    canvas.fill_path(path, &ink(color), FillRule::Winding, transform, None);
-}
-
 fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, transform: Transform) {
     let dash = stroke.dashed.then(|| DASHES.map(|length| length as f32));
     let pen = Pen {
@@ -127,23 +145,6 @@ fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, tra
         ..Pen::default()
     };
     canvas.stroke_path(path, &ink(stroke.color), &pen, transform, None);
-}
-
-fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font, page: Transform) {
-    let Some(path) = outline(&font.outline(&label.text, label.size)) else {
-        return;
-    };
-    let before = match label.anchor {
-        Anchor::Start => 0.0,
-        Anchor::Middle => 0.5,
-        Anchor::End => 1.0,
-    } * font.width(&label.text, label.size);
-    let turn = if label.rotated { -90.0 } else { 0.0 };
-    let place = page
-        .pre_translate(label.at.x as f32, label.at.y as f32)
-        .pre_rotate(turn)
-        .pre_translate(-before as f32, 0.0);
-    fill_path(canvas, &path, label.color, place);
 }
 
 /// Writes rows as they are painted.
@@ -184,7 +185,6 @@ fn encode(
 mod tests {
     use super::*;
     use crate::figure::drawing::{DOT, INK, circle, rectangle};
-    use glam::DVec2;
     use std::io::Cursor;
 
     #[test]

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use crate::report::numbers::short;
 use crate::scenario::{Scenario, Units};
 
 /// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
@@ -62,16 +61,9 @@ impl Setting {
         }
     }
 
-    /// The value shown for a drawn length, and its unit.
-    pub fn in_unit(&self, length: f64) -> (f64, &str) {
-        let unit = self.units.length.as_deref();
-        (self.scale() * length, unit.unwrap_or("L"))
-    }
-
-    /// Formats a drawn length with its unit.
-    pub fn format_length(&self, length: f64) -> String {
-        let (shown, unit) = self.in_unit(length);
-        format!("{} {unit}", short(shown))
+    /// The unit of the values shown.
+    pub fn unit(&self) -> &str {
+        self.units.length.as_deref().unwrap_or("L")
     }
 }
 

@@ -1,6 +1,7 @@
 //! Several leaves in small panels, seen by one camera, to one scale.
 
 use super::kit::*;
+use crate::report::numbers::short;
 
 const COLUMNS: usize = 4;
 /// Margin to the left and right of the panels.
@@ -12,7 +13,7 @@ const BOTTOM: f64 = 10.0;
 /// Least pixels between grid lines.
 const GRID: f64 = 17.0;
 /// Factor of the line width of veins in small panels.
-const THINNER: f64 = 0.75;
+pub const THINNER: f64 = 0.75;
 
 const MARGINS: Margins = Margins {
     left: 14.0,
@@ -21,9 +22,9 @@ const MARGINS: Margins = Margins {
 };
 
 /// Where the panels are, and the box that all of them show.
-pub struct SmallPanels {
+pub struct SmallPanels<'s> {
     bounds: [DVec3; 2],
-    setting: Setting,
+    setting: &'s Setting,
     /// Displayed width of a square of the grid.
     step: f64,
     size: DVec2,
@@ -31,23 +32,24 @@ pub struct SmallPanels {
     count: usize,
 }
 
-impl SmallPanels {
+impl<'s> SmallPanels<'s> {
     /// `count` panels from `top` on that can hold any of these shapes.
     pub fn holding<'a>(
         shapes: impl Iterator<Item = &'a Veins>,
         count: usize,
-        setting: &Setting,
+        setting: &'s Setting,
         top: f64,
     ) -> Self {
         let bounds = common_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
-        let size = DVec2::new(width, height(bounds, width));
-        let any = Cell::new(DVec2::ZERO, size);
-        let scale = Camera::facing(bounds, View::Oblique, any, MARGINS).scale;
+        let extent = Camera::facing(OBLIQUE).extent(bounds);
+        let height = (width - MARGINS.left - MARGINS.right) * extent.y / extent.x + MARGINS.below;
+        let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
+        let scale = (MARGINS.inside(size) / extent).min_element();
         SmallPanels {
             bounds,
             step: round_step(setting.scale() * GRID / scale),
-            setting: setting.clone(),
+            setting,
             size,
             top,
             count,
@@ -56,10 +58,10 @@ impl SmallPanels {
 
     /// Formats the width of a square of the grid.
     pub fn grid_width(&self) -> String {
-        self.setting.format_length(self.step / self.setting.scale())
+        format!("{} {}", short(self.step), self.setting.unit())
     }
 
-    pub fn cell(&self, index: usize) -> Cell {
+    fn cell(&self, index: usize) -> Cell {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
         let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
         Cell::new(
@@ -74,47 +76,30 @@ impl SmallPanels {
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
-    /// Draws a leaf with its letter and title in its panel. The first panel also shows the
-    /// names of the axes and gravity.
+    /// Draws a leaf with its letter and title in its panel.
     pub fn draw(&self, page: &mut Drawing, index: usize, veins: &Veins, caption: [&str; 2]) {
         let [letter, text] = caption;
-        let caption = (letter, text, NOTE);
-        self.draw_over(page, index, veins, View::Oblique, caption, |_, _, _| ());
+        let scene = self.begin(page, index, OBLIQUE, (letter, text, NOTE));
+        scene.draw_leaf(page, veins, THINNER * veins.line_width());
     }
 
-    /// The same in any view, with a title in a colour, and above what `under` draws with
-    /// lines of a given width.
-    pub fn draw_over(
+    /// Draws a panel in which a leaf can be drawn, with its letter and a title in a colour. The
+    /// first also shows the names of the axes and gravity.
+    pub fn begin(
         &self,
         page: &mut Drawing,
         index: usize,
-        veins: &Veins,
         view: View,
         (letter, text, color): (&str, &str, Color),
-        under: impl FnOnce(&mut Drawing, &Scene, f64),
-    ) {
+    ) -> Scene<'s> {
         let cell = self.cell(index);
         title_in(page, cell.corner, letter, text, color);
-        let (bounds, setting, step) = (self.bounds, &self.setting, Some(self.step));
+        let (bounds, setting, step) = (self.bounds, self.setting, Some(self.step));
         let scene = Scene::new(bounds, setting, view, cell, MARGINS, step);
         scene.draw_box(page);
         if index == 0 {
             scene.draw_names(page, 9.0, false);
-            scene.draw_gravity(page);
         }
-        let width = THINNER * veins.line_width();
-        under(page, &scene, width);
-        scene.draw_leaf(page, veins, width);
+        scene
     }
-}
-
-/// The height that the box needs in a panel of this width.
-fn height(bounds: [DVec3; 2], width: f64) -> f64 {
-    let any = Cell::new(
-        DVec2::ZERO,
-        DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
-    );
-    let (first, last) = Camera::facing(bounds, View::Oblique, any, MARGINS).outline(bounds);
-    let needed = (last - first).y / (last - first).x * (width - MARGINS.left - MARGINS.right);
-    (needed + MARGINS.below).clamp(LOWEST, HIGHEST)
 }

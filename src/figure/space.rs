@@ -3,24 +3,11 @@
 
 use super::kit::*;
 
-/// The direction from which the box is seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
-    /// From above one of its edges.
-    Oblique,
-    /// Along the xi axis, from a little above.
-    Front,
-}
-
-impl View {
-    /// Azimuth from the xi axis and elevation above the floor, in degrees.
-    fn angles(self) -> [f64; 2] {
-        match self {
-            View::Oblique => [-55.0, 28.0],
-            View::Front => [-8.0, 12.0],
-        }
-    }
-}
+/// Directions from which the box is seen: azimuth from the xi axis and elevation above the
+/// floor, in degrees. From above one of its edges, and along the xi axis from a little above.
+pub type View = [f64; 2];
+pub const OBLIQUE: View = [-55.0, 28.0];
+pub const FRONT: View = [-8.0, 12.0];
 
 /// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_SIDE: f64 = 0.4;
@@ -33,6 +20,13 @@ pub struct Margins {
     pub left: f64,
     pub right: f64,
     pub below: f64,
+}
+
+impl Margins {
+    /// Pixels that are left to the box, of a cell of this size.
+    pub fn inside(self, size: DVec2) -> DVec2 {
+        size - DVec2::new(self.left + self.right, self.below)
+    }
 }
 
 /// Least distance between the ticks of an axis.
@@ -60,142 +54,148 @@ pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     [middle - half, middle + half]
 }
 
-/// A parallel projection, centred in a cell.
+/// A parallel projection.
 pub struct Camera {
     right: DVec3,
     up: DVec3,
-    toward: DVec3,
+    pub toward: DVec3,
     /// Pixels per length.
-    pub scale: f64,
+    scale: f64,
     /// The origin on the page.
     origin: DVec2,
 }
 
 impl Camera {
-    /// Shows the whole box in a cell with these margins.
-    pub fn facing([low, high]: [DVec3; 2], view: View, cell: Cell, margins: Margins) -> Self {
-        let [(sin_a, cos_a), (sin_e, cos_e)] =
-            view.angles().map(|angle| angle.to_radians().sin_cos());
-        let mut camera = Camera {
-            right: DVec3::new(-sin_a, cos_a, 0.0),
-            up: DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e),
-            toward: DVec3::new(cos_e * cos_a, cos_e * sin_a, sin_e),
+    /// The origin is in the corner of the page, and a pixel a length.
+    pub fn new(right: DVec3, up: DVec3) -> Self {
+        Camera {
+            right,
+            up,
+            toward: right.cross(up),
             scale: 1.0,
             origin: DVec2::ZERO,
-        };
-        let (first, last) = camera.outline([low, high]);
-        let free = cell.size - DVec2::new(margins.left + margins.right, margins.below);
-        camera.scale = (free / (last - first)).min_element();
-        let shift = DVec2::new(margins.left - margins.right, -margins.below);
-        let middle = cell.corner + 0.5 * cell.size + 0.5 * shift;
-        camera.origin = middle - camera.scale * 0.5 * (first + last);
-        camera
+        }
     }
 
-    /// Corners of the bounding rectangle of a box on the page.
-    pub fn outline(&self, [low, high]: [DVec3; 2]) -> (DVec2, DVec2) {
-        let corners = (0..8).map(|corner| {
-            let side = |axis: usize| [low, high][corner >> axis & 1][axis];
-            self.place(DVec3::new(side(0), side(1), side(2)))
-        });
-        let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        corners.fold(none, |(first, last), at| (first.min(at), last.max(at)))
+    pub fn facing(view: View) -> Self {
+        let [(sin_a, cos_a), (sin_e, cos_e)] = view.map(|angle| angle.to_radians().sin_cos());
+        let right = DVec3::new(-sin_a, cos_a, 0.0);
+        Camera::new(right, DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e))
     }
 
-    fn place(&self, point: DVec3) -> DVec2 {
-        let flat = DVec2::new(self.right.dot(point), -self.up.dot(point));
-        self.origin + self.scale * flat
+    /// Shows a point at a place on the page.
+    pub fn placed(mut self, scale: f64, point: DVec3, at: DVec2) -> Self {
+        self.scale = scale;
+        self.origin += at - self.place(point);
+        self
     }
+
+    pub fn place(&self, point: DVec3) -> DVec2 {
+        self.origin + self.turned(point)
+    }
+
+    fn turned(&self, vector: DVec3) -> DVec2 {
+        self.scale * DVec2::new(self.right.dot(vector), -self.up.dot(vector))
+    }
+
+    /// Width and height of a box on the page.
+    pub fn extent(&self, bounds: [DVec3; 2]) -> DVec2 {
+        let corners = || corners(bounds).map(|corner| self.place(corner));
+        let low = corners().fold(DVec2::INFINITY, DVec2::min);
+        corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
+    }
+
+    /// Draws the direction of gravity, if there is any, in a corner far from `taken`.
+    pub fn draw_gravity(
+        &self,
+        page: &mut Drawing,
+        gravity: Option<DVec3>,
+        cell: Cell,
+        taken: impl Iterator<Item = DVec2>,
+    ) {
+        if let Some(gravity) = gravity {
+            let direction = self.turned(gravity) / self.scale;
+            draw_gravity(page, cell, taken, direction, self.toward.dot(gravity) > 0.0);
+        }
+    }
+}
+
+fn corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+    let side = move |corner: usize, axis: usize| bounds[corner >> axis & 1][axis];
+    (0..8).map(move |k| DVec3::new(side(k, 0), side(k, 1), side(k, 2)))
 }
 
 /// One axis along an edge of the box.
 struct Edge {
     axis: usize,
-    direction: DVec3,
-    at: DVec3,
-    low: f64,
-    high: f64,
-    /// Away from the box, in the plane the labels lie in.
-    outward: DVec3,
+    from: DVec3,
+    to: DVec3,
+    /// Away from the box, on the page.
+    out: DVec2,
     /// Offsets from a point on the edge along its grid lines: to the corner between the two
     /// walls, and to the end of the second.
     walls: [DVec3; 2],
-    /// Displayed value between ticks, and that of a length of 1.
-    step: f64,
-    unit: f64,
+    ticks: Vec<(DVec3, String)>,
 }
 
-impl Edge {
-    fn point(&self, value: f64) -> DVec3 {
-        self.at + (value - self.at.dot(self.direction)) * self.direction
-    }
-
-    fn ticks(&self) -> Vec<(f64, String)> {
-        let inset = 0.02 * (self.high - self.low);
-        let ends = [self.low + inset, self.high - inset].map(|end| self.unit * end);
-        let found = multiples(ends[0], ends[1], self.step).into_iter();
-        found
-            .map(|(value, text)| (value / self.unit, text))
-            .collect()
-    }
-}
-
-/// Edges along the three axes, with ticks spaced by `step` or, without it, as close as is
-/// readable.
-fn edges(camera: &Camera, low: DVec3, high: DVec3, unit: f64, step: Option<f64>) -> [Edge; 3] {
-    let sides = high - low;
-    let edge = |axis, direction: DVec3, at, outward, walls| Edge {
-        axis,
-        direction,
-        at,
-        low: direction.dot(low),
-        high: direction.dot(high),
-        outward,
-        walls,
-        step: step.unwrap_or_else(|| {
-            let length = camera.place(direction).distance(camera.place(DVec3::ZERO));
-            round_step(unit * TICK_DISTANCE / length)
-        }),
-        unit,
-    };
-    let side = |axis: DVec3| sides * axis;
-    let (back, up, left) = (side(DVec3::Y), side(DVec3::Z), side(DVec3::NEG_X));
-    let walls = [[back, back + up], [left, left + up], [back, back - left]];
-    [
-        edge(0, DVec3::X, low, DVec3::NEG_Y, walls[0]),
-        edge(1, DVec3::Y, low.with_x(high.x), DVec3::X, walls[1]),
-        edge(2, DVec3::Z, low, -camera.right, walls[2]),
-    ]
-}
-
-pub struct Scene {
+/// A box in space, and the leaf in it.
+pub struct Scene<'s> {
     low: DVec3,
     high: DVec3,
     camera: Camera,
     edges: [Edge; 3],
-    setting: Setting,
+    setting: &'s Setting,
     cell: Cell,
 }
 
-impl Scene {
-    /// The box in a cell with these margins; its grid is spaced by `step` or, without it,
-    /// as close as is readable.
+impl<'s> Scene<'s> {
+    /// The box in a cell with these margins; its grid is spaced by `step`, in the unit that is
+    /// shown, or, without it, as close as is readable.
     pub fn new(
         [low, high]: [DVec3; 2],
-        setting: &Setting,
+        setting: &'s Setting,
         view: View,
         cell: Cell,
         margins: Margins,
         step: Option<f64>,
     ) -> Self {
-        let camera = Camera::facing([low, high], view, cell, margins);
-        let edges = edges(&camera, low, high, setting.scale(), step);
+        let camera = Camera::facing(view);
+        let scale = margins.inside(cell.size) / camera.extent([low, high]);
+        let shift = DVec2::new(margins.left - margins.right, -margins.below);
+        let (middle, at) = (0.5 * (low + high), cell.middle() + 0.5 * shift);
+        let camera = camera.placed(scale.min_element(), middle, at);
+        let unit = setting.scale();
+        let edge = |axis: usize, from: DVec3, outward: DVec3, walls: [DVec3; 2]| {
+            let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
+            let step = step.unwrap_or_else(|| {
+                round_step(unit * TICK_DISTANCE / camera.turned(DVec3::AXES[axis]).length())
+            });
+            let inset = 0.02 * (high - low)[axis];
+            let ends = [low[axis] + inset, high[axis] - inset].map(|end| unit * end);
+            let ticks = multiples(ends[0], ends[1], step).into_iter();
+            Edge {
+                axis,
+                from,
+                to: at(high[axis]),
+                out: camera.turned(outward).normalize(),
+                walls,
+                ticks: ticks
+                    .map(|(value, text)| (at(value / unit), text))
+                    .collect(),
+            }
+        };
+        let [x, y, z] = DVec3::AXES.map(|axis| (high - low) * axis);
+        let edges = [
+            edge(0, low, DVec3::NEG_Y, [y, y + z]),
+            edge(1, low.with_x(high.x), DVec3::X, [-x, z - x]),
+            edge(2, low, -camera.right, [y, y + x]),
+        ];
         Scene {
             low,
             high,
             camera,
             edges,
-            setting: setting.clone(),
+            setting,
             cell,
         }
     }
@@ -215,8 +215,7 @@ impl Scene {
         let floor = [low, near, right, far].map(|corner| self.place(corner));
         page.shape(polygon(&floor), FLOOR, None);
         for edge in &self.edges {
-            for (value, _) in edge.ticks() {
-                let start = edge.point(value);
+            for &(start, _) in &edge.ticks {
                 let line = [start, start + edge.walls[0], start + edge.walls[1]];
                 let line = line.map(|point| self.place(point));
                 page.stroke(polyline(&line), Stroke::new(GRID, 0.7));
@@ -238,60 +237,42 @@ impl Scene {
         }
     }
 
-    pub fn draw_labels(&self, page: &mut Drawing) {
-        for edge in &self.edges {
-            let out = self.outward(edge);
-            for (value, text) in edge.ticks() {
-                let foot = self.place(edge.point(value));
-                page.line(foot, foot + 4.0 * out, Stroke::new(FRAME, 0.8));
-                let at = foot + label_offset(out, 17.0);
-                page.centered_label(at, &text, TICK_SIZE, Anchor::Middle, NOTE);
+    /// Draws the axes with their names at this distance from the edges, and gravity.
+    pub fn draw_axes(&self, page: &mut Drawing, distance: f64) {
+        for Edge { out, ticks, .. } in &self.edges {
+            for (point, text) in ticks {
+                let foot = self.place(*point);
+                page.line(foot, foot + 4.0 * *out, Stroke::new(FRAME, 0.8));
+                let at = foot + label_offset(*out, 17.0);
+                page.centered_label(at, text, TICK_SIZE, Anchor::Middle, NOTE);
             }
         }
+        self.draw_names(page, distance, true);
     }
 
     /// Draws the names of all axes at a distance from their edges, with units if values
-    /// are shown.
+    /// are shown, and outside the box the direction of gravity.
     pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
-        for edge in &self.edges {
-            let at = self.middle(edge) + label_offset(self.outward(edge), distance);
+        let middles = self
+            .edges
+            .each_ref()
+            .map(|edge| self.place(0.5 * (edge.from + edge.to)));
+        for (edge, middle) in self.edges.iter().zip(middles) {
+            let at = middle + label_offset(edge.out, distance);
             let name = self.setting.brief_axis(edge.axis, values);
             // A long name extends away from its edge, or is placed on top of it.
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, Anchor::Middle),
                 0 => (at, Anchor::End),
                 1 => (at, Anchor::Start),
-                _ => (self.place(edge.point(edge.high)) + ABOVE, Anchor::End),
+                _ => (self.place(edge.to) + ABOVE, Anchor::End),
             };
             page.centered_label(at, &name, TEXT_SIZE + 1.0, anchor, INK);
         }
-    }
-
-    /// Draws the direction of gravity, if there is any, outside the box.
-    pub fn draw_gravity(&self, page: &mut Drawing) {
-        let Some(gravity) = self.setting.gravity else {
-            return;
-        };
-        let Camera {
-            right, up, toward, ..
-        } = self.camera;
-        let direction = DVec2::new(right.dot(gravity), -up.dot(gravity));
-        let ends = [self.low, self.high];
-        let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
-        let corners = (0..8).map(|k| self.place(corner(k)));
-        let names = self.edges.iter().map(|edge| self.middle(edge));
-        let toward = toward.dot(gravity) > 0.0;
-        draw_gravity(page, self.cell, corners.chain(names), direction, toward);
-    }
-
-    /// The middle of an edge on the page.
-    fn middle(&self, edge: &Edge) -> DVec2 {
-        self.place(edge.point(0.5 * (edge.low + edge.high)))
-    }
-
-    /// The outward direction of an edge on the page.
-    fn outward(&self, edge: &Edge) -> DVec2 {
-        (self.place(edge.outward) - self.place(DVec3::ZERO)).normalize()
+        let taken = corners([self.low, self.high]).map(|corner| self.place(corner));
+        let taken = taken.chain(middles);
+        self.camera
+            .draw_gravity(page, self.setting.gravity, self.cell, taken);
     }
 
     /// Draws the shadows of all veins on the floor, the pieces of the veins, those

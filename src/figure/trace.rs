@@ -32,8 +32,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let shown = shown(trace);
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
-    let longest = shown.iter().map(point).flat_map(|point| &point.curves);
-    let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
+    let longest = longest(shown.iter().map(point).flat_map(|point| &point.curves));
     let shapes: Vec<Veins> = (shown.iter().map(point))
         .map(|point| Veins::through(&point.curves, &point.tips, longest))
         .collect();
@@ -136,8 +135,8 @@ fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
     let pairs = || one.curves.iter().zip(&other.curves);
     let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
     let distances = points.flatten().map(|(a, b)| a.distance(b));
-    let size = pairs().map(|(a, b)| length(a).max(length(b)));
-    distances.fold(0.0, f64::max) / size.fold(f64::MIN_POSITIVE, f64::max)
+    let size = longest(one.curves.iter().chain(&other.curves));
+    distances.fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
 }
 
 fn caption(point: &TracePoint) -> String {
@@ -174,8 +173,7 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         tip => {
-            let curves = points().take(1).flat_map(|point| &point.curves);
-            let longest = curves.map(|curve| length(curve)).fold(0.0, f64::max);
+            let longest = longest(points().take(1).flat_map(|point| &point.curves));
             let name = with_unit(&format!("{tip} of the tip"), units.length.as_deref());
             (name, ROUNDING * longest)
         }

@@ -42,8 +42,6 @@ impl Vein {
 pub struct Veins {
     pub veins: Vec<Vein>,
     pub count: usize,
-    /// Stride of the veins that are drawn.
-    pub every: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
     /// Corners of the bounding box; the clamp is at the origin.
@@ -65,7 +63,8 @@ impl Veins {
         Veins::through(&still.curves, &tips, record.length)
     }
 
-    /// Veins through these points, with the longest rod as the unit.
+    /// Veins through these points, with the longest rod as the unit. Tips are extrapolated,
+    /// points need not be.
     pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
         let usable = longest.is_finite() && longest > 0.0;
         let unit = if usable { longest } else { 1.0 };
@@ -92,7 +91,6 @@ impl Veins {
         Veins {
             veins,
             count,
-            every: stride(count),
             dots: Vec::new(),
             tips,
             low,
@@ -124,8 +122,9 @@ impl Veins {
 
     pub fn notes(&self, setting: &Setting) -> Vec<String> {
         let mut notes = vec![format!("L = {}", setting.length())];
-        if self.every > 1 {
-            notes.push(format!("1 vein in {} drawn", self.every));
+        let every = stride(self.count);
+        if every > 1 {
+            notes.push(format!("1 vein in {every} drawn"));
         }
         notes
     }
@@ -171,13 +170,35 @@ pub fn tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
     ends.filter_map(|curve| curve.last()).copied().collect()
 }
 
-pub fn length(curve: &[DVec3]) -> f64 {
-    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
+/// The length of the longest of these curves.
+pub fn longest<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f64 {
+    let length = |curve: &Vec<DVec3>| curve.windows(2).map(|w| w[0].distance(w[1])).sum();
+    curves.into_iter().map(length).fold(0.0, f64::max)
 }
 
-/// Whether a point is finite and not too far away to be drawn.
+/// Whether a point, in lengths, is finite and not too far away to be drawn.
 pub fn is_drawable(point: DVec3) -> bool {
     point.is_finite() && point.abs().max_element() < FARTHEST
+}
+
+/// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
+pub fn tamed(points: impl Iterator<Item = DVec3>, longest: f64) -> Vec<DVec3> {
+    let mut last = DVec3::ZERO;
+    let tame = points.map(|point| {
+        if is_drawable(point / longest) {
+            last = point;
+        }
+        last
+    });
+    tame.collect()
+}
+
+/// The smallest stride that leaves a vein of so many nodes its tip and at most so many segments.
+pub fn node_stride(nodes: usize, most: usize) -> usize {
+    let last = nodes.saturating_sub(1);
+    let mut strides = last.div_ceil(most).max(1)..=last;
+    let whole = strides.find(|stride| last.is_multiple_of(*stride));
+    whole.unwrap_or(1)
 }
 
 /// The points up to the first that cannot be drawn.
@@ -265,6 +286,14 @@ mod tests {
         assert!(smooth(&[]).is_empty());
         assert!(smooth(&[DVec3::X]).is_empty());
         assert_eq!(smooth(&[DVec3::ZERO, DVec3::X])[0][3], DVec3::X);
+    }
+
+    #[test]
+    fn a_thinned_vein_keeps_its_tip() {
+        for (nodes, kept) in [(65, 33), (33, 33), (61, 31), (2, 2), (1, 1), (0, 1)] {
+            let (last, stride) = (f64::max(nodes as f64 - 1.0, 0.0), node_stride(nodes, 32));
+            assert_eq!(last / stride as f64 + 1.0, f64::from(kept));
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 // The box around the leaf: axes with ticks, gravity, captions and the colour scale, on the canvas below the leaf.
 const AXIS_NAMES = ["x", "y", "z"];
+const font = (px) => `${px}px system-ui, "DejaVu Sans", sans-serif`;
 
 /// The box that holds all leaves, the base among them.
 function boxOf(leaves) {
@@ -48,11 +49,10 @@ function edges(box, place) {
   });
 }
 
-function drawAxes(pen, box, place, css, small) {
+function drawAxes(pen, box, place, small) {
   const size = small ? 10 : 12;
-  const font = (px) => `${px}px system-ui, "DejaVu Sans", sans-serif`;
   pen.lineWidth = 1;
-  floor(pen, box, place, css);
+  floor(pen, box, place);
   for (const edge of edges(box, place)) {
     const { axis, from, p, q, mid } = edge;
     const way = [q[0] - p[0], q[1] - p[1]];
@@ -85,7 +85,7 @@ function drawAxes(pen, box, place, css, small) {
 }
 
 /// Fine lines on the lower side of the box.
-function floor(pen, box, place, css) {
+function floor(pen, box, place) {
   pen.strokeStyle = css("--grid");
   for (const axis of [0, 1]) {
     const other = 1 - axis;
@@ -110,7 +110,7 @@ function line(pen, p, q) {
 }
 
 /// The direction of gravity as an arrow of fixed size in a corner of the panel; none if there is none.
-function drawGravity(pen, box, place, css, at) {
+function drawGravity(pen, box, place, at) {
   const size = Math.hypot(...view.gravity);
   if (!(size > 0)) return;
   const [a, b] = [place(box.middle), place(box.middle.map((x, k) => x + (0.25 * box.extent * view.gravity[k]) / size))];
@@ -124,7 +124,6 @@ function drawGravity(pen, box, place, css, at) {
   const reach = 38 * part;
   const from = [at[0] - 0.5 * reach * unit[0], at[1] - 0.5 * reach * unit[1]];
   const to = [at[0] + 0.5 * reach * unit[0], at[1] + 0.5 * reach * unit[1]];
-  pen.beginPath();
   if (part > 0.05) {
     line(pen, from, [to[0] - 6 * unit[0], to[1] - 6 * unit[1]]);
     pen.beginPath();
@@ -134,19 +133,20 @@ function drawGravity(pen, box, place, css, at) {
     pen.fill();
   } else {
     // Along the line of sight: away from the reader.
+    pen.beginPath();
     pen.arc(at[0], at[1], 7, 0, 7);
     pen.stroke();
     line(pen, [at[0] - 5, at[1] - 5], [at[0] + 5, at[1] + 5]);
     line(pen, [at[0] - 5, at[1] + 5], [at[0] + 5, at[1] - 5]);
   }
-  pen.font = '12px system-ui, "DejaVu Sans", sans-serif';
+  pen.font = font(12);
   pen.textAlign = "center";
   pen.textBaseline = "alphabetic";
   pen.fillText("gravity", at[0], at[1] + 36);
 }
 
 /// The colour scale, or which vein has which colour.
-function drawScale(pen, quantity, limits, map, css, width, height) {
+function drawScale(pen, quantity, limits, map, width, height) {
   const [wide, high] = [Math.min(260, width - 40), 10];
   const [left, top] = [width - wide - 24, height - 46];
   const byVein = quantity.name === "vein";
@@ -158,7 +158,7 @@ function drawScale(pen, quantity, limits, map, css, width, height) {
     pen.fillRect(left + i, top, 1.5, high);
   }
   pen.fillStyle = css("--ink");
-  pen.font = '12px system-ui, "DejaVu Sans", sans-serif';
+  pen.font = font(12);
   pen.textAlign = "left";
   pen.textBaseline = "alphabetic";
   pen.fillText(byVein ? "vein" : withUnit(quantity.name, quantity.unit), left, top - 6);
@@ -176,8 +176,8 @@ function drawScale(pen, quantity, limits, map, css, width, height) {
 
 function veinTicks() {
   const count = view.rods;
-  const step = ticks(0, count, 6).step || 1;
-  const values = [1];
-  for (let k = Math.max(1, step); k <= count; k += Math.max(1, step)) if (k > 1) values.push(Math.round(k));
-  return [...new Set(values)];
+  const step = Math.max(1, ticks(0, count, 6).step);
+  const values = new Set([1]);
+  for (let k = step; k <= count; k += step) values.add(k);
+  return [...values];
 }

@@ -18,9 +18,10 @@ function leafAt(index) {
   return decoded.get(index);
 }
 
+const evenly = (nodes) => Array.from({ length: nodes }, (_, i) => i / Math.max(1, nodes - 1));
+
 function decode(leaf) {
-  const nodes = leaf.nodes;
-  const stations = leaf.stations || Array.from({ length: nodes }, (_, i) => i / Math.max(1, nodes - 1));
+  const stations = leaf.stations || evenly(leaf.nodes);
   let points;
   if (leaf.points.f32 !== undefined) {
     points = new Float32Array(bytes(leaf.points.f32));
@@ -30,18 +31,7 @@ function decode(leaf) {
     points = Float32Array.from(steps, (step, i) => low[i % 3] + (step / 65535) * size);
   }
   const state = leaf.state ? new Float32Array(bytes(leaf.state)) : null;
-  return { ...leaf, stations, points: tame(points, nodes), state };
-}
-
-/// Numbers gone wild are drawn where the vein was last seen.
-function tame(points, nodes) {
-  const far = 1e4 * view.longest;
-  for (let i = 0; i < points.length; i += 3) {
-    const wild = [0, 1, 2].some((k) => !(Math.abs(points[i + k]) < far));
-    const first = (i / 3) % nodes === 0;
-    if (wild) for (let k = 0; k < 3; k++) points[i + k] = first ? 0 : points[i + k - 3];
-  }
-  return points;
+  return { ...leaf, stations, points, state };
 }
 
 const [lengthUnit, forceUnit] = view.units;

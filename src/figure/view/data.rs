@@ -4,11 +4,9 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::figure::setting::with_unit;
-use crate::figure::veins::is_drawable;
+use crate::figure::veins::{node_stride, tamed};
 use crate::relax::RodShape;
 use crate::report::base64::encode as base64;
-use crate::scenario::Units;
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
 const STATE: usize = 16;
@@ -117,25 +115,16 @@ pub struct Curve {
     pub special: Vec<(usize, &'static str)>,
 }
 
-impl View {
-    /// The name of a quantity, a length or else an energy, with its unit if that is known.
-    pub fn with_unit(&self, name: &str, is_length: bool) -> String {
-        let [length, force] = self.units.clone();
-        let unit = match is_length {
-            true => length,
-            false => Units { length, force }.energy(),
-        };
-        with_unit(name, unit.as_deref())
-    }
-}
-
 impl Leaf {
-    /// A leaf in full, with strains and forces; `drawn` are the numbers of the veins that
-    /// are drawn.
-    pub fn full(label: String, stations: &[f64], rods: &[RodShape], drawn: &[usize]) -> Self {
-        let shown = || drawn.iter().flat_map(|&number| &rods[number - 1].nodes);
-        let mut state = Vec::with_capacity(STATE * stations.len() * drawn.len());
-        for node in shown() {
+    /// A leaf in full, with strains and forces.
+    pub fn full(label: String, stations: &[f64], rods: &[RodShape], view: &View) -> Self {
+        let shown = || view.drawn.iter().map(|&number| &rods[number - 1].nodes);
+        let points = shown().flat_map(|nodes| {
+            let points = nodes.iter().map(|node| node.position);
+            tamed(points, view.longest)
+        });
+        let mut state = Vec::with_capacity(STATE * stations.len() * view.drawn.len());
+        for node in shown().flatten() {
             let q = node.rotation;
             state.extend([q.w, q.x, q.y, q.z]);
             let vectors = [node.v, node.u, node.n, node.m].map(|v| v.to_array());
@@ -146,7 +135,7 @@ impl Leaf {
             nodes: stations.len(),
             stations: Some(stations.into()),
             points: Points::Full {
-                f32: vectors(shown().map(|node| node.position)),
+                f32: vectors(points),
             },
             state: Some(floats(state)),
             ..Leaf::default()
@@ -158,26 +147,20 @@ impl Leaf {
         label: String,
         stations: &[f64],
         curves: &[Vec<DVec3>],
-        drawn: &[usize],
+        view: &View,
         most: usize,
     ) -> Self {
         let nodes = curves.first().map_or(0, Vec::len);
-        let stride = nodes.saturating_sub(1).div_ceil(most).max(1);
-        // The tip must remain.
-        let stride = (stride..nodes)
-            .find(|k| (nodes - 1).is_multiple_of(*k))
-            .unwrap_or(1);
-        let shown = || {
-            let curves = drawn.iter().map(|&number| &curves[number - 1]);
-            curves.flat_map(move |curve| curve.iter().step_by(stride).copied())
-        };
-        let near = || shown().filter(|point| is_drawable(*point));
-        let low = near().reduce(DVec3::min).unwrap_or_default();
-        let high = near().reduce(DVec3::max).unwrap_or_default();
+        let stride = node_stride(nodes, most);
+        let curves = view.drawn.iter().map(|&number| &curves[number - 1]);
+        let shown = curves.flat_map(|it| tamed(it.iter().step_by(stride).copied(), view.longest));
+        let shown: Vec<DVec3> = shown.collect();
+        let all = || shown.iter().copied();
+        let low = all().reduce(DVec3::min).unwrap_or_default();
+        let high = all().reduce(DVec3::max).unwrap_or_default();
         let size = (high - low).max_element().max(f64::MIN_POSITIVE);
         let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
-        // NaN becomes a corner of the box.
-        let steps = shown().flat_map(step);
+        let steps = all().flat_map(step);
         let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
         Leaf {
             label,
@@ -208,23 +191,4 @@ pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
 fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
     let numbers = numbers.into_iter();
     base64(numbers.flat_map(|number| (number as f32).to_le_bytes()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thinned_vein_keeps_its_tip() {
-        for (nodes, kept) in [(65, 33), (33, 33), (61, 31), (2, 2), (1, 1), (0, 1)] {
-            let curve = (0..nodes).map(|i| DVec3::X * f64::from(i)).collect();
-            let leaf = Leaf::coarse(String::new(), &[], &[curve], &[1], 32);
-            assert_eq!(leaf.nodes, kept);
-            let Points::Coarse { u16, size, .. } = leaf.points else {
-                panic!()
-            };
-            assert_eq!(u16.len(), if nodes == 0 { 0 } else { 8 * kept });
-            assert!(size == f64::from(nodes - 1) || nodes < 2);
-        }
-    }
 }

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 
 use crate::figure::drawing::{Color, color_of_vein};
-use crate::figure::veins::is_drawable;
+use crate::figure::veins::{node_stride, tamed};
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
 
@@ -30,9 +30,9 @@ const ELEMENT_ARRAY: u32 = 34963;
 
 /// A leaf at rest.
 pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-    let radius = RADIUS * equilibrium.shape.longest();
-    let curves = &equilibrium.shape.curves;
-    write(&equilibrium.scenario, &[(0.0, &curves[..])], radius, out)
+    let shape = &equilibrium.shape;
+    let leaf = [(0.0, &shape.curves[..])];
+    write(&equilibrium.scenario, &leaf, shape.longest(), out)
 }
 
 /// A moving leaf.
@@ -43,7 +43,7 @@ pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let kept = (0..film.len()).filter(|&k| k.is_multiple_of(stride) || k == last);
     let shape = |k: usize| (record.moments[film[k].moment].time, &film[k].curves[..]);
     let shapes: Vec<(f64, &[Vec<DVec3>])> = kept.map(shape).collect();
-    write(&record.scenario, &shapes, RADIUS * record.length, out)
+    write(&record.scenario, &shapes, record.length, out)
 }
 
 /// The buffer, with its views and accessors.
@@ -76,29 +76,23 @@ impl File {
         self.accessors.len() - 1
     }
 
-    fn vectors(&mut self, vectors: &[Vec3]) -> usize {
-        let all = || vectors.iter().copied();
-        let low = all().reduce(Vec3::min).unwrap_or_default();
-        let high = all().reduce(Vec3::max).unwrap_or_default();
+    /// Adds numbers one by one, or vectors for vertices, with their bounds.
+    fn floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> usize {
+        let bound = |of: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
+            let along = |k: usize| numbers.iter().map(move |it| it[k]).fold(start, of);
+            (0..N).map(along).collect()
+        };
         let accessor = json!({
-            "componentType": FLOAT, "count": vectors.len(), "type": "VEC3",
-            "min": low.to_array(), "max": high.to_array(),
+            "componentType": FLOAT, "count": numbers.len(),
+            "type": if N == 3 { "VEC3" } else { "SCALAR" },
+            "min": bound(f32::min, f32::MAX), "max": bound(f32::max, f32::MIN),
         });
-        let bytes = all().flat_map(|v| v.to_array().map(f32::to_le_bytes));
-        self.add(bytes.flatten(), Some(ARRAY), accessor)
+        let bytes = numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+        self.add(bytes, (N == 3).then_some(ARRAY), accessor)
     }
 
-    fn scalars(&mut self, numbers: &[f32]) -> usize {
-        let all = || numbers.iter().copied();
-        let (low, high) = (
-            all().fold(f32::MAX, f32::min),
-            all().fold(f32::MIN, f32::max),
-        );
-        let accessor = json!({
-            "componentType": FLOAT, "count": numbers.len(), "type": "SCALAR", "min": [low], "max": [high],
-        });
-        let bytes = all().flat_map(f32::to_le_bytes);
-        self.add(bytes, None, accessor)
+    fn vectors(&mut self, vectors: impl Iterator<Item = Vec3>) -> usize {
+        self.floats(&vectors.map(Vec3::into).collect::<Vec<[f32; 3]>>())
     }
 }
 
@@ -106,20 +100,27 @@ impl File {
 fn write(
     name: &str,
     shapes: &[(f64, &[Vec<DVec3>])],
-    radius: f64,
+    longest: f64,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let thinned: Vec<Vec<Vec<DVec3>>> = shapes.iter().map(|(_, curves)| thin(curves)).collect();
-    let Some(first) = thinned
-        .first()
-        .filter(|curves| curves.iter().any(|curve| curve.len() > 1))
-    else {
+    let thin = |curve: &Vec<DVec3>| {
+        let stride = node_stride(curve.len(), MOST_SEGMENTS);
+        tamed(curve.iter().copied().step_by(stride), longest)
+    };
+    let thinned = shapes
+        .iter()
+        .map(|(_, curves)| curves.iter().map(thin).collect());
+    let thinned: Vec<Vec<Vec<DVec3>>> = thinned.collect();
+    let radius = RADIUS * longest;
+    let first = thinned.first();
+    let Some(first) = first.filter(|curves| curves.iter().any(|curve| curve.len() > 1)) else {
         return finish(name, &File::default(), json!([]), None, out);
     };
     let (veins, points) = (first.len(), first[0].len());
     let base = Tubes::around(first, radius);
     let mut file = File::default();
-    let (position, normal) = (file.vectors(&base.positions), file.vectors(&base.normals));
+    let position = file.vectors(base.positions.iter().copied());
+    let normal = file.vectors(base.normals.iter().copied());
     let colors = (0..veins).flat_map(|vein| {
         let color = linear(color_of_vein(vein, veins));
         std::iter::repeat_n(color, Tubes::vertices(points)).flatten()
@@ -136,11 +137,11 @@ fn write(
     let mut targets = Vec::new();
     for curves in &thinned[1..] {
         let tubes = Tubes::around(curves, radius);
-        let minus =
-            |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        let mut moved = |of: fn(&Tubes) -> &Vec<Vec3>| {
+            file.vectors(of(&tubes).iter().zip(of(&base)).map(|(a, b)| a - b))
+        };
         targets.push(json!({
-            "POSITION": file.vectors(&minus(&tubes.positions, &base.positions)),
-            "NORMAL": file.vectors(&minus(&tubes.normals, &base.normals)),
+            "POSITION": moved(|tubes| &tubes.positions), "NORMAL": moved(|tubes| &tubes.normals),
         }));
     }
     let mut mesh = json!([{ "name": "veins", "primitives": [{
@@ -166,15 +167,15 @@ fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
     };
     let times = shapes
         .iter()
-        .map(|(time, _)| ((time - start) * rate) as f32);
-    let times: Vec<f32> = times.collect();
-    let targets = shapes.len() - 1;
-    let weight = |shape: usize, target: usize| f32::from(u8::from(shape == target + 1));
-    let weights =
-        (0..shapes.len()).flat_map(|shape| (0..targets).map(move |target| weight(shape, target)));
-    let weights: Vec<f32> = weights.collect();
+        .map(|(time, _)| [((time - start) * rate) as f32]);
+    let times: Vec<[f32; 1]> = times.collect();
+    let mut weights = vec![[0.0]; shapes.len() * (shapes.len() - 1)];
+    // The first shape is the base.
+    for shape in 1..shapes.len() {
+        weights[shape * (shapes.len() - 1) + shape - 1] = [1.0];
+    }
     json!([{ "name": "motion",
-        "samplers": [{ "input": file.scalars(&times), "output": file.scalars(&weights), "interpolation": "LINEAR" }],
+        "samplers": [{ "input": file.floats(&times), "output": file.floats(&weights), "interpolation": "LINEAR" }],
         "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
     }])
 }
@@ -221,26 +222,6 @@ fn finish(
         out.write_all(chunk)?;
     }
     Ok(())
-}
-
-/// Fewer points of every vein, including the tip; points that cannot be drawn repeat the
-/// one before.
-fn thin(curves: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
-    let last = curves
-        .first()
-        .map_or(0, |curve| curve.len().saturating_sub(1));
-    let stride = (last.div_ceil(MOST_SEGMENTS).max(1)..=last.max(1))
-        .find(|stride| last.is_multiple_of(*stride));
-    let drawable = |mut curve: Vec<DVec3>| {
-        for i in 0..curve.len() {
-            if !is_drawable(curve[i]) {
-                curve[i] = if i > 0 { curve[i - 1] } else { DVec3::ZERO };
-            }
-        }
-        curve
-    };
-    let kept = |curve: &Vec<DVec3>| curve.iter().copied().step_by(stride.unwrap_or(1)).collect();
-    curves.iter().map(|curve| drawable(kept(curve))).collect()
 }
 
 /// Converts a colour from sRGB to linear RGB, opaque.

@@ -28,7 +28,7 @@ use super::drawing::{Drawing, color_of_vein};
 use super::svg::{self, hex};
 use super::veins::is_drawn;
 use crate::report::{Reported, json};
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Scenario, Units};
 use crate::simulate::Record;
 use crate::study::Trace;
 use data::View;
@@ -54,7 +54,7 @@ pub trait Viewed: Reported {
 
     /// Fills in the data of the page.
     #[doc(hidden)]
-    fn fill(&self, view: &mut View);
+    fn fill(&self, view: &mut View, units: &Units);
 }
 
 /// One of several shapes: its time or number, its stations and its centrelines.
@@ -112,7 +112,7 @@ pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
         modes: Vec::new(),
         chart: None,
     };
-    result.fill(&mut view);
+    result.fill(&mut view, &scenario.units);
     assemble(&view, &R::STILL(result, scenario))
 }
 

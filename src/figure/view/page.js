@@ -16,7 +16,7 @@ const sequence = view.kind === "motion" || view.kind === "trace";
 const shown = { at: 0, mode: -1, phase: 0, alone: several ? -1 : 0, playing: false, dirty: true, stale: true, quantity: 0 };
 let space = null;
 let diagram = null;
-let leaf = null;
+let leaves = [];
 
 function row(name, ...cells) {
   const tr = document.createElement("tr");
@@ -51,7 +51,7 @@ function setTheme(name) {
   themed.clear();
   find("theme").textContent = name === "dark" ? "light" : "dark";
   redraw();
-  if (space) space.meshes.forEach((mesh) => mesh.theme(css));
+  if (space) space.meshes.forEach((mesh) => mesh.theme());
 }
 
 /// Everything that is drawn in space; throws where that cannot be.
@@ -67,11 +67,10 @@ function openSpace() {
   controls.minZoom = 0.2;
   controls.maxZoom = 200;
   controls.addEventListener("change", redraw);
-  const first = several ? view.leaves.map((_, i) => leafAt(i)) : sequence ? sampled(60) : [leafAt(0)];
-  return { renderer, scene, sun, camera, controls, meshes: [], box: boxOf(first), fit: [1, 1], panels: [] };
+  return { renderer, scene, sun, camera, controls, meshes: [], box: boxOf(sampled(60)), fit: [1, 1], panels: [] };
 }
 
-/// Some leaves of a sequence, the first and the last among them.
+/// All leaves or, of a long sequence, so many, the first and the last among them.
 function sampled(most) {
   const last = view.leaves.length - 1;
   const count = Math.min(most, last + 1);
@@ -84,21 +83,22 @@ function meshFor(panel, shape) {
   if (!mesh) {
     mesh = new LeafMesh(shape);
     mesh.panel = panel;
-    mesh.theme(css);
+    mesh.theme();
     space.scene.add(mesh.group);
     space.meshes.push(mesh);
   }
   return mesh;
 }
 
-/// The leaf in the first panel: as given, between two instants, or in a mode.
-function currentLeaf() {
-  if (shown.mode >= 0) return inMode(view.modes[shown.mode], Math.sin(shown.phase));
+/// The leaves in the panels: several, or one: as given, between two instants, or in a mode.
+function currentLeaves() {
+  if (several) return shown.alone < 0 ? sampled(Infinity) : [leafAt(shown.alone)];
+  if (shown.mode >= 0) return [inMode(view.modes[shown.mode], Math.sin(shown.phase))];
   const index = Math.min(Math.floor(shown.at), view.leaves.length - 1);
   const [a, part] = [leafAt(index), shown.at - index];
-  if (view.kind !== "motion" || part < 1e-6 || index + 1 >= view.leaves.length) return a;
+  if (view.kind !== "motion" || part < 1e-6 || index + 1 >= view.leaves.length) return [a];
   const b = leafAt(index + 1);
-  return { ...a, points: a.points.map((x, i) => x + part * (b.points[i] - x)) };
+  return [{ ...a, points: a.points.map((x, i) => x + part * (b.points[i] - x)) }];
 }
 
 function inMode(mode, amplitude) {
@@ -107,10 +107,9 @@ function inMode(mode, amplitude) {
     mode.by = new Float32Array(bytes(mode.displacement));
     const largest = Math.max(...mode.by.map(Math.abs), 1e-30);
     mode.size = Math.min(1, (0.2 * space.box.extent) / largest);
-    mode.stations = Array.from({ length: mode.nodes }, (_, i) => i / Math.max(1, mode.nodes - 1));
   }
   const points = mode.decoded.map((x, i) => x + amplitude * mode.size * mode.by[i]);
-  return { label: mode.label, nodes: mode.nodes, stations: mode.stations, points, state: null };
+  return { label: mode.label, nodes: mode.nodes, stations: evenly(mode.nodes), points, state: null };
 }
 
 const activeQuantities = () => (shown.mode >= 0 ? GEOMETRY : quantities);
@@ -122,7 +121,7 @@ const limitsKnown = new Map();
 function limitsOf(quantity) {
   const key = `${quantity.name} ${shown.mode}`;
   if (!limitsKnown.has(key)) {
-    const leaves = shown.mode >= 0 ? [inMode(view.modes[shown.mode], 1), inMode(view.modes[shown.mode], -1)] : several ? view.leaves.map((_, i) => leafAt(i)) : sampled(40);
+    const leaves = shown.mode >= 0 ? [inMode(view.modes[shown.mode], 1), inMode(view.modes[shown.mode], -1)] : sampled(40);
     let [low, high] = range(leaves.flatMap((leaf) => [...range(valuesOf(leaf, quantity).filter(Number.isFinite))]));
     // A signed quantity has its zero in the middle; one that does not vary has some width.
     if (quantity.signed) [low, high] = [-Math.max(Math.abs(low), Math.abs(high)), Math.max(Math.abs(low), Math.abs(high))];
@@ -166,14 +165,8 @@ function redraw() {
 
 /// Brings everything up to date: `again` after a setting has changed.
 function update(again) {
-  if (space) {
-    if (several && shown.alone < 0) space.panels = view.leaves.map((_, i) => ({ leaf: leafAt(i), mesh: put(i, leafAt(i), again), label: view.leaves[i].label }));
-    else {
-      const index = several ? shown.alone : 0;
-      leaf = several ? leafAt(index) : currentLeaf();
-      space.panels = [{ leaf, mesh: put(index, leaf, again), label: several ? leaf.label : "" }];
-    }
-  } else leaf = leafAt(Math.floor(shown.at));
+  leaves = currentLeaves();
+  if (space) space.panels = leaves.map((leaf, i) => ({ leaf, mesh: put(i, leaf, again), label: several ? leaf.label : "" }));
   shown.dirty = true;
   if (again) shown.stale = true;
   if (sequence || shown.mode >= 0) tellFrame();
@@ -334,18 +327,18 @@ function drawUnder(width, height, ratio) {
   const small = space.panels.length > 1;
   for (const panel of space.panels) {
     const place = placeIn(panel);
-    if (find("axes").checked) drawAxes(pen, space.box, place, css, small);
-    if (panel === space.panels[0]) drawGravity(pen, space.box, place, css, small ? [width - 44, 32] : [44, height - 64]);
+    if (find("axes").checked) drawAxes(pen, space.box, place, small);
+    if (panel === space.panels[0]) drawGravity(pen, space.box, place, small ? [width - 44, 32] : [44, height - 64]);
     if (panel.label) drawLabel(pen, panel, small);
   }
   const colors = quantity();
-  drawScale(pen, colors, colors.name === "vein" ? null : limitsOf(colors), mapOf(colors), css, width, height);
+  drawScale(pen, colors, colors.name === "vein" ? null : limitsOf(colors), mapOf(colors), width, height);
 }
 
 function drawLabel(pen, panel, small) {
   const [left, top, width] = panel.rect;
   pen.fillStyle = css("--ink");
-  pen.font = `${small ? 12 : 14}px system-ui, "DejaVu Sans", sans-serif`;
+  pen.font = font(small ? 12 : 14);
   pen.textAlign = "center";
   pen.textBaseline = "top";
   pen.fillText(panel.label, left + width / 2, top + (small && top > 0 ? 6 : 46), width - 12);
@@ -411,7 +404,7 @@ function hover(event) {
 
 /// The same numbers without a mouse.
 function fillProbe() {
-  const one = leaf || (space && space.panels[0] && space.panels[0].leaf) || leafAt(0);
+  const one = leaves[0];
   find("station").max = one.nodes - 1;
   const wanted = Number(find("vein").value);
   const j = view.drawn.reduce((best, number, k) => (Math.abs(number - wanted) < Math.abs(view.drawn[best] - wanted) ? k : best), 0);

@@ -5,13 +5,17 @@ use glam::DVec3;
 
 use super::Viewed;
 use super::data::{Chart, Curve, Leaf, ModeShape, View, vectors};
+use crate::figure::setting::with_unit;
 use crate::figure::{self, Figure};
 use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::{brief, counted, short, significant};
 use crate::report::words::{equilibrium_of_index, verdict};
 use crate::report::{Reported, is_special};
+use crate::scenario::Units;
 use crate::simulate::{Moment, Record};
-use crate::study::{All, Boundary, BoundaryPoint, PointKind, Trace, TraceBranch, TracePoint};
+use crate::study::{
+    All, Boundary, BoundaryPoint, PointKind, Trace, TraceBranch, TracePoint, TraceShow,
+};
 
 /// Most segments of a vein that are drawn of each of many leaves, and of those of a motion.
 const MOST_NODES: usize = 32;
@@ -24,11 +28,11 @@ const MOST_POINTS: usize = 1000;
 impl Viewed for Equilibrium {
     const STILL: Figure<Self> = figure::leaf;
 
-    fn fill(&self, view: &mut View) {
+    fn fill(&self, view: &mut View, _: &Units) {
         view.verdict = verdict(self);
         view.success = self.outcome.is_success();
         let shape = &self.shape;
-        let leaf = Leaf::full("at rest".into(), &shape.stations, &shape.rods, &view.drawn);
+        let leaf = Leaf::full("at rest".into(), &shape.stations, &shape.rods, view);
         view.leaves.push(leaf);
         if self.stability.mode_shapes {
             let modes = self.stability.modes.iter().flatten().enumerate();
@@ -61,7 +65,7 @@ impl Viewed for All {
     const STILL: Figure<Self> = figure::all;
 
     /// All equilibria side by side.
-    fn fill(&self, view: &mut View) {
+    fn fill(&self, view: &mut View, _: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();
         view.verdict = counted(count, "equilibrium", "equilibria");
@@ -74,9 +78,10 @@ impl Viewed for All {
             let kind = equilibrium_of_index(leaf.stability.negative_eigenvalues);
             let energy = short(leaf.energy.unwrap_or(f64::NAN));
             let label = format!("{}. {kind}, energy {energy}", k + 1);
+            let shape = &leaf.shape;
             view.leaves.push(Leaf {
                 summary: leaf.summary(),
-                ..Leaf::full(label, &leaf.shape.stations, &leaf.shape.rods, &view.drawn)
+                ..Leaf::full(label, &shape.stations, &shape.rods, view)
             });
         }
     }
@@ -85,7 +90,7 @@ impl Viewed for All {
 impl Viewed for Record {
     const STILL: Figure<Self> = figure::filmstrip;
 
-    fn fill(&self, view: &mut View) {
+    fn fill(&self, view: &mut View, units: &Units) {
         view.kind = "motion";
         view.verdict = match self.stopped {
             None => format!("followed to t = {}", short(self.time)),
@@ -100,21 +105,15 @@ impl Viewed for Record {
             let (label, curves) = (format!("t = {}", short(time)), &still.curves);
             Leaf {
                 time: Some(time),
-                ..Leaf::coarse(
-                    label,
-                    &self.stations,
-                    curves,
-                    &view.drawn,
-                    MOST_MOVING_NODES,
-                )
+                ..Leaf::coarse(label, &self.stations, curves, view, MOST_MOVING_NODES)
             }
         });
         view.leaves = shapes.collect();
-        view.chart = Some(energies_and_tip(&self.moments, view));
+        view.chart = Some(energies_and_tip(&self.moments, units));
     }
 }
 
-fn energies_and_tip(moments: &[Moment], view: &View) -> Chart {
+fn energies_and_tip(moments: &[Moment], units: &Units) -> Chart {
     let stride = moments.len().div_ceil(MOST_POINTS).max(1);
     let shown = || moments.iter().step_by(stride);
     let curve = |choice, color, name: &str, of: &dyn Fn(&Moment) -> f64| Curve {
@@ -144,7 +143,10 @@ fn energies_and_tip(moments: &[Moment], view: &View) -> Chart {
     Chart {
         across: "time".into(),
         log: false,
-        choices: vec![view.with_unit("energy", false), view.with_unit("tip", true)],
+        choices: vec![
+            with_unit("energy", units.energy().as_deref()),
+            with_unit("tip", units.length.as_deref()),
+        ],
         curves: energies.chain(tip).collect(),
     }
 }
@@ -152,7 +154,7 @@ fn energies_and_tip(moments: &[Moment], view: &View) -> Chart {
 impl Viewed for Trace {
     const STILL: Figure<Self> = figure::trace;
 
-    fn fill(&self, view: &mut View) {
+    fn fill(&self, view: &mut View, units: &Units) {
         view.kind = "trace";
         let count = self.branches.len();
         view.verdict = match (count, self.complete) {
@@ -175,55 +177,43 @@ impl Viewed for Trace {
             };
             Leaf {
                 summary: vec![("energy", significant(point.energy))],
-                ..Leaf::coarse(
-                    label,
-                    &point.stations,
-                    &point.curves,
-                    &view.drawn,
-                    MOST_NODES,
-                )
+                ..Leaf::coarse(label, &point.stations, &point.curves, view, MOST_NODES)
             }
         };
         view.leaves = points.map(leaf).collect();
-        view.chart = Some(branches(self, view));
+        view.chart = Some(branches(self, units));
     }
 }
 
-/// Coordinates of the tip and the energy against the varied number.
-fn branches(trace: &Trace, view: &View) -> Chart {
-    type Of = fn(&TracePoint) -> f64;
-    // Of free tips the first represents all.
-    fn tip(point: &TracePoint, axis: usize) -> f64 {
-        point.tips.first().map_or(f64::NAN, |tip| tip[axis])
-    }
-    let choices: [(&str, Of); 4] = [
-        ("tip z", |point| tip(point, 2)),
-        ("tip y", |point| tip(point, 1)),
-        ("tip x", |point| tip(point, 0)),
-        ("energy", |point| point.energy),
+/// Coordinates of the tip, of free tips that of the first, and the energy against the varied
+/// number.
+fn branches(trace: &Trace, units: &Units) -> Chart {
+    let (length, energy) = (units.length.as_deref(), units.energy());
+    let choices = [
+        ("tip z", TraceShow::TipZ, length),
+        ("tip y", TraceShow::TipY, length),
+        ("tip x", TraceShow::TipX, length),
+        ("energy", TraceShow::Energy, energy.as_deref()),
     ];
-    let curve = |choice: usize, of: Of, branch: &TraceBranch| Curve {
-        choice,
-        unstable: branch.points.iter().map(|point| point.index > 0).collect(),
-        special: (branch.critical())
-            .map(|(at, point)| (at, point.kind.word()))
-            .collect(),
-        ..along(&branch.points, |point| (point.value, of(point)))
-    };
-    let curves = choices.iter().enumerate().flat_map(|(choice, (_, of))| {
-        let branches = trace.branches.iter();
-        numbered(
-            "branch",
-            branches.map(|branch| curve(choice, *of, branch)).collect(),
-        )
-    });
+    let curves = choices
+        .iter()
+        .enumerate()
+        .flat_map(|(choice, (_, shown, _))| {
+            let curve = |branch: &TraceBranch| Curve {
+                choice,
+                unstable: branch.points.iter().map(|point| point.index > 0).collect(),
+                special: (branch.critical())
+                    .map(|(at, point)| (at, point.kind.word()))
+                    .collect(),
+                ..along(&branch.points, |point| (point.value, shown.of(point)))
+            };
+            numbered("branch", trace.branches.iter().map(curve).collect())
+        });
     Chart {
         across: trace.keys.to_string(),
         log: trace.log,
-        choices: choices
-            .map(|(name, _)| view.with_unit(name, name != "energy"))
-            .into(),
         curves: curves.collect(),
+        choices: choices.map(|(name, _, unit)| with_unit(name, unit)).into(),
     }
 }
 
@@ -252,7 +242,7 @@ fn numbered(what: &str, mut curves: Vec<Curve>) -> Vec<Curve> {
 impl Viewed for Boundary {
     const STILL: Figure<Self> = figure::boundary;
 
-    fn fill(&self, view: &mut View) {
+    fn fill(&self, view: &mut View, _: &Units) {
         view.kind = "trace";
         let count = counted(self.curves.len(), "curve", "curves");
         view.verdict = match self.complete {
@@ -264,13 +254,7 @@ impl Viewed for Boundary {
         let leaf = |point: &BoundaryPoint| {
             let [first, second] = point.values.map(brief);
             let label = format!("{first}, {second}: {}", point.kind.replace('-', " "));
-            Leaf::coarse(
-                label,
-                &point.stations,
-                &point.curves,
-                &view.drawn,
-                MOST_NODES,
-            )
+            Leaf::coarse(label, &point.stations, &point.curves, view, MOST_NODES)
         };
         view.leaves = points.map(leaf).collect();
         view.chart = Some(plane(self));

@@ -30,6 +30,19 @@ function plain(geometry) {
   return (material = new THREE.MeshLambertMaterial({ vertexColors: true })) => new THREE.Mesh(geometry, material);
 }
 
+/// Triangles between points: for each of `count` veins, whose points begin `stride` apart, quadrilaterals along it and
+/// across, whose corners are `step` apart along and `side` across.
+function quads(count, stride, along, across, step, side) {
+  const indices = [];
+  for (let j = 0; j < count; j++)
+    for (let i = 0; i < along; i++)
+      for (let k = 0; k < across; k++) {
+        const p = j * stride + i * step + k * side;
+        indices.push(p, p + side, p + step, p + side, p + side + step, p + step);
+      }
+  return new THREE.BufferAttribute(Uint32Array.from(indices), 1);
+}
+
 /// A leaf in the scene, whose shape and colours can be set again without new buffers.
 class LeafMesh {
   constructor(leaf) {
@@ -41,14 +54,14 @@ class LeafMesh {
     const attribute = (size) => new THREE.BufferAttribute(new Float32Array(vertices * size), size).setUsage(THREE.DynamicDrawUsage);
     const geometry = new THREE.BufferGeometry();
     for (const [name, size] of [["position", 3], ["normal", 3], ["color", 3]]) geometry.setAttribute(name, attribute(size));
-    geometry.setIndex(new THREE.BufferAttribute(this.tubeIndices(), 1));
+    geometry.setIndex(quads(veins, this.fine * RING, this.fine - 1, STRIPS, RING, 1));
     this.tubes = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true }));
     this.toward = [0, 0, 0];
     const membrane = new THREE.BufferGeometry();
     membrane.setAttribute("position", new THREE.BufferAttribute(this.points, 3).setUsage(THREE.DynamicDrawUsage));
     const flat = new THREE.BufferAttribute(new Float32Array(3 * veins * this.fine), 3).setUsage(THREE.DynamicDrawUsage);
     membrane.setAttribute("normal", flat);
-    membrane.setIndex(new THREE.BufferAttribute(this.surfaceIndices(), 1));
+    membrane.setIndex(quads(veins - 1, this.fine, this.fine - 1, 1, 1, this.fine));
     const material = new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.55, depthWrite: false });
     this.surface = new THREE.Mesh(membrane, material);
     const ball = plain(new THREE.SphereGeometry(1.9 * radius, 16, 12));
@@ -60,31 +73,6 @@ class LeafMesh {
     this.group = new THREE.Group();
     this.group.add(this.tubes, this.surface, this.clamp, ...this.tips);
     for (const part of [this.tubes, this.surface]) part.frustumCulled = false;
-  }
-
-  tubeIndices() {
-    const indices = new Uint32Array(veins * Math.max(0, this.fine - 1) * STRIPS * 6);
-    let at = 0;
-    for (let j = 0; j < veins; j++)
-      for (let i = 0; i + 1 < this.fine; i++)
-        for (let k = 0; k < STRIPS; k++) {
-          const p = (j * this.fine + i) * RING + k;
-          indices.set([p, p + 1, p + RING, p + 1, p + 1 + RING, p + RING], at);
-          at += 6;
-        }
-    return indices;
-  }
-
-  surfaceIndices() {
-    const indices = new Uint32Array(Math.max(0, veins - 1) * Math.max(0, this.fine - 1) * 6);
-    let at = 0;
-    for (let j = 0; j + 1 < veins; j++)
-      for (let i = 0; i + 1 < this.fine; i++) {
-        const [p, q] = [j * this.fine + i, (j + 1) * this.fine + i];
-        indices.set([p, q, p + 1, q, q + 1, p + 1], at);
-        at += 6;
-      }
-    return indices;
   }
 
   /// Takes over the shape of a leaf with as many nodes.
@@ -178,7 +166,7 @@ class LeafMesh {
   }
 
   /// The parts that have one colour each.
-  theme(css) {
+  theme() {
     this.clamp.material.color.set(css("--clamp"));
     this.tips.forEach((tip) => tip.material.color.set(css("--accent")));
     this.surface.material.color.set(css("--membrane"));
@@ -190,19 +178,16 @@ const linear = (c) => c.map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.
 
 /// d r / d sigma times the spacing of the stations on the side that is asked for.
 function slopeOfState(leaf) {
-  const { state, stations, nodes, points } = leaf;
-  const lengths = Float32Array.from({ length: veins }, (_, j) => restLength(leaf, j));
+  const { state, stations, nodes } = leaf;
   return (p, i, side, out) => {
     const s = 16 * p;
     const [w, x, y, z, v1, v2, v3] = state.subarray(s, s + 7);
-    const step = Math.abs(stations[i + side] - stations[i]) * lengths[Math.floor(p / nodes)];
+    const step = Math.abs(stations[i + side] - stations[i]) * view.lengths[Math.floor(p / nodes)];
     out[0] = step * ((1 - 2 * (y * y + z * z)) * v1 + 2 * (x * y - w * z) * v2 + 2 * (x * z + w * y) * v3);
     out[1] = step * (2 * (x * y + w * z) * v1 + (1 - 2 * (x * x + z * z)) * v2 + 2 * (y * z - w * x) * v3);
     out[2] = step * (2 * (x * z - w * y) * v1 + 2 * (y * z + w * x) * v2 + (1 - 2 * (x * x + y * y)) * v3);
   };
 }
-
-const restLength = (_, j) => view.lengths[j];
 
 /// The same from the neighbours.
 function slopeOfPoints(leaf) {
