@@ -123,6 +123,19 @@ fn reissner_over_the_axial_stiffness() {
     }
 }
 
+/// Where a function changes its sign between two numbers, to the last digit.
+fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let sign = f(low).signum();
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        match f(middle) * sign > 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
 /// Greenhill's column of weight q with a load P on its tip, both pushing: theta'' + (P + q t)
 /// theta = 0 from the tip, where theta' = 0, to the base, where theta = 0; by power series.
 #[test]

@@ -6,7 +6,6 @@
 pub mod branch;
 pub mod fit;
 pub mod motion;
-mod numerics;
 mod pairs;
 pub mod plane;
 pub mod random;
@@ -29,7 +28,6 @@ pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::Base;
 pub use motion::TIMOSHENKO;
-pub use numerics::*;
 pub use pairs::pairs;
 pub use shot::*;
 
