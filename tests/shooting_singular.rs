@@ -113,8 +113,7 @@ fn all_veins_of_a_pair_would_move() {
     assert!(text.contains("all veins would move"), "{text}");
 }
 
-/// The critical length of `tests/lens.rs` and the critical weight of
-/// `tests/hanging_curved.rs`, without any eigenvalue being counted.
+/// A critical length of a lens and a critical weight of `tests/bifurcations.rs`, without any eigenvalue being counted.
 #[test]
 fn published_bifurcations_are_seen() {
     let long = |length: f64| format!("leaf.length=[1.0, {length:?}, 1.0]");

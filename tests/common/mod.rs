@@ -17,7 +17,6 @@ pub use std::f64::consts::PI;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
-pub use branch::{NEUTRAL, critical, critical_of_rigid};
 pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
@@ -121,6 +120,11 @@ pub const RIGID: &str = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.s
 pub fn rod(overrides: &str) -> Scenario {
     let rod = Scenario::from_toml_with(ROD, "rod", &entries(overrides));
     rod.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The text of [`ROD`] whose tip is held where it is at rest.
+pub fn held(how: &str) -> String {
+    format!("{ROD}\ntip = {{ held = \"{how}\", position = [1.0, 0.0, 0.0] }}")
 }
 
 /// The numbers of a text of lines of columns; `#` begins a comment.
