@@ -54,28 +54,6 @@ fn a_full_circle_comes_back_to_the_clamp_turned_once() {
     assert!((middle - DVec3::new(0.0, 1.0 / PI, 0.0)).length() < 1e-11);
 }
 
-/// Wound into coils and pulled aside by a dead force (Ibrahimbegovic 1997): load
-/// factor, tip / L. Collocation on the boundary-value problem.
-const COILS: &str = "
-    0.1  0.041020335261  0.005377090312   -0.109172901932
-    1.0  0.000480324966  0.0000072496847  -0.007644174173
-";
-
-#[test]
-fn one_coil_and_ten_end_where_the_boundary_value_problem_says() {
-    let length = 10.0;
-    for [lambda, wanted @ ..] in table::<4>(COILS) {
-        let (moment, force) = (200.0 * PI * lambda, 50.0 * lambda);
-        let loads = format!("load.tip_moment=[0, 0, {moment:?}]; load.tip_force=[0, 0, {force:?}]");
-        let leaf = Both::solve("classic/helical_rollup", &loads);
-        let wanted = length * DVec3::from_array(wanted);
-        let what = format!("lambda = {lambda}");
-        leaf.tip_is(&what, wanted, length * 1e-12, length * 1e-11);
-        // No potential, so no count of eigenvalues: nothing is claimed.
-        assert_eq!(leaf.relaxed.stability.negative_eigenvalues, None);
-    }
-}
-
 /// More turns than are applied by steps: from the shape of the moment alone.
 #[test]
 fn hundreds_of_turns_are_found() {
