@@ -137,14 +137,12 @@ fn stated_errors_of_eigenvalues_are_bounds() {
     assert!(compared > 10 * count, "{compared}");
 }
 
-/// All eigenvalues, ascending, by a dense method, and the matrix made from the
-/// segments' derivatives by the tests themselves.
+/// All eigenvalues, ascending, by a dense method.
 fn dense(scenario: &Scenario, state: &State) -> Vec<f64> {
     let leaf = Leaf::new(scenario);
     let grid = discrete(&leaf, state.segments());
     let linear = Linear::new(&grid, &Physics::new(&leaf), state);
-    let matrix = linear.scaled(&(&linear.strains + &linear.coupling));
-    let values = SymmetricEigen::new(matrix).eigenvalues;
+    let values = SymmetricEigen::new(linear.scaled()).eigenvalues;
     let mut values: Vec<f64> = values.iter().copied().collect();
     values.sort_by(f64::total_cmp);
     values
