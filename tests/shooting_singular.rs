@@ -131,18 +131,6 @@ fn published_bifurcations_are_seen() {
     }
 }
 
-/// The files and the paper's leaves are nowhere near a bifurcation.
-#[test]
-fn nothing_is_reported_of_ordinary_leaves() {
-    for (folder, entries) in [("classic", ""), ("paper", "leaf.rods=5")] {
-        for file in files(folder) {
-            let leaf = read(&file, entries);
-            let shot = shot_near(&leaf, &settle(&leaf, 1e-8));
-            assert!(shot.neutral.is_none(), "{}", leaf.name);
-        }
-    }
-}
-
 fn moving(displacements: &[[f64; 3]]) -> Neutral {
     let rods = displacements.iter().map(|d| DVec3::from_array(*d));
     Neutral {
