@@ -4,7 +4,7 @@
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Workplace, contains, near, tells, timeless};
+use workplace::{Json, Workplace, contains, near, pairs, tells, timeless};
 
 const FILES: &str = "trace.csv trace.json trace.png trace.svg";
 
@@ -25,24 +25,6 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     assert_eq!(rows[0][..5], ["1", "1", "regular", "0.0", ""]);
     let last = rows.last().unwrap();
     assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
-}
-
-/// Every point is the leaf that `relax` finds there.
-#[test]
-fn points_are_what_relax_finds() {
-    let place = Workplace::new();
-    let vary = "--vary load.gravity[2]=0..-3:4";
-    place.run(format!("trace leaf.toml --tolerance 1e-8 {vary} --out t"));
-    let rows = place.table("t/trace.csv", COLUMNS);
-    assert!(rows.len() > 6);
-    for row in rows.iter().step_by(3) {
-        let set = format!("--set load.gravity=[0,0,{}]", row[3]);
-        let relax = format!("relax leaf.toml --tolerance 1e-10 {set} --out r");
-        let leaf = place.told(0, relax);
-        let numbers: Vec<f64> = row[5..9].iter().map(|cell| cell.parse().unwrap()).collect();
-        near(&numbers[..3].into(), &leaf["tip"], 2e-8);
-        assert!(numbers[3] < 1e-8, "{row:?}");
-    }
 }
 
 /// A leaf without weight, soft across, loses its flatness at a fork; both its
@@ -137,24 +119,33 @@ fn a_branch_that_needs_finer_grids_gets_them() {
     assert_eq!(index("first"), index("last") + 1);
 }
 
-/// The rest length of one vein grows; veins are coupled at one end of the range only.
+/// One load, the rest length of one vein, and coupling, which may end where leaves do: no step
+/// leads beyond it.
 #[test]
 fn a_branch_ends_in_the_leaf_that_relax_finds_there() {
     let place = Workplace::new();
-    let stretched = "--set rest.stretch=[1.2,1,1,1,1]";
-    let coupled = "--set coupling.y=0 --set coupling.z=40";
-    for (varied, there, tolerance) in [
-        ("--vary rest.stretch[0]=1..1.2", stretched, 1e-6),
-        ("--set coupling.y=0 --vary coupling.z=0..40", coupled, 1e-8),
-    ] {
-        let follow = format!("trace leaf.toml {varied} --tolerance {tolerance}");
+    let table = "
+        load.gravity[2]=0..-3 => load.gravity=[0,0,-3]
+        rest.stretch[0]=1..1.2 => rest.stretch=[1.2,1,1,1,1]
+        coupling.z=0..40 => coupling.z=40
+        coupling.z=40..0 => coupling.z=0
+        coupling.z=2..1e-9 => coupling.z=1e-9
+    ";
+    for (varied, there) in pairs(table) {
+        let follow = format!("trace leaf.toml --vary {varied} --tolerance 1e-8 --out t");
         let trace = place.told(0, follow);
-        let branch = &trace["branches"][0];
+        let (branch, last) = (&trace["branches"][0], &trace["branches"][0]["last"]);
+        assert_eq!(branch["end"], "reached", "{trace}");
         assert!(branch["points"].count() < 40, "{branch}");
-        let fine = 0.1 * tolerance;
-        let relax = format!("relax leaf.toml {there} --tolerance {fine} --out r");
+        let end = varied.rsplit("..").next().unwrap();
+        assert_eq!(last["value"].as_f64(), end.parse().ok());
+        let relax = format!("relax leaf.toml --set {there} --tolerance 1e-9 --out r");
         let leaf = place.told(0, relax);
-        near(&branch["last"]["tip"], &leaf["tip"], 2.0 * tolerance);
+        near(&last["tip"], &leaf["tip"], 2e-8);
+        let row = place.table("t/trace.csv", COLUMNS).pop().unwrap();
+        let numbers: Vec<f64> = row[5..9].iter().map(|cell| cell.parse().unwrap()).collect();
+        near(&numbers[..3].into(), &leaf["tip"], 2e-8);
+        assert!(numbers[3] <= 1e-8, "{row:?}");
     }
 }
 
@@ -191,20 +182,6 @@ fn a_loop_is_closed() {
         // It goes through both crossings and to both sides.
         let number = branch["points"].count();
         assert!(number > 20, "{number}");
-    }
-}
-
-/// A range may end at the last leaf there is: no step leads beyond it.
-#[test]
-fn a_range_may_end_where_leaves_do() {
-    let place = Workplace::new();
-    for (range, end) in [("40..0", "0.0"), ("2..1e-9", "1e-9")] {
-        let trace = place.told(0, format!("trace leaf.toml --vary coupling.z={range}"));
-        assert_eq!(trace["branches"][0]["end"], "reached", "{trace}");
-        let last = &trace["branches"][0]["last"];
-        assert_eq!(last["value"].as_f64(), end.parse().ok());
-        let leaf = place.told(0, format!("relax leaf.toml --set coupling.z={end} --out r"));
-        near(&last["tip"], &leaf["tip"], 2e-6);
     }
 }
 
