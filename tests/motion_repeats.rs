@@ -65,19 +65,3 @@ fn looked_at_or_not() {
         assert_eq!(looked.save(), other.save());
     }
 }
-
-#[test]
-fn from_saved_numbers() {
-    let leaf = Leaf::new(&damped(3));
-    for (mut through, mut other) in methods(&leaf, 20).into_iter().zip(methods(&leaf, 20)) {
-        through.advance(0.2).unwrap();
-        assert!(other.restore(&through.save()));
-        for method in [&mut through, &mut other] {
-            method.advance(0.5).unwrap();
-        }
-        let [a, b] = [&mut through, &mut other].map(|method| bits(&method.snapshot().state));
-        assert_eq!(a, b);
-        assert_eq!(through.save(), other.save());
-        assert!(!other.restore(&[0.0]));
-    }
-}
