@@ -42,9 +42,15 @@ fn json_is_alone_on_standard_output() {
 }
 
 #[test]
-fn overrides_reach_the_scenario() {
-    let summary = summary(&Workplace::new(), "--set leaf.rods=3 --tolerance 1e-5");
-    tells(&summary, "rods=3 tolerance=1e-5");
+fn requests_reach_the_solver() {
+    workplace::all_tell(
+        0,
+        "
+        relax leaf.toml --set leaf.rods=3 --tolerance 1e-5 => rods=3 tolerance=1e-5
+        relax leaf.toml --method shooting --intervals 4 => intervals=4; by multiple shooting over 4 intervals
+        relax scenarios/paper/fig10.toml --set leaf.rods=5 --method shooting => outcome=saddle stable=false negative_eigenvalues=18; unstable equilibrium of index 18
+        ",
+    );
 }
 
 #[test]
@@ -106,22 +112,6 @@ fn shooting_finds_a_stable_leaf() {
     let told = "method=shooting outcome=converged segments=[] intervals=1 stable=true";
     tells(&summary, told);
     contains(&place.picture("out/figure"), &["by single shooting"]);
-}
-
-#[test]
-fn intervals_are_as_asked() {
-    let (report, summary) = shoot(&Workplace::new(), "leaf.toml --intervals 4", 0);
-    contains(&report, &["by multiple shooting over 4 intervals"]);
-    assert_eq!(summary["intervals"], 4);
-}
-
-#[test]
-fn shooting_finds_a_saddle_and_calls_it_unstable() {
-    let fig10 = "scenarios/paper/fig10.toml --set leaf.rods=5";
-    let (report, summary) = shoot(&Workplace::new(), fig10, 0);
-    contains(&report, &["unstable equilibrium of index 18"]);
-    let told = "outcome=saddle stable=false negative_eigenvalues=18";
-    tells(&summary, told);
 }
 
 #[test]

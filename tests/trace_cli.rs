@@ -1,15 +1,22 @@
-//! What scripts rely on when they follow an equilibrium: files, exit statuses,
+//! What scripts rely on when they follow an equilibrium, and boundaries: files, exit statuses,
 //! messages, and results that do not depend on the threads.
 
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Workplace, contains, near, pairs, tells, timeless};
+use workplace::{Json, Workplace, all_refused, all_tell, contains, near, pairs, tells, timeless};
 
 const FILES: &str = "trace.csv trace.json trace.png trace.svg";
 
 const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
     negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
+
+const BOUNDARY: &str = "curve,point,kind,load.tip_force[0],stiffness.bending_3,error_1,error_2,\
+    tip_x,tip_y,tip_z,error,index_before,index_behind";
+
+/// A column that buckles in one plane alone.
+const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+    --set stiffness.bending_2=1000 --vary load.tip_force[0]=0..-6";
 
 #[test]
 fn a_trace_is_a_table_a_summary_and_a_figure() {
@@ -25,6 +32,34 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     assert_eq!(rows[0][..5], ["1", "1", "regular", "0.0", ""]);
     let last = rows.last().unwrap();
     assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
+}
+
+#[test]
+fn a_boundary_is_a_table_a_summary_and_a_figure() {
+    let place = Workplace::new();
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let run = place.run(format!("trace leaf.toml {COLUMN} {bending}"));
+    run.ends(0).says(&[
+        "load.tip_force[0] from 0.0 to -6.0",
+        "stiffness.bending_3 from 0.5 to 2.0",
+        "at stiffness.bending_3 = 1.0",
+        "branches cross: index 0 to 1",
+        "the end of a range",
+        "written",
+    ]);
+    let files = "boundary.csv boundary.json boundary.png boundary.svg";
+    place.holds("out/small", files);
+    let picture = place.picture("out/small/boundary");
+    let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
+    contains(&picture, &parts);
+    let rows = place.table("out/small/boundary.csv", BOUNDARY);
+    assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);
+    assert_eq!(rows[0][4], "0.5");
+    assert_eq!(rows.last().unwrap()[4], "2.0");
+    let json = place.json("out/small/boundary.json");
+    assert_eq!(json["complete"], true);
+    assert_eq!(json["curves"][0]["ends"][1], "reached");
+    assert_eq!(json["curves"][0]["points"].list().len(), rows.len());
 }
 
 /// A leaf without weight, soft across, loses its flatness at a fork; both its
@@ -70,7 +105,7 @@ fn a_leaf_that_is_pulled_obeys_hookes_law() {
 
 #[test]
 fn what_cannot_be_followed_is_refused() {
-    workplace::all_refused(
+    all_refused(
         "trace leaf.toml --vary",
         "leaf.rods=3..9 => a whole number has nothing between
         method.step=1e-3..1 => setting of a method
@@ -83,19 +118,32 @@ fn what_cannot_be_followed_is_refused() {
         load.gravity[2]=0..1 --tolerance 5 => tolerance
         load.gravity[2]=0..1 --segments 0 => segments",
     );
+    all_refused(
+        "trace leaf.toml --vary load.gravity[2]=0..-1 --vary",
+        "load.gravity[2]=0..-3 => varies twice
+        load.gravity[1]+load.gravity[2]=0..-3 => varies twice
+        leaf.rods=3..9 => a whole number has nothing between
+        dynamics.density=1..2 => no equilibrium
+        load.gravity[1]=1..1 => the same
+        stiffness.axial=100..-5 => greater than 0
+        load.gravity[1]=0..1 --vary load.gravity[0]=0..1 => 3 times
+        load.gravity[1]=0..1 --cross-section 1 => vary one number",
+    );
 }
 
 /// What ends early is said, with what was found until then.
 #[test]
-fn a_branch_that_goes_on_is_an_outcome() {
-    let place = Workplace::new();
-    let few = "trace leaf.toml --vary load.gravity[2]=0..-3:100 --points 5";
-    let trace = place.told(1, few);
-    assert_eq!(trace["complete"], false);
-    let branch = &trace["branches"][0];
-    tells(branch, "end=most-points points=5");
-    contains(branch["remark"].text(), &["allow more"]);
-    place.holds("out/small", FILES);
+fn what_goes_on_is_an_outcome() {
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let short = COLUMN.replace("0..-6", "0..-1");
+    let table = format!(
+        "
+        trace leaf.toml --vary load.gravity[2]=0..-3:100 --points 5 => complete=false branches.0.end=most-points branches.0.points=5; allow more
+        trace leaf.toml {COLUMN} {bending}:100 --points 20 => complete=false curves.0.ends.1=most-points
+        trace leaf.toml {short} {bending} => complete=false; changes nowhere
+        "
+    );
+    all_tell(1, &table);
 }
 
 /// On the grid that is enough at its start, this branch would go over to one that only
