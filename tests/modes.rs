@@ -230,8 +230,15 @@ fn negative(leaf: &Equilibrium) -> usize {
 #[test]
 fn saddles_have_as_many_negative_eigenvalues_as_their_index() {
     let flat = scenario("paper/fig10", "leaf.rods=5");
-    for (segments, index) in [(10, 14), (20, 16), (40, 18)] {
+    for (segments, index) in [(10, 14), (20, 16), (40, 18), (80, 18)] {
         let leaf = settled(&flat, &keeping(with_on(segments, 24)));
+        assert_eq!(leaf.outcome, Outcome::Saddle);
+        // So soft a state lies elsewhere on every grid, but nearly flat on all.
+        assert!(
+            tip(&leaf).z.abs() < 0.01,
+            "{segments} segments: {}",
+            tip(&leaf)
+        );
         assert_eq!(leaf.stability.negative_eigenvalues, Some(index));
         assert_eq!(negative(&leaf), index, "{segments} segments");
         assert!(modes_of(&leaf).is_sorted_by_key(|mode| mode.eigenvalue));

@@ -57,26 +57,9 @@ fn each_comes_to_rest_in_the_stable_equilibrium_recorded() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The flat leaf of Fig. 10, N = 5, which a boundary-value solver returns as
-/// the solution (tip z = -0.0015): unstable in as many ways as a grid can show.
-#[test]
-fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
-    let flat = figure("fig10", 5);
-    for (segments, index) in [(10, 14), (20, 16), (40, 18), (80, 18)] {
-        let leaf = relaxed(&flat, &keeping(on(segments)));
-        assert_eq!(leaf.outcome, Outcome::Saddle, "{segments} segments");
-        let found = leaf.stability.negative_eigenvalues;
-        assert_eq!(found, Some(index), "{segments} segments");
-        // So soft a state lies elsewhere on every grid, but nearly flat on all.
-        let tip = tip(&leaf);
-        assert!(tip.z.abs() < 0.01, "{segments} segments: {tip}");
-    }
-    let left = settle(&flat, 1e-6);
-    assert!(tip(&left).z.abs() > 0.1);
-}
-
-/// To be kept as the result a saddle must be as accurate as any other: the
-/// count must be that of grids that resolve it.
+/// The flat leaf of Fig. 10, which a boundary-value solver returns as the solution
+/// (`tests/modes.rs` has it on single grids). To be kept as the result a saddle must be as
+/// accurate as any other: the count must be that of grids that resolve it.
 #[test]
 fn a_saddle_on_nested_grids_has_the_index_of_the_finest() {
     let leaf = kept(&figure("fig10", 5), 1e-6);

@@ -313,11 +313,6 @@ pub fn nodes(rods: &[RodShape]) -> impl Iterator<Item = &NodeState> {
     rods.iter().flat_map(|rod| &rod.nodes)
 }
 
-/// `KEY=VALUE` for a vector.
-pub fn set_vector(key: &str, v: DVec3) -> String {
-    format!("{key}=[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
-}
-
 /// [`entries`] of the three stretch and shear stiffnesses.
 pub fn set_stiffness(axial: f64, shear: f64) -> String {
     format!("stiffness.axial={axial}; stiffness.shear_2={shear}; stiffness.shear_3={shear}")

@@ -7,23 +7,18 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 use crate::common::{asked, linear, paper_leaf};
 
-/// The next even number between 0 and 1 of a sequence that `state` begins, by the generator
+/// Random numbers, the same everywhere, of the sequence that a number begins, by the generator
 /// of Steele, Lea and Flood (OOPSLA 2014).
-pub fn splitmix64(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// Random numbers, the same everywhere, of the sequence that a number begins.
 pub struct Draw(pub u64);
 
 impl Draw {
     /// Between 0 and 1.
     pub fn even(&mut self) -> f64 {
-        splitmix64(&mut self.0)
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
