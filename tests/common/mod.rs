@@ -43,6 +43,14 @@ pub fn files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
+/// All scenario files; measured data stand beside theirs.
+pub fn scenario_files() -> Vec<PathBuf> {
+    let folders = ["paper", "classic", "motion", "study", "measured"];
+    let mut all = folders.map(files).concat();
+    all.retain(|file| file.extension().is_none_or(|kind| kind != "csv"));
+    all
+}
+
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
 pub fn path(name: &str) -> PathBuf {
     let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
