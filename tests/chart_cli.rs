@@ -6,7 +6,7 @@ mod workplace;
 use std::collections::HashMap;
 
 use serde_json::{Value, json};
-use workplace::{Json, Workplace, all_refused, contains, pairs, tells};
+use workplace::{Json, Workplace, contains, pairs, tells};
 
 const FILES: &str = "chart.csv chart.json chart.png chart.svg";
 
@@ -357,24 +357,4 @@ fn malformed_tables_are_refused_with_file_and_line() {
         place.refuses("chart leaf.toml --peers peers.csv", &message);
     }
     place.refuses("chart leaf.toml --peers absent.csv", "absent.csv");
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "chart",
-        "leaf.toml --seconds 0 => seconds 0: must be greater than 0
-        leaf.toml --seconds -1 => seconds -1
-        leaf.toml --seconds nan => seconds NaN
-        leaf.toml --seconds 1e9 => at most 86400
-        leaf.toml --methods newton => semi-implicit-grid
-        leaf.toml --tolerance 1e-3 => --rods
-        leaf.toml --tolerance 2 --rods 2 => tolerance = 2
-        leaf.toml --rods 2,many => --rods
-        leaf.toml --rods 2,0 => leaf.rods
-        leaf.toml --set leaf.rods=0 => rods
-        leaf.toml --out leaf.toml/out => --out DIR
-        absent.toml => absent.toml
-        => SCENARIO",
-    );
 }

@@ -4,7 +4,7 @@
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Run, Workplace, all_refused, contains, tells};
+use workplace::{Json, Run, Workplace, contains, tells};
 
 const FILES: &str = "check.json check.png check.svg";
 
@@ -139,20 +139,4 @@ fn json_goes_alone_to_standard_output_and_the_reason_to_standard_error() {
     let reason = check["reason"].text();
     contains(reason, &["did not come to rest"]);
     contains(&run.err, &[reason]);
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "check",
-        "leaf.toml --intervals 0 => --intervals 0: allowed are
-        leaf.toml --intervals 5000 => 1 to 4096
-        leaf.toml --tolerance -1 => tolerance
-        leaf.toml --tolerance 1 => tolerance
-        leaf.toml --set leaf.rods=0 => rods
-        leaf.toml --segments 8 => --segments
-        leaf.toml --method shooting => --method
-        leaf.toml --out leaf.toml/out => --out DIR
-        absent.toml => absent.toml",
-    );
 }

@@ -5,7 +5,7 @@ mod workplace;
 
 use std::fs;
 
-use workplace::{Workplace, all_refused, contains};
+use workplace::{Workplace, contains};
 
 const FILES: &str = "map.csv map.json map.png map.svg";
 
@@ -190,31 +190,4 @@ fn maps_are_not_mixed() {
     let message = "other.csv:1: is no row of this map";
     place.refuses(small("--draw other.csv"), message);
     place.refuses(small("--draw absent.csv"), "absent.csv");
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    let torsion = "--vary stiffness.torsion=1..2:2";
-    all_refused(
-        "map leaf.toml",
-        "=> --vary
-        --vary stiffness.torsion=1 => has no ..
-        --vary stiffness.torsion[5]=1..2 => 5 entries
-        --vary rest.twist=0..1:2000 --vary rest.bend_2=0..1:2000 => at most 1000000",
-    );
-    all_refused(
-        &format!("map leaf.toml {torsion}"),
-        "--vary stiffness.torsion=1..2:2 => varies twice
-        --vary rest.twist=0..1 --vary rest.bend_2=0..1 => one or two axes
-        --methods newton => semi-implicit
-        --methods explicit-motion => method.step
-        --set method.step=0 => greater than 0
-        --set method.steps=1 => method.step and method.segments
-        --cell-seconds 0 => cell-seconds
-        --tolerance 1 => tolerance
-        --shard 3/2 => --shard <I/K>
-        --shard 1/2 --draw a.csv => --draw
-        --set leaf.rods=0 => rods
-        --out leaf.toml/out => --out DIR",
-    );
 }

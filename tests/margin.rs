@@ -296,12 +296,6 @@ fn a_column_that_is_shortened_has_a_barrier() {
 fn what_has_no_margin_is_said() {
     let place = Workplace::new();
     let run = |more: &str| place.run(format!("relax leaf.toml --margin --write none {more}"));
-    workplace::all_refused(
-        "relax leaf.toml --margin",
-        "--all => cannot be used with
-        --method shooting => --margin: a margin is that of a relaxed leaf
-        --set leaf.rods=1 --set load.tip_moment=[0,0,1] => dead moment",
-    );
     let held = run("--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]").ends(0);
     held.says(&["the tip is held: a force on it moves nothing"]);
     let free = run("--set leaf.joined=false").ends(0);

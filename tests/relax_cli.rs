@@ -6,7 +6,7 @@ mod workplace;
 use std::fs;
 
 use serde_json::{Value, json};
-use workplace::{Json, Run, Workplace, all_refused, contains, floats, leaf, tells};
+use workplace::{Json, Run, Workplace, contains, floats, leaf, tells};
 
 const FILES: &str = "centerlines.csv figure.png figure.svg summary.json";
 
@@ -75,24 +75,7 @@ fn a_single_grid_claims_no_accuracy() {
 }
 
 #[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "relax",
-        "leaf.toml --method newton => newton
-        leaf.toml --method newton => semi-implicit
-        leaf.toml --method implicit => semi-implicit
-        absent.toml => absent.toml: cannot be read
-        leaf.toml --segments few => invalid value 'few' for '--segments <N>'
-        leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
-        leaf.toml --modes 101 => --modes
-        leaf.toml --modes -1 => --modes
-        leaf.toml --modes all => --modes
-        leaf.toml --method shooting --segments 8 => --segments 8: shooting has no grid
-        leaf.toml --intervals 4 => --intervals 4: only the method shooting has intervals
-        leaf.toml --method explicit --keep-unstable => --keep-unstable: explicit motion leaves unstable equilibria; use the method semi-implicit
-        leaf.toml --method shooting --intervals 0 => --intervals 0: allowed are 1 to 4096",
-    );
-    all_refused("grow", "leaf.toml => grow");
+fn a_folder_that_is_a_file_is_refused() {
     let place = Workplace::new();
     place.write("plain", "a file");
     let message = "error: cannot write to the folder plain/out: plain is not a folder";

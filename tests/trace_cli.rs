@@ -4,7 +4,7 @@
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Workplace, all_refused, all_tell, contains, near, pairs, tells, timeless};
+use workplace::{Json, Workplace, all_tell, contains, near, pairs, tells, timeless};
 
 const FILES: &str = "trace.csv trace.json trace.png trace.svg";
 
@@ -101,34 +101,6 @@ fn a_leaf_that_is_pulled_obeys_hookes_law() {
         let parts = ["displacement along x / cm", "force / N", "slope", "N/cm"];
         contains(&place.picture("h/trace"), &parts);
     }
-}
-
-#[test]
-fn what_cannot_be_followed_is_refused() {
-    all_refused(
-        "trace leaf.toml --vary",
-        "leaf.rods=3..9 => a whole number has nothing between
-        method.step=1e-3..1 => setting of a method
-        dynamics.density=1..2 => no equilibrium
-        solve.tolerance=1e-3..1e-6 => changes no leaf
-        load.gravity[2]=1..1 => the same
-        stiffness.axial=100..-5 => greater than 0
-        load.gravity[2]=0..1 --points 1 => 2 or more
-        load.gravity[2]=0..1 --cross-section -1 => greater than 0
-        load.gravity[2]=0..1 --tolerance 5 => tolerance
-        load.gravity[2]=0..1 --segments 0 => segments",
-    );
-    all_refused(
-        "trace leaf.toml --vary load.gravity[2]=0..-1 --vary",
-        "load.gravity[2]=0..-3 => varies twice
-        load.gravity[1]+load.gravity[2]=0..-3 => varies twice
-        leaf.rods=3..9 => a whole number has nothing between
-        dynamics.density=1..2 => no equilibrium
-        load.gravity[1]=1..1 => the same
-        stiffness.axial=100..-5 => greater than 0
-        load.gravity[1]=0..1 --vary load.gravity[0]=0..1 => 3 times
-        load.gravity[1]=0..1 --cross-section 1 => vary one number",
-    );
 }
 
 /// What ends early is said, with what was found until then.

@@ -8,7 +8,7 @@ use std::process::Stdio;
 
 use leafdyn::scenario::Scenario;
 use serde_json::Value;
-use workplace::{Json, Run, Workplace, all_refused, contains, floats, leaf, pairs};
+use workplace::{Json, Run, Workplace, contains, floats, leaf, pairs};
 
 /// Verbs, the files that they write and the keys of their JSON, in their order.
 const VERBS: &str = "
@@ -62,21 +62,6 @@ fn a_map_keeps_no_rows_unless_tables_are_asked_for() {
     again.says(&["2 were there, 0 computed"]);
     let shard = place.ok(format!("{map} --shard 1/2 --json --out part"));
     assert_eq!(shard.json()["outcomes"][0]["counts"]["right"], 1);
-}
-
-#[test]
-fn kinds_that_there_are_not_are_refused() {
-    all_refused(
-        "relax",
-        "leaf.toml --write pdf => pdf: must be some of json, csv, svg, png
-        leaf.toml --write json,none => none: must be some of
-        leaf.toml --write json, => must be some of
-        leaf.toml --all --write csv => --write csv: this verb writes json, svg, png
-        leaf.toml --stations 0 => --stations
-        leaf.toml --stations many => --stations",
-    );
-    let none = "leaf.toml --vary rest.twist=0..1 --stations 4 => --stations 4: the files of this verb have none";
-    all_refused("trace", none);
 }
 
 #[test]
