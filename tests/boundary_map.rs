@@ -6,7 +6,7 @@ mod workplace;
 use common::PI;
 use common::branch::weak_veins;
 use serde_json::{Value, json};
-use workplace::{Json, Workplace, all_refused, contains, floats, timeless};
+use workplace::{Json, Workplace, contains, floats, timeless};
 
 /// A column without weight.
 const COLUMN: &str =
@@ -162,14 +162,4 @@ fn a_cell_close_beyond_a_curve_is_counted_on_finer_grids() {
     let wide = format!("{column}{end} --vary stiffness.torsion=1..2 --map 2x2");
     let found = place.told(0, wide);
     assert_eq!(map(&found)["index"], json!([[0, 1], [0, 1]]));
-}
-
-#[test]
-fn maps_that_cannot_be_are_refused() {
-    all_refused(
-        "trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --map",
-        "16 => as 16x16
-        0x4 => from 1 to 256
-        4x1000 => from 1 to 256",
-    );
 }

@@ -6,7 +6,7 @@ mod workplace;
 use std::collections::HashMap;
 
 use serde_json::{Value, json};
-use workplace::{Json, Workplace, all_refused, contains, pairs, tells};
+use workplace::{Json, Workplace, contains, pairs, tells};
 
 const FILES: &str = "chart.csv chart.json chart.png chart.svg";
 
@@ -143,23 +143,6 @@ fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
 }
 
 #[test]
-fn single_grids_are_of_second_order() {
-    let (rows, _) = chart(&Workplace::new(), TWO, "semi-implicit-grid,explicit-grid");
-    for (method, finest) in [("semi-implicit-grid", 512.0), ("explicit-grid", 64.0)] {
-        let grids = of(&rows, method);
-        let fine = |row: &&&Row| (8.0..=finest).contains(&knob(row, "segments="));
-        let fine = grids.iter().filter(fine);
-        let errors: Vec<f64> = fine.map(|row| number(row, "true_error").unwrap()).collect();
-        assert!(errors.len() >= 4);
-        for pair in errors.windows(2) {
-            let ratio = pair[0] / pair[1];
-            assert!((ratio - 4.0).abs() < 0.2, "{method}: {errors:?}");
-        }
-        assert!(grids.iter().all(|row| row["error_estimate"].is_empty()));
-    }
-}
-
-#[test]
 fn tolerances_are_kept_and_estimates_are_bounds() {
     let methods = "semi-implicit,explicit,single-shooting,shooting,shooting-from-rest";
     let (rows, chart) = chart(&Workplace::new(), TWO, methods);
@@ -262,6 +245,7 @@ fn profiles_with_knots_anywhere_have_a_reference_at_every_station() {
     let (rows, chart) = chart(&Workplace::new(), &leaf, THREE);
     assert_eq!(chart["reference"]["confirmed"], true);
     let grids = of(&rows, "semi-implicit-grid");
+    assert!(grids.iter().all(|row| row["error_estimate"].is_empty()));
     let errors = [1, 7].map(|k| number(grids[k], "true_error").unwrap());
     let [coarse, fine] = errors;
     assert!(fine < 1e-5 && coarse / fine > 500.0, "{errors:?}");
@@ -373,24 +357,4 @@ fn malformed_tables_are_refused_with_file_and_line() {
         place.refuses("chart leaf.toml --peers peers.csv", &message);
     }
     place.refuses("chart leaf.toml --peers absent.csv", "absent.csv");
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "chart",
-        "leaf.toml --seconds 0 => seconds 0: must be greater than 0
-        leaf.toml --seconds -1 => seconds -1
-        leaf.toml --seconds nan => seconds NaN
-        leaf.toml --seconds 1e9 => at most 86400
-        leaf.toml --methods newton => semi-implicit-grid
-        leaf.toml --tolerance 1e-3 => --rods
-        leaf.toml --tolerance 2 --rods 2 => tolerance = 2
-        leaf.toml --rods 2,many => --rods
-        leaf.toml --rods 2,0 => leaf.rods
-        leaf.toml --set leaf.rods=0 => rods
-        leaf.toml --out leaf.toml/out => --out DIR
-        absent.toml => absent.toml
-        => SCENARIO",
-    );
 }

@@ -4,7 +4,7 @@
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Run, Workplace, all_refused, contains, tells};
+use workplace::{Json, Run, Workplace, contains, tells};
 
 const FILES: &str = "check.json check.png check.svg";
 
@@ -72,26 +72,20 @@ fn the_json_has_both_solutions_and_their_differences() {
     }
 }
 
+/// Tolerances and intervals as asked, a saddle, and free tips, which are listed.
 #[test]
-fn tolerance_and_intervals_are_as_asked() {
-    let (check, run) = check("leaf.toml --tolerance 1e-8 --intervals 7");
-    run.ends(0);
-    assert_eq!(check["tolerance"], 1e-8);
-    assert_eq!(check["shooting"]["intervals"], 7);
-    assert!(check["difference"]["position"].number() < 1e-8);
-}
-
-#[test]
-fn a_saddle_is_called_unstable_by_both() {
-    let place = Workplace::new();
-    let run = place.run("check scenarios/paper/fig10.toml --set leaf.rods=5 --keep-unstable");
-    run.ends(0).says(&[
-        "relaxed  unstable equilibrium of index 18",
-        "shooting unstable equilibrium of index 18",
-    ]);
-    let check = place.json("out/fig10/check.json");
+fn what_is_asked_of_both_methods_is_told_of_both() {
+    workplace::all_tell(
+        0,
+        "
+        check leaf.toml --tolerance 1e-8 --intervals 7 => tolerance=1e-8 shooting.intervals=7 within_estimates=true; multiple shooting over 7
+        check scenarios/paper/fig10.toml --set leaf.rods=5 --keep-unstable => relaxation.stable=false relaxation.negative_eigenvalues=18 shooting.stable=false shooting.negative_eigenvalues=18; relaxed  unstable equilibrium of index 18 | shooting unstable equilibrium of index 18
+        ",
+    );
+    let free = Workplace::new().told(0, "check leaf.toml --set leaf.joined=false");
     for method in ["relaxation", "shooting"] {
-        tells(&check[method], "stable=false negative_eigenvalues=18");
+        assert_eq!(free[method]["tip"], Value::Null);
+        assert_eq!(free[method]["tips"].list().len(), 5);
     }
 }
 
@@ -106,16 +100,6 @@ fn a_neutral_direction_is_explained() {
     contains(neutral["meaning"].text(), &["bifurcation", "along y"]);
     let tip = neutral["displacement"][0].list().last().unwrap();
     assert!((tip[1].number().abs() - 1.0).abs() < 1e-9);
-}
-
-#[test]
-fn free_tips_are_listed() {
-    let (check, run) = check("leaf.toml --set leaf.joined=false");
-    run.ends(0);
-    for method in ["relaxation", "shooting"] {
-        assert_eq!(check[method]["tip"], Value::Null);
-        assert_eq!(check[method]["tips"].list().len(), 5);
-    }
 }
 
 /// Single shooting cannot follow a leaf that is pulled hard.
@@ -155,20 +139,4 @@ fn json_goes_alone_to_standard_output_and_the_reason_to_standard_error() {
     let reason = check["reason"].text();
     contains(reason, &["did not come to rest"]);
     contains(&run.err, &[reason]);
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "check",
-        "leaf.toml --intervals 0 => --intervals 0: allowed are
-        leaf.toml --intervals 5000 => 1 to 4096
-        leaf.toml --tolerance -1 => tolerance
-        leaf.toml --tolerance 1 => tolerance
-        leaf.toml --set leaf.rods=0 => rods
-        leaf.toml --segments 8 => --segments
-        leaf.toml --method shooting => --method
-        leaf.toml --out leaf.toml/out => --out DIR
-        absent.toml => absent.toml",
-    );
 }

@@ -57,11 +57,8 @@ fn an_acceleration_of_a_flat_strip_is_named() {
 /// Nothing is said about the leaves that come with the program, whose numbers are meant.
 #[test]
 fn nothing_is_said_about_other_leaves() {
-    for folder in ["paper", "classic", "motion", "study", "measured"] {
-        let all = files(folder).into_iter();
-        for file in all.filter(|file| file.extension().is_some_and(|it| it == "toml")) {
-            let doubts = settle(&read(&file, ""), 1e-4).doubts;
-            assert!(doubts.is_empty(), "{}: {doubts:?}", file.display());
-        }
+    for file in scenario_files() {
+        let doubts = settle(&read(&file, ""), 1e-4).doubts;
+        assert!(doubts.is_empty(), "{}: {doubts:?}", file.display());
     }
 }

@@ -1,63 +1,11 @@
-//! A cantilever under a dead transverse tip load, and a column beyond its
-//! buckling load, follow the elastica; by relaxation and by shooting.
+//! A column beyond its buckling load follows the elastica; by relaxation, by shooting and along
+//! branches.
 
 mod common;
 
 use common::branch::follow;
 use common::*;
 use leafdyn::study::PointKind;
-
-fn load(alpha: f64) -> String {
-    format!("load.tip_force=[0, 0, {:?}]", -alpha)
-}
-
-/// Bisshopp and Drucker 1945, Mattiasson 1981: alpha = P L^2/EI, slope, x and
-/// y of the tip. Closed form, elliptic integrals.
-const INEXTENSIBLE: &str = "
-     1  0.46135194971188  0.94356676371662  0.30172077379981
-     2  0.78174983155654  0.83935827917483  0.49345748039671
-     5  1.2153681176117   0.61237163927557  0.71379152361191
-    10  1.4302855388039   0.44500440224625  0.81060902488030
-    50  1.5679819015714   0.19999960395040  0.91715544730359
-";
-
-#[test]
-fn an_inextensible_cantilever_follows_the_closed_form() {
-    for [alpha, slope, x, y] in table(INEXTENSIBLE) {
-        let what = format!("alpha = {alpha}");
-        let leaf = Both::solve("classic/cantilever_tip", &load(alpha));
-        leaf.tip_is(&what, DVec3::new(x, 0.0, -y), 2e-14, TIGHT);
-        for rods in leaf.shapes() {
-            close(&what, tip_angle(rods, 0, DVec3::NEG_Z), slope, TIGHT);
-            // The clamp's moment is P x; it acts about -e2 on the part before it.
-            let moment = rods[0].nodes[0].m.length();
-            close(&what, moment, alpha * x, alpha * TIGHT);
-        }
-        assert_eq!(leaf.relaxed.stable(), Some(true));
-    }
-}
-
-/// alpha, EA, GA; x, y and slope of the tip. Collocation on the
-/// boundary-value problem, two meshes.
-const COSSERAT: &str = "
-     4   100   40  0.6585159805983  0.7307575514909  1.0997828540301
-    10   100   40  0.4270824760091  0.9424536888340  1.3957770840497
-    10  1000  400  0.4432531320994  0.8236366963903  1.4272379906638
-";
-
-#[test]
-fn a_cantilever_that_stretches_and_shears_follows_reissner() {
-    for [alpha, axial, shear, x, y, slope] in table(COSSERAT) {
-        let what = format!("alpha = {alpha}, EA = {axial}");
-        let entries = format!("{}; {}", load(alpha), set_stiffness(axial, shear));
-        let leaf = Both::solve("classic/cantilever_tip_cosserat", &entries);
-        leaf.tip_is(&what, DVec3::new(x, 0.0, -y), 2e-13, TIGHT);
-        for rods in leaf.shapes() {
-            close(&what, tip_angle(rods, 0, DVec3::NEG_Z), slope, TIGHT);
-        }
-        assert_eq!(leaf.relaxed.stable(), Some(true));
-    }
-}
 
 /// End slope in degrees, P/P_cr, x and y of the tip. Closed form, elliptic
 /// integrals.

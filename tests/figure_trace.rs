@@ -42,9 +42,6 @@ const PITCHFORK: &str =
 
 #[test]
 fn the_quantity_is_chosen_and_each_has_a_panel() {
-    let svg = figure(PITCHFORK);
-    assert_eq!(groups(&svg, "branches").len(), 1);
-    assert!(svg.contains(">z of the tip<"));
     let svg = figure(&format!("{PITCHFORK} --show x,energy,twist"));
     let panels = groups(&svg, "branches");
     assert_eq!(panels.len(), 3);
@@ -53,14 +50,6 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
     for (panel, name) in panels.iter().zip(names) {
         assert!(panel.contains(name), "{name}");
     }
-}
-
-#[test]
-fn the_key_and_the_title_name_what_there_is() {
-    let svg = figure(PITCHFORK);
-    let parts = ["stable drawn solid, unstable dashed", "branches cross"];
-    contains(&svg, &parts);
-    assert!(!svg.contains(">fold<"));
     let svg = figure("scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-1");
     assert!(svg.contains(">stable equilibria<"));
     for absent in ["unstable", "branches cross", "stroke-dasharray"] {
@@ -68,25 +57,41 @@ fn the_key_and_the_title_name_what_there_is() {
     }
 }
 
+/// The coordinates of a path of straight lines.
+fn coordinates(path: &str) -> Vec<f64> {
+    let (_, path) = path.split_once("d=\"M").unwrap();
+    let path = path.split(['Z', '"']).next().unwrap();
+    let numbers = path.split([' ', 'L']).map(|number| number.parse().unwrap());
+    numbers.collect()
+}
+
 #[test]
-fn leaves_that_look_the_same_are_drawn_once() {
-    // From where the branches cross the flat leaf does not change any more.
+fn a_pitchfork_is_drawn_as_it_is() {
     let svg = figure(PITCHFORK);
-    let [leaves] = groups(&svg, "leaves")[..] else {
-        panic!()
+    // The key and the title name what there is.
+    let parts = [
+        "stable drawn solid, unstable dashed",
+        "branches cross",
+        ">z of the tip<",
+    ];
+    contains(&svg, &parts);
+    assert!(!svg.contains(">fold<"));
+    let ([panel], [leaves], [law]) = (
+        &groups(&svg, "branches")[..],
+        &groups(&svg, "leaves")[..],
+        &groups(&svg, "law")[..],
+    ) else {
+        panic!("one of each")
     };
+    // Leaves that look the same are drawn once: from where the branches cross the flat leaf
+    // does not change any more.
     let all = texts(leaves).into_iter().map(|(text, _)| text);
     let captions: Vec<String> = all.filter(|text| text.starts_with("at ")).collect();
     for (part, count) in [("index 1", 0), ("\u{2212}5, stable", 2)] {
         let with = captions.iter().filter(|caption| caption.contains(part));
         assert_eq!(with.count(), count, "{captions:?}");
     }
-}
-
-#[test]
-fn numbers_beside_points_do_not_touch() {
-    let svg = figure(PITCHFORK);
-    let panel = groups(&svg, "branches")[0];
+    // Numbers beside points do not touch.
     let digits = |text: &str| text.chars().all(|c| c.is_ascii_digit() || ", ".contains(c));
     let numbers: Vec<(String, [f64; 2])> = (texts(panel).into_iter())
         .filter(|(text, at)| digits(text) && at[0] > 64.0 && at[1] < 478.0)
@@ -96,6 +101,21 @@ fn numbers_beside_points_do_not_touch() {
         for (other, b) in &numbers[..k] {
             let apart = (a[0] - b[0]).abs() > 8.0 || (a[1] - b[1]).abs() > 10.0;
             assert!(apart, "{one} and {other}");
+        }
+    }
+    // The line of the force law ends within its frame.
+    let path = |part: &str| coordinates(law.lines().find(|line| line.contains(part)).unwrap());
+    let ends = path("stroke=\"#d55e00\"");
+    assert_eq!(ends.len(), 4);
+    // The frame is the rectangle, the only closed path without a fill.
+    let corners = path("Z\" stroke");
+    // Not cut off at the frame, but ending inside.
+    for end in ends.chunks(2) {
+        for (at, low, high) in [
+            (end[0], corners[0], corners[2]),
+            (end[1], corners[1], corners[5]),
+        ] {
+            assert!(at > low + 2.0 && at < high - 2.0, "{at} in {low} to {high}");
         }
     }
 }
@@ -110,36 +130,6 @@ fn what_varies_by_its_logarithm_has_a_logarithmic_axis() {
     });
     let [first, second] = [decades[1] - decades[0], decades[2] - decades[1]];
     assert!((first - second).abs() < 0.1 && first > 100.0, "{decades:?}");
-}
-
-/// The coordinates of a path of straight lines.
-fn numbers(path: &str) -> Vec<f64> {
-    let (_, path) = path.split_once("d=\"M").unwrap();
-    let path = path.split(['Z', '"']).next().unwrap();
-    let numbers = path.split([' ', 'L']).map(|number| number.parse().unwrap());
-    numbers.collect()
-}
-
-#[test]
-fn the_line_of_a_force_law_ends_within_its_frame() {
-    let svg = figure(PITCHFORK);
-    let [law] = groups(&svg, "law")[..] else {
-        panic!()
-    };
-    let path = |part: &str| numbers(law.lines().find(|line| line.contains(part)).unwrap());
-    let ends = path("stroke=\"#d55e00\"");
-    assert_eq!(ends.len(), 4);
-    // The frame is the rectangle, the only closed path without a fill.
-    let corners = path("Z\" stroke");
-    // Not cut off at the frame, but ending inside.
-    for end in ends.chunks(2) {
-        for (at, low, high) in [
-            (end[0], corners[0], corners[2]),
-            (end[1], corners[1], corners[5]),
-        ] {
-            assert!(at > low + 2.0 && at < high - 2.0, "{at} in {low} to {high}");
-        }
-    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::fit::{fitted, gives_back, request, within_bars};
+use common::fit::{self, fitted, gives_back, request, within_bars};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::{Fit, FitOutcome};
@@ -11,17 +11,12 @@ const KNOTS: [f64; 3] = [0.5, -1.5, 1.0];
 
 /// The vein of `scenarios/measured`, which hangs, with noise of a deviation: points on it,
 /// seen from the side, what is fitted to them to a tolerance, and that leaf at rest.
-fn traced(sd: f64, seed: u64, tolerance: Option<f64>) -> (Vec<[f64; 2]>, Fit, Vec<NodeState>) {
+fn traced(sd: f64, seed: u64, tolerance: Option<f64>) -> (Vec<DVec3>, Fit, Vec<NodeState>) {
     let hanging = common::branch::text("measured/hanging");
     let mut noise = Draw(seed);
     let knots = format!("rest.bend_2.value={KNOTS:?}");
     let leaf = settle(base(&hanging, &knots).scenario(), 1e-9);
-    let (mut points, mut table) = (Vec::new(), String::from("rod,x,z,sd\n"));
-    for node in &leaf.shape.rods[0].nodes[1..] {
-        let [x, z] = [node.position.x, node.position.z].map(|it| it + sd * noise.normal());
-        points.push([x, z]);
-        table += &format!("1,{x:?},{z:?},{:?}\n", sd.max(1e-4));
-    }
+    let (table, points) = fit::traced(&leaf, [1, 1], "rod,x,z,sd", sd, &mut noise);
     let mut wanted = request(base(&hanging, ""), &[&table], &["rest.bend_2"]);
     wanted.tolerance = tolerance;
     let found = fitted(&wanted);
@@ -38,10 +33,10 @@ fn the_rest_shape_comes_back() {
     let (points, found, curve) = traced(0.0, 1, Some(1e-8));
     gives_back(&found, &KNOTS, 6e-4);
     assert_eq!(curve.len(), 1 + points.len());
-    for (node, [x, z]) in curve[1..].iter().zip(points) {
-        let apart = (node.position.x - x).hypot(node.position.z - z);
+    for (node, point) in curve[1..].iter().zip(points) {
+        let apart = node.position.distance(point);
         // The points were not marked: what is along the vein is not compared.
-        assert!(apart < 1e-4, "{apart:e} at {x}");
+        assert!(apart < 1e-4, "{apart:e} at {point}");
     }
 }
 
@@ -51,8 +46,7 @@ fn the_rest_shape_comes_back() {
 fn noise_leaves_it_within_its_bars() {
     let sd = 2e-3;
     let (points, found, curve) = traced(sd, 3, None);
-    for [x, z] in points {
-        let point = DVec3::new(x, 0.0, z);
+    for point in points.into_iter().map(|point| point.with_y(0.0)) {
         let to = |pair: &[NodeState]| {
             let [a, b] = [pair[0].position, pair[1].position];
             let t = ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
@@ -60,7 +54,7 @@ fn noise_leaves_it_within_its_bars() {
         };
         let apart = curve.windows(2).map(to).fold(f64::INFINITY, f64::min);
         // Beyond the tip the vein is taken to go on straight.
-        assert!(apart < 5.0 * sd, "{apart:e} at {x}");
+        assert!(apart < 5.0 * sd, "{apart:e} at {point}");
     }
     within_bars(&found, &KNOTS, 2.0);
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::fit::{LEAF, PULLS, THREE, VEIN, fitted, gives_back, pulls, request};
+use common::fit::{LEAF, PULLS, THREE, VEIN, fitted, gives_back, pulls, request, traced};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::FitOutcome;
@@ -45,16 +45,9 @@ fn frequencies_give_stiffness_and_mass() {
 fn traced_veins_give_stiffnesses() {
     let truth = base(LEAF, "stiffness.bending_2=1.6; coupling.z=2.5");
     let leaf = settle(truth.scenario(), 1e-9);
-    let (mut marked, mut bare) = (String::from("rod,sigma,x,y,z\n"), String::from("rod,x,z\n"));
-    for (j, rod) in leaf.shape.rods.iter().enumerate() {
-        for (sigma, node) in leaf.shape.stations.iter().zip(&rod.nodes).skip(1) {
-            let [x, y, z] = node.position.to_array();
-            marked += &format!("{},{sigma:?},{x:?},{y:?},{z:?}\n", j + 1);
-            bare += &format!("{},{x:?},{z:?}\n", j + 1);
-        }
-    }
     let free = ["stiffness.bending_2", "coupling.z"];
-    for data in [marked, bare] {
+    for columns in ["rod,sigma,x,y,z", "rod,x,z"] {
+        let (data, _) = traced(&leaf, [5, 1], columns, 0.0, &mut Draw(1));
         let found = fitted(&request(base(LEAF, ""), &[&data], &free));
         gives_back(&found, &[1.6, 2.5], 1e-3);
     }
@@ -68,10 +61,7 @@ fn what_weight_and_stiffness_share_is_named_in_their_units() {
         .replace("-0.5", "-20.0")
         .replace("axial = 50.0, shear_2 = 40.0, shear_3 = 40.0", RIGIDLY);
     let leaf = settle(base(&heavy, "").scenario(), 1e-9);
-    let mut table = String::from("rod,x,z,sd\n");
-    for node in &leaf.shape.rods[0].nodes[1..] {
-        table += &format!("1,{:?},{:?},1e-3\n", node.position.x, node.position.z);
-    }
+    let (table, _) = traced(&leaf, [1, 1], "rod,x,z,sd", 0.0, &mut Draw(1));
     let free = ["stiffness.bending_2", "load.gravity[2]"];
     let found = fitted(&request(base(&heavy, ""), &[&table], &free));
     let open = only(&found.undetermined);

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::fit::{VEIN, fitted, request};
+use common::fit::{self, VEIN, fitted, request};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::FitOutcome;
@@ -108,13 +108,10 @@ fn kinds(a: f64, b: f64) -> [Built; 7] {
 fn traced(built: &Built, noise: &mut Draw) -> String {
     let base = base(&built.text, &built.truth);
     let leaf = settle(base.scenario(), 1e-9).at_stations(base.scenario(), Some(20));
-    let mut table = String::from("rod,sigma,x,y,z,sd\n");
-    for tenth in 1..=built.traced {
-        let place = leaf.shape.rods[0].nodes[2 * tenth].position;
-        let [x, y, z] = place.to_array().map(|x| x + 1e-4 * noise.normal());
-        table += &format!("1,{:?},{x:?},{y:?},{z:?},1e-4\n", 0.1 * tenth as f64);
-    }
-    table
+    let (table, _) = fit::traced(&leaf, [1, 2], "rod,sigma,x,y,z,sd", 1e-4, noise);
+    // The header, and so many points.
+    let lines: Vec<&str> = table.lines().take(1 + built.traced).collect();
+    lines.join("\n")
 }
 
 #[test]

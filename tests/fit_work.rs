@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::fit::{LEAF, THREE, fitted, pulls, request, within_bars};
+use common::fit::{self, LEAF, THREE, fitted, pulls, request, within_bars};
 use common::random::Draw;
 use common::*;
 use leafdyn::study::{Fit, fit};
@@ -47,13 +47,7 @@ fn twenty_numbers_of_a_large_leaf_take_few_evaluations() {
     let pulled = pulls(&text, &truth, &forces, sd, &mut noise);
     let known = base(&text, &truth);
     let leaf = settle(known.scenario(), 1e-8).at_stations(known.scenario(), Some(20));
-    let mut traced = String::from("rod,x,y,z,sd\n");
-    for (j, rod) in leaf.shape.rods.iter().enumerate() {
-        for node in &rod.nodes[1..] {
-            let [x, y, z] = node.position.to_array().map(|x| x + sd * noise.normal());
-            traced += &format!("{},{x:?},{y:?},{z:?},{sd:?}\n", j + 1);
-        }
-    }
+    let (traced, _) = fit::traced(&leaf, [21, 1], "rod,x,y,z,sd", sd, &mut noise);
     let bending = (0..19).map(|j| format!("stiffness.bending_2[{j}]"));
     let free: Vec<String> = bending.chain(["stiffness.axial".into()]).collect();
     let free: Vec<&str> = free.iter().map(String::as_str).collect();

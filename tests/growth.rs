@@ -146,12 +146,7 @@ fn fan(entry: &str) -> Scenario {
 #[test]
 fn relaxation_and_shooting_agree_on_lists_and_profiles() {
     for entry in GROWN {
-        let scenario = fan(entry);
-        let relaxed = settle(&scenario, TIGHT);
-        let shot = shot_near(&scenario, &relaxed);
-        agree(entry, &scenario, &relaxed, &shot, 1e-9);
-        let alone = shot_alone(&scenario, &relaxed.shape.stations);
-        agree(entry, &scenario, &relaxed, &alone, 1e-9);
+        all_agree(entry, &fan(entry));
     }
 }
 

@@ -46,12 +46,11 @@ fn a_wrench_about_the_axis_holds_a_straight_rod_in_a_helix() {
             // The wrench, moved from the axis to the tip.
             let force = force * axis;
             let moment = moment * axis + (centre - helix(length)).cross(force);
-            let loads = [("force", force), ("moment", moment)];
-            let [force_is, moment_is] =
-                loads.map(|(key, value)| set_vector(&format!("load.tip_{key}"), value));
+            let [pulled, turned] = [force, moment].map(|load| load.to_array());
+            let loads = format!("load.tip_force={pulled:?}; load.tip_moment={turned:?}");
             let stiffness = format!("{RIGID}; stiffness.torsion={TORSION}");
             let long = format!("leaf.length={length:?}; {stiffness}");
-            let leaf = Both::of(&rod(&format!("{long}; {force_is}; {moment_is}")));
+            let leaf = Both::of(&rod(&format!("{long}; {loads}")));
             let what = format!("twist {twist}, length {length}");
             let estimate = estimate(&leaf.relaxed);
             for (rods, estimate) in leaf.shapes().into_iter().zip([estimate, f64::INFINITY]) {

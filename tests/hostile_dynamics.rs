@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::valid::holds;
+use common::valid::{all_refused, holds};
 use common::*;
 use leafdyn::scenario::{Dynamics, ScenarioError};
 use proptest::prelude::*;
@@ -176,13 +176,11 @@ fn overrides() {
 
 #[test]
 fn unknown_keys() {
-    refused! { with_lines;
-        "denisty = 1.0" =>
-            "leaf.toml:20: unknown key dynamics.denisty (did you mean dynamics.density?)",
-            "density, rotary_inertia, section_radius, external_damping, internal_damping, duration, \
-             output_interval, clamped, start, gravity, tip_force, tip_moment, rest";
-        "[dynamics.load]" => "unknown key dynamics.load";
-    }
+    let table = r#"
+        denisty = 1.0 => leaf.toml:20: unknown key dynamics.denisty (did you mean dynamics.density?) & density, rotary_inertia, section_radius, external_damping, internal_damping, duration, output_interval, clamped, start, gravity, tip_force, tip_moment, rest
+        [dynamics.load] => unknown key dynamics.load
+    "#;
+    all_refused(table, with_lines);
     let text = format!("dynamics = 3\n{STILL}");
     let table = "scenario:1: dynamics = 3: must be a table: write [dynamics]";
     holds(Scenario::from_toml(&text), &[table]);
@@ -190,106 +188,78 @@ fn unknown_keys() {
 
 #[test]
 fn wrong_types_and_ranges() {
-    refused! { with_lines;
-        "density = 0" => "leaf.toml:20: dynamics.density = 0: must be greater than 0";
-        "density = [1.0, -1.0]" => "leaf.toml:20: dynamics.density, entry 2 = -1.0: must be greater than 0";
-        "density = [1.0]" => "dynamics.density = [1.0]: has 1 entries: must have 2, one per rod";
-        "density = 1e99" => "dynamics.density = 1e99: must lie between 1e-50 and 1e50";
-        "density = inf" => "dynamics.density = inf: must be a finite number";
-        "density = true" =>
-            "dynamics.density = true: must be a number, a list of 2 (one per rod), or a profile";
-        "\nrotary_inertia = { at = [0, 1], value = [1, 0] }" =>
-            "leaf.toml:21: dynamics.rotary_inertia, value, entry 2 = 0: must be greater than 0";
-        "section_radius = -1" => "dynamics.section_radius = -1: must be greater than 0";
-        "section_radius = 0.1\nrotary_inertia = 0.1" =>
-            "leaf.toml:20: dynamics.section_radius = 0.1: dynamics.rotary_inertia is given, too",
-            "leave one of them out";
-        "external_damping = -1" => "leaf.toml:20: dynamics.external_damping = -1: must not be negative";
-        "external_damping = [1.0, 1.0]" => "dynamics.external_damping = [1.0, 1.0]: must be a number";
-        "internal_damping = inf" => "dynamics.internal_damping = inf: must be a finite number";
-        "duration = 0" => "dynamics.duration = 0: must be greater than 0";
-        "duration = \"long\"" => "dynamics.duration = \"long\": must be a number";
-        "output_interval = 0" => "dynamics.output_interval = 0: must be greater than 0";
-        "output_interval = 11" =>
-            "leaf.toml:20: dynamics.output_interval = 11: must be at most dynamics.duration, 10";
-        "clamped = 1" => "dynamics.clamped = 1: must be true or false";
-        "clamped = false" => "leaf.toml:20: dynamics.clamped = false: a free base needs leaf.rods = 1 (here 2)";
-        "tip_moment = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1]] }" =>
-            "leaf.toml:20: dynamics.tip_moment = {",
-            "a moment at the tip needs leaf.rods = 1 (here 2)";
-    }
+    let table = r#"
+        density = 0 => leaf.toml:20: dynamics.density = 0: must be greater than 0
+        density = [1.0, -1.0] => leaf.toml:20: dynamics.density, entry 2 = -1.0: must be greater than 0
+        density = [1.0] => dynamics.density = [1.0]: has 1 entries: must have 2, one per rod
+        density = 1e99 => dynamics.density = 1e99: must lie between 1e-50 and 1e50
+        density = inf => dynamics.density = inf: must be a finite number
+        density = true => dynamics.density = true: must be a number, a list of 2 (one per rod), or a profile
+        \nrotary_inertia = { at = [0, 1], value = [1, 0] } => leaf.toml:21: dynamics.rotary_inertia, value, entry 2 = 0: must be greater than 0
+        section_radius = -1 => dynamics.section_radius = -1: must be greater than 0
+        section_radius = 0.1\nrotary_inertia = 0.1 => leaf.toml:20: dynamics.section_radius = 0.1: dynamics.rotary_inertia is given, too & leave one of them out
+        external_damping = -1 => leaf.toml:20: dynamics.external_damping = -1: must not be negative
+        external_damping = [1.0, 1.0] => dynamics.external_damping = [1.0, 1.0]: must be a number
+        internal_damping = inf => dynamics.internal_damping = inf: must be a finite number
+        duration = 0 => dynamics.duration = 0: must be greater than 0
+        duration = "long" => dynamics.duration = "long": must be a number
+        output_interval = 0 => dynamics.output_interval = 0: must be greater than 0
+        output_interval = 11 => leaf.toml:20: dynamics.output_interval = 11: must be at most dynamics.duration, 10
+        clamped = 1 => dynamics.clamped = 1: must be true or false
+        clamped = false => leaf.toml:20: dynamics.clamped = false: a free base needs leaf.rods = 1 (here 2)
+        tip_moment = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1]] } => leaf.toml:20: dynamics.tip_moment = { & a moment at the tip needs leaf.rods = 1 (here 2)
+    "#;
+    all_refused(table, with_lines);
 }
 
 #[test]
 fn loads_and_factors_in_time() {
-    refused! { with_lines;
-        "gravity = 1.0" =>
-            "leaf.toml:20: dynamics.gravity = 1.0: must be a table: a load in time is { at = [0.0, 1.0], value = [[";
-        "gravity = {}" => "dynamics.gravity = {}: at is missing: a load in time is";
-        "gravity = { at = [0.0] }" => "value is missing: a load in time is";
-        "gravity = { at = [0.0], factor = [1.0] }" => "unknown key factor: a load in time is";
-        "gravity = { at = 0.0, value = [[0, 0, 1]] }" =>
-            "dynamics.gravity, at = 0.0: must be a list of numbers";
-        "gravity = { at = [], value = [] }" => "dynamics.gravity, at = []: at least one time is needed";
-        "gravity = { at = [0, 1, 1], value = [[0, 0, 1]] }" =>
-            "dynamics.gravity, at, entry 3 = 1: must be greater than the entry before it, 1: times rise strictly";
-        "gravity = { at = [0, inf], value = [[0, 0, 1]] }" =>
-            "dynamics.gravity, at, entry 2 = inf: must be a finite number";
-        "gravity = { at = [0, 1], value = [[0, 0, 1]] }" =>
-            "dynamics.gravity, value = [[0, 0, 1]]: has 1 entries: must have 2, one per entry of at";
-        "gravity = { at = [0], value = 1 }" =>
-            "dynamics.gravity, value = 1: must be a list of lists of three numbers";
-        "gravity = { at = [0], value = [1] }" =>
-            "dynamics.gravity, value, entry 1 = 1: must be a list of three numbers [x, y, z]";
-        "gravity = { at = [0], value = [[0, 1]] }" =>
-            "dynamics.gravity, value, entry 1 = [0, 1]: has 2 entries: must have 3, one per axis";
-        "tip_force = { at = [0,\n 1], value = [[0, 0, 1],\n [0, nan, 1]] }" =>
-            "leaf.toml:22: dynamics.tip_force, value, entry 2, component 2 = nan: must be a finite number";
-        "rest = 2.0" =>
-            "dynamics.rest = 2.0: must be a table: a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
-        "rest = { at = [0], value = [1] }" => "unknown key value: a factor in time is";
-        "rest = { at = [0], factor = 1 }" => "dynamics.rest, factor = 1: must be a list of numbers";
-        "rest = { at = [0, 1], factor = [1, true] }" =>
-            "dynamics.rest, factor, entry 2 = true: must be a number";
-        "[dynamics.rest]\nat = [0, 1]" => "leaf.toml:20: dynamics.rest =", "factor is missing";
-    }
+    let table = r#"
+        gravity = 1.0 => leaf.toml:20: dynamics.gravity = 1.0: must be a table: a load in time is { at = [0.0, 1.0], value = [[
+        gravity = {} => dynamics.gravity = {}: at is missing: a load in time is
+        gravity = { at = [0.0] } => value is missing: a load in time is
+        gravity = { at = [0.0], factor = [1.0] } => unknown key factor: a load in time is
+        gravity = { at = 0.0, value = [[0, 0, 1]] } => dynamics.gravity, at = 0.0: must be a list of numbers
+        gravity = { at = [], value = [] } => dynamics.gravity, at = []: at least one time is needed
+        gravity = { at = [0, 1, 1], value = [[0, 0, 1]] } => dynamics.gravity, at, entry 3 = 1: must be greater than the entry before it, 1: times rise strictly
+        gravity = { at = [0, inf], value = [[0, 0, 1]] } => dynamics.gravity, at, entry 2 = inf: must be a finite number
+        gravity = { at = [0, 1], value = [[0, 0, 1]] } => dynamics.gravity, value = [[0, 0, 1]]: has 1 entries: must have 2, one per entry of at
+        gravity = { at = [0], value = 1 } => dynamics.gravity, value = 1: must be a list of lists of three numbers
+        gravity = { at = [0], value = [1] } => dynamics.gravity, value, entry 1 = 1: must be a list of three numbers [x, y, z]
+        gravity = { at = [0], value = [[0, 1]] } => dynamics.gravity, value, entry 1 = [0, 1]: has 2 entries: must have 3, one per axis
+        tip_force = { at = [0,\n 1], value = [[0, 0, 1],\n [0, nan, 1]] } => leaf.toml:22: dynamics.tip_force, value, entry 2, component 2 = nan: must be a finite number
+        rest = 2.0 => dynamics.rest = 2.0: must be a table: a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }
+        rest = { at = [0], value = [1] } => unknown key value: a factor in time is
+        rest = { at = [0], factor = 1 } => dynamics.rest, factor = 1: must be a list of numbers
+        rest = { at = [0, 1], factor = [1, true] } => dynamics.rest, factor, entry 2 = true: must be a number
+        [dynamics.rest]\nat = [0, 1] => leaf.toml:20: dynamics.rest = & factor is missing
+    "#;
+    all_refused(table, with_lines);
 }
 
 /// A = 2, L = 2, but the smallest bending stiffness is 1.
 #[test]
 fn limits_that_values_set_together() {
-    refused! { with_lines;
-        "density = [1.0, 1e-13]" =>
-            "leaf.toml:20: dynamics.density, entry 2 = 1e-13: gives rho/rho_mean = 2.000e-13, the limit is 1e-12";
-        "density = { at = [0, 0.5, 1], value = [1e13, 1, 1] }" => "rho/rho_mean = 1.000e13, the limit is 1e12";
-        "density = 1.0\nrotary_inertia = 1e13" =>
-            "leaf.toml:21: dynamics.rotary_inertia = 1e13: gives rho I/(rho_mean L^2) = 2.500e12, the limit is 1e12";
-        "density = 1.0\nrotary_inertia = [1.0, 1e-13]" =>
-            "dynamics.rotary_inertia, entry 2 = 1e-13: gives rho I/(rho_mean L^2) = 2.500e-14";
-        "section_radius = [0.1, 1e-6]" =>
-            "dynamics.section_radius, entry 2 = 1e-6: gives r/L = 5.000e-7, the limit is 1e-6";
-        "density = 8\nexternal_damping = 1e13" =>
-            "leaf.toml:21: dynamics.external_damping = 1e13: gives c T/rho_mean = 1.000e13, the limit is 1e12";
-        "external_damping = 1e308" => "dynamics.external_damping = 1e308: gives c T/rho_mean";
-        "density = 8\ninternal_damping = 1e13" =>
-            "dynamics.internal_damping = 1e13: gives t/T = 1.250e12, the limit is 1e12";
-        "density = 8\nduration = 1e13" => "dynamics.duration = 1e13: gives t/T = 1.250e12, the limit is 1e12";
-        "duration = 1e-13" => "dynamics.duration = 1e-13: gives t/T = 1.000e-13, the limit is 1e-12";
-        "output_interval = 9.9e-6" =>
-            "leaf.toml:20: dynamics.output_interval = 9.9e-6: gives duration/output_interval = 1.010e6, the limit is 1e6";
-        "rest = { at = [0, 1e13], factor = [1, 1] }" =>
-            "dynamics.rest, at, entry 2 = 1e13: gives |t|/T = 1.000e13, the limit is 1e12";
-        "tip_force = { at = [-1.7e308, 1.7e308], value = [[0, 0, 0], [0, 0, 0]] }" =>
-            "dynamics.tip_force, at, entry 1 = -1.7e308: gives |t|/T";
-        "gravity = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1e8]] }" =>
-            "dynamics.gravity, value, entry 2 = [0, 0, 1e8]: gives |g| L^3/A = 8.000e8, the limit is 1e8";
-        "tip_force = { at = [0], value = [[1.7e308, 1.7e308, 0]] }" =>
-            "dynamics.tip_force, value, entry 1 = [1.7e308, 1.7e308, 0]: gives |F| L^2/A";
-        "rest = { at = [0, 1], factor = [1, -1001] }" =>
-            "dynamics.rest, factor, entry 2 = -1001: gives |factor u0| L = 1.001e3, the limit is 1e3";
-        "rest = { at = [0], factor = [1e307] }" =>
-            "dynamics.rest, factor, entry 1 = 1e307: gives |factor| = 1.000e307, the limit is 1e6";
-    }
+    let table = r#"
+        density = [1.0, 1e-13] => leaf.toml:20: dynamics.density, entry 2 = 1e-13: gives rho/rho_mean = 2.000e-13, the limit is 1e-12
+        density = { at = [0, 0.5, 1], value = [1e13, 1, 1] } => rho/rho_mean = 1.000e13, the limit is 1e12
+        density = 1.0\nrotary_inertia = 1e13 => leaf.toml:21: dynamics.rotary_inertia = 1e13: gives rho I/(rho_mean L^2) = 2.500e12, the limit is 1e12
+        density = 1.0\nrotary_inertia = [1.0, 1e-13] => dynamics.rotary_inertia, entry 2 = 1e-13: gives rho I/(rho_mean L^2) = 2.500e-14
+        section_radius = [0.1, 1e-6] => dynamics.section_radius, entry 2 = 1e-6: gives r/L = 5.000e-7, the limit is 1e-6
+        density = 8\nexternal_damping = 1e13 => leaf.toml:21: dynamics.external_damping = 1e13: gives c T/rho_mean = 1.000e13, the limit is 1e12
+        external_damping = 1e308 => dynamics.external_damping = 1e308: gives c T/rho_mean
+        density = 8\ninternal_damping = 1e13 => dynamics.internal_damping = 1e13: gives t/T = 1.250e12, the limit is 1e12
+        density = 8\nduration = 1e13 => dynamics.duration = 1e13: gives t/T = 1.250e12, the limit is 1e12
+        duration = 1e-13 => dynamics.duration = 1e-13: gives t/T = 1.000e-13, the limit is 1e-12
+        output_interval = 9.9e-6 => leaf.toml:20: dynamics.output_interval = 9.9e-6: gives duration/output_interval = 1.010e6, the limit is 1e6
+        rest = { at = [0, 1e13], factor = [1, 1] } => dynamics.rest, at, entry 2 = 1e13: gives |t|/T = 1.000e13, the limit is 1e12
+        tip_force = { at = [-1.7e308, 1.7e308], value = [[0, 0, 0], [0, 0, 0]] } => dynamics.tip_force, at, entry 1 = -1.7e308: gives |t|/T
+        gravity = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1e8]] } => dynamics.gravity, value, entry 2 = [0, 0, 1e8]: gives |g| L^3/A = 8.000e8, the limit is 1e8
+        tip_force = { at = [0], value = [[1.7e308, 1.7e308, 0]] } => dynamics.tip_force, value, entry 1 = [1.7e308, 1.7e308, 0]: gives |F| L^2/A
+        rest = { at = [0, 1], factor = [1, -1001] } => dynamics.rest, factor, entry 2 = -1001: gives |factor u0| L = 1.001e3, the limit is 1e3
+        rest = { at = [0], factor = [1e307] } => dynamics.rest, factor, entry 1 = 1e307: gives |factor| = 1.000e307, the limit is 1e6
+    "#;
+    all_refused(table, with_lines);
     // At the limits.
     accepted("output_interval = 1e-5");
     accepted("duration = 0.3\noutput_interval = 3e-7");

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::valid::{VALID, holds, with};
+use common::valid::{VALID, all_refused, holds, with};
 use common::*;
 use leafdyn::scenario::{Key, Place};
 
@@ -36,22 +36,22 @@ fn overrides() {
 
 #[test]
 fn refused_overrides_say_that_they_are_overrides() {
-    refused! { overridden;
-        "leaf.rods=0" => "leaf.rods = 0: must be a whole number";
-        "leaf.rods=five" => "leaf.rods = five: must be a whole number";
-        "stiffness.torsion=-1" => "stiffness.torsion = -1: must be greater than 0";
-        "load.gravity=[0,0" => "not valid TOML";
-        "leaf.fan=" => "not valid TOML";
-        "leaf.fan=round" => "leaf.fan = round: must be \"paper\"";
-        "stifness.torsion=1" =>
-            "unknown key stifness.torsion (did you mean stiffness.torsion?)";
-        "gravity=[0,0,1]" => "unknown key gravity (did you mean load.gravity?)";
-        "leaf=3" => "unknown key leaf";
-        "=3" => "unknown key";
-        "leaf.rods" => "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
-        "load.tip_force=[0,0,1e300]" => "load.tip_force = [0,0,1e300]: gives |F| L^2/A";
-        "name=a/b" => "name = a/b: must be usable as a folder name";
-    }
+    let table = r#"
+        leaf.rods=0 => leaf.rods = 0: must be a whole number
+        leaf.rods=five => leaf.rods = five: must be a whole number
+        stiffness.torsion=-1 => stiffness.torsion = -1: must be greater than 0
+        load.gravity=[0,0 => not valid TOML
+        leaf.fan= => not valid TOML
+        leaf.fan=round => leaf.fan = round: must be "paper"
+        stifness.torsion=1 => unknown key stifness.torsion (did you mean stiffness.torsion?)
+        gravity=[0,0,1] => unknown key gravity (did you mean load.gravity?)
+        leaf=3 => unknown key leaf
+        =3 => unknown key
+        leaf.rods => must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]
+        load.tip_force=[0,0,1e300] => load.tip_force = [0,0,1e300]: gives |F| L^2/A
+        name=a/b => name = a/b: must be usable as a folder name
+    "#;
+    all_refused(table, overridden);
     holds(with(&["leaf.rods=1\nname='x'"]), &["leaf.rods"]);
     // The list in the file is what no longer fits.
     let list = "leaf.toml:10: stiffness.bending_2 = [1.0, 1.0, 1.0]: has 3 entries: must have 4";

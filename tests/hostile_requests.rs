@@ -25,44 +25,36 @@ fn place() -> Workplace {
     place
 }
 
-#[track_caller]
-fn refused(arguments: &str, parts: &[&str]) {
-    let run = place().refuses(format!("relax leaf.toml {arguments}"), parts[0]);
-    let message = run.err;
-    contains(&message, parts);
-    assert!(message.trim().lines().count() <= 8, "too long: {message}");
-}
+/// Tolerances beyond double precision, segments that no grid can have (two kinks cut the rod in
+/// three), and leaves that do not fit.
+const REFUSED: &str = "
+    --tolerance small => --tolerance & small
+    --tolerance 1e-20 => double precision
+    --segments 0 => --segments 0 & at least 3
+    --segments 2 => --segments 2 & at least 3 & knots
+    --segments -5 => -5
+    --segments 1.5 => --segments & 1.5
+    --segments 1000000 => 5000000 nodes & at most 4000000
+    --segments 18446744073709551615 => nodes & at most 4000000
+    --segments 18446744073709551616 => --segments
+    --set leaf.rods=1000000 => leaf.rods & 100000
+    --set leaf.rods=100000 --segments 1000 => 100000 rods & at most 4000000
+";
 
 #[test]
-fn tolerances_beyond_double_precision_are_refused() {
+fn requests_that_cannot_be_met_are_refused() {
+    let mut all = REFUSED.to_string();
     for tolerance in ["0", "1e-20", "-1", "1e-13", "0.2", "inf", "nan", "1e400"] {
-        let parts = ["tolerance", "1e-12", "0.1"];
-        refused(&format!("--tolerance {tolerance}"), &parts);
-        refused(&format!("--set solve.tolerance={tolerance}"), &parts[..1]);
+        all += &format!("--tolerance {tolerance} => tolerance & 1e-12 & 0.1\n");
+        all += &format!("--set solve.tolerance={tolerance} => tolerance\n");
     }
-    refused("--tolerance small", &["--tolerance", "small"]);
-    refused("--tolerance 1e-20", &["double precision"]);
-}
-
-#[test]
-fn segments_that_no_grid_can_have_are_refused() {
-    let nodes = "at most 4000000";
-    refused("--segments 0", &["--segments 0", "at least 3"]);
-    // Two kinks cut the rod in three.
-    refused("--segments 2", &["--segments 2", "at least 3", "knots"]);
-    refused("--segments -5", &["-5"]);
-    refused("--segments 1.5", &["--segments", "1.5"]);
-    refused("--segments 1000000", &["5000000 nodes", nodes]);
-    refused("--segments 18446744073709551615", &["nodes", nodes]);
-    refused("--segments 18446744073709551616", &["--segments"]);
+    for (arguments, said) in pairs(&all) {
+        let parts: Vec<&str> = said.split(" & ").collect();
+        let message = place().refuses(format!("relax leaf.toml {arguments}"), parts[0]);
+        contains(&message.err, &parts);
+        assert!(message.err.trim().lines().count() <= 8, "too long: {said}");
+    }
     place().run("relax leaf.toml --segments 3").ends(0);
-}
-
-#[test]
-fn leaves_that_do_not_fit_are_refused() {
-    refused("--set leaf.rods=1000000", &["leaf.rods", "100000"]);
-    let many = "--set leaf.rods=100000 --segments 1000";
-    refused(many, &["100000 rods", "at most 4000000"]);
 }
 
 #[test]

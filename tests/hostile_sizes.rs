@@ -62,6 +62,17 @@ fn a_large_scenario_is_weighed_before_it_is_parsed() {
     let limited = "relax large.toml --memory 100MB";
     place.refuses(limited, "would take about 242.1 MB");
     place.ok("relax large.toml --memory 1GB");
+    // What a text takes when parsed depends on its tables and keys more than on its length.
+    let numbers = format!("a = [{}]", "1.0, ".repeat(20_000));
+    let keys = format!("a{} = 1\n", ".b".repeat(75)).repeat(660);
+    let tables = format!("a = [{}]", "{a.b.c=1},".repeat(10_000));
+    assert!(keys.len() < numbers.len() + 10_000 && tables.len() < numbers.len() + 10_000);
+    place.write("numbers.toml", numbers);
+    place.refuses("relax numbers.toml --memory 15MB", "unknown key a");
+    for (name, text) in [("keys", keys), ("tables", tables)] {
+        place.write(&format!("{name}.toml"), text);
+        place.refuses(format!("relax {name}.toml --memory 40MB"), "a scenario of ");
+    }
 }
 
 /// Numbers of rods that no scenario has, and sizes beyond all powers of ten.
@@ -105,6 +116,15 @@ fn a_cell_keeps_its_time_whatever_its_grid() {
     }
     let seconds = clock.elapsed().as_secs();
     assert!(seconds < 60, "{seconds} s");
+    // A grid that takes longer to build than a cell may last is not begun.
+    let place = Workplace::new();
+    let huge = "--set leaf.rods=1 --set method.segments=1000000 --methods semi-implicit";
+    let how = "--vary load.gravity[2]=-1..-2:2 --cell-seconds 1 --write csv";
+    let map = place.ok(format!("map leaf.toml {huge} {how}"));
+    map.says(&["out-of-time"]);
+    let rows = place.read("out/small/map.csv");
+    let late = rows.matches("1000000 nodes take longer than 1 s");
+    assert_eq!(late.count(), 2);
 }
 
 #[test]
@@ -160,33 +180,4 @@ fn a_checkpoint_with_an_impossible_number_is_refused() {
         late[time] = 1e18;
         assert!(!simulation.restore(&late), "{scheme:?}");
     }
-}
-
-/// What a text takes when parsed depends on its tables and keys more than on its length.
-#[test]
-fn a_text_of_many_tables_is_weighed_by_them() {
-    let place = Workplace::new();
-    let numbers = format!("a = [{}]", "1.0, ".repeat(20_000));
-    let keys = format!("a{} = 1\n", ".b".repeat(75)).repeat(660);
-    let tables = format!("a = [{}]", "{a.b.c=1},".repeat(10_000));
-    assert!(keys.len() < numbers.len() + 10_000 && tables.len() < numbers.len() + 10_000);
-    place.write("numbers.toml", numbers);
-    place.refuses("relax numbers.toml --memory 15MB", "unknown key a");
-    for (name, text) in [("keys", keys), ("tables", tables)] {
-        place.write(&format!("{name}.toml"), text);
-        place.refuses(format!("relax {name}.toml --memory 40MB"), "a scenario of ");
-    }
-}
-
-/// A grid that takes longer to build than a cell may last is not begun.
-#[test]
-fn cells_of_huge_grids_are_late_at_once() {
-    let place = Workplace::new();
-    let huge = "--set leaf.rods=1 --set method.segments=1000000 --methods semi-implicit";
-    let how = "--vary load.gravity[2]=-1..-2:2 --cell-seconds 1 --write csv";
-    let map = place.ok(format!("map leaf.toml {huge} {how}"));
-    map.says(&["out-of-time"]);
-    let rows = place.read("out/small/map.csv");
-    let late = rows.matches("1000000 nodes take longer than 1 s");
-    assert_eq!(late.count(), 2);
 }

@@ -5,7 +5,7 @@ mod workplace;
 
 use std::fs;
 
-use workplace::{Workplace, all_refused, contains};
+use workplace::{Workplace, contains};
 
 const FILES: &str = "map.csv map.json map.png map.svg";
 
@@ -93,19 +93,6 @@ fn one_and_two_threads_give_the_same_rows() {
     assert_eq!(one, two);
 }
 
-/// Rows without a word on which map they are of.
-#[test]
-fn a_table_without_its_summary_is_refused() {
-    let place = Workplace::new();
-    run(&place, "", "2");
-    fs::remove_file(place.path("out/map.json")).unwrap();
-    let before = place.read("out/map.csv");
-    let refused = place.refuses(small("--out out"), "out/map.csv is of another map");
-    contains(&refused.err, &["name another folder with --out DIR"]);
-    assert_eq!(place.read("out/map.csv"), before);
-    place.holds("out", "map.csv map.png map.svg");
-}
-
 #[test]
 fn a_run_goes_on_where_one_was_stopped() {
     let place = Workplace::new();
@@ -125,12 +112,7 @@ fn a_run_goes_on_where_one_was_stopped() {
     assert_eq!(lines(&place, "out/map.csv"), again);
     let shown = run(&place, "--json", "2");
     assert_eq!(shown, place.read("out/map.json"), "--json shows the file");
-}
-
-#[test]
-fn more_methods_are_added_to_a_map() {
-    let place = Workplace::new();
-    run(&place, "", "2");
+    // With another method.
     let more = place.run(format!("{CELLS} --out out --methods single-shooting"));
     more.ends(0).says(&["36 were there, 12 computed"]);
     assert_eq!(lines(&place, "out/map.csv").len(), 1 + 48);
@@ -161,6 +143,11 @@ fn shards_joined_equal_the_whole() {
     sorted.sort();
     assert_eq!(rows, sorted);
 
+    // What is drawn may be a part.
+    let draw = small("--out part --draw out/map-1-of-3.csv");
+    shared.run(draw).ends(0).says(&["4 of 12"]);
+    contains(&shared.picture("part/map"), &["4 of 12 cells"]);
+
     // A plain run in their folder takes them up and draws,
     contains(&run(&shared, "", "2"), &["36 were there, 0 computed"]);
     assert_eq!(timeless(&shared, "out/map.csv"), whole);
@@ -178,15 +165,6 @@ fn shards_joined_equal_the_whole() {
 }
 
 #[test]
-fn what_is_drawn_may_be_part_of_a_map() {
-    let place = Workplace::new();
-    run(&place, "--shard 1/3", "2");
-    let report = run(&place, "--draw out/map-1-of-3.csv", "2");
-    contains(&report, &["4 of 12"]);
-    contains(&place.picture("out/map"), &["4 of 12 cells"]);
-}
-
-#[test]
 fn maps_are_not_mixed() {
     let place = Workplace::new();
     run(&place, "", "2");
@@ -201,38 +179,13 @@ fn maps_are_not_mixed() {
     let leaf = place.read("leaf.toml").replace("y = 1.0", "y = 2.0");
     place.write("leaf.toml", leaf);
     place.refuses(small("--out out"), "scenario_digest");
-}
-
-#[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    let torsion = "--vary stiffness.torsion=1..2:2";
-    all_refused(
-        "map leaf.toml",
-        "=> --vary
-        --vary stiffness.torsion=1 => has no ..
-        --vary stiffness.torsion[5]=1..2 => 5 entries
-        --vary rest.twist=0..1:2000 --vary rest.bend_2=0..1:2000 => at most 1000000",
-    );
-    all_refused(
-        &format!("map leaf.toml {torsion}"),
-        "--vary stiffness.torsion=1..2:2 => varies twice
-        --vary rest.twist=0..1 --vary rest.bend_2=0..1 => one or two axes
-        --methods newton => semi-implicit
-        --methods explicit-motion => method.step
-        --set method.step=0 => greater than 0
-        --set method.steps=1 => method.step and method.segments
-        --cell-seconds 0 => cell-seconds
-        --tolerance 1 => tolerance
-        --shard 3/2 => --shard <I/K>
-        --shard 1/2 --draw a.csv => --draw
-        --set leaf.rods=0 => rods
-        --out leaf.toml/out => --out DIR",
-    );
-}
-
-#[test]
-fn files_that_are_not_of_this_map_are_refused() {
-    let place = Workplace::new();
+    // Rows without a word on which map they are of, and other tables.
+    fs::remove_file(place.path("out/map.json")).unwrap();
+    let before = place.read("out/map.csv");
+    let refused = place.refuses(small("--out out"), "out/map.csv is of another map");
+    contains(&refused.err, &["name another folder with --out DIR"]);
+    assert_eq!(place.read("out/map.csv"), before);
+    place.holds("out", "map.csv map.png map.svg");
     place.write("other.csv", "a,b\n1,2\n");
     let message = "other.csv:1: is no row of this map";
     place.refuses(small("--draw other.csv"), message);

@@ -12,8 +12,7 @@
 
 mod common;
 
-use common::motion::{BOTH, Scheme, discrete, explicit, method, released};
-use common::vibration::Linear;
+use common::motion::{BOTH, Scheme, explicit, method, released};
 use common::*;
 use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Physics;
@@ -81,13 +80,12 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
     let leaf = Leaf::new(&scenario);
     let rest = released(&leaf, 6);
     let physics = Physics::new(&leaf);
-    let all = Linear::new(&discrete(&leaf, 6), &physics, &rest);
-    let linear = all.modes();
+    let all = vibration::modes(&leaf, &rest, 21, &[]);
     let stable = explicit(&leaf, &rest, None).stable_step().step;
     for &mode in modes {
-        let omega = linear.frequencies[mode];
+        let omega = all[mode].eigenvalue.sqrt();
         let drag = physics.damping + physics.retardation * omega * omega;
-        let start = all.displaced(&rest, linear.modes.column(mode).into(), SIZE);
+        let start = vibration::displaced(&rest, &all[mode], SIZE);
         let until = 20.0 / omega;
         for scheme in BOTH {
             let of = |steps| {

@@ -16,41 +16,12 @@ use proptest::prelude::*;
 const TOLERANCE: f64 = 1e-10;
 const EQUAL: f64 = 1e-12;
 
-prop_compose! {
-    /// Twisted, tapered, unequal veins under a general load; coupled alike
-    /// along x and y.
-    fn leaves()(
-        rods in 1..5_usize,
-        joined in any::<bool>(),
-        coupled in any::<bool>(),
-    )(
-        couple in prop::array::uniform3(0.5..2.0),
-        force in prop::array::uniform3(20.0..200.0),
-        rest in prop::collection::vec(prop::array::uniform3(-1.0..1.0), rods),
-        lengths in prop::collection::vec(0.9..1.1, rods),
-        angles in prop::collection::vec(-0.2..0.2, rods),
-        coupling in prop::collection::vec((0.0..3.0, 0.0..3.0), rods - 1),
-        gravity in prop::array::uniform3(-1.0..1.0),
-        tip_force in prop::array::uniform3(-0.5..0.5),
-        joined in Just(joined),
-        coupled in Just(coupled),
-    ) -> Scenario {
-        let mut leaf = paper_leaf(rest.len(), couple, force, 0.0);
-        leaf.joined = joined;
-        leaf.gravity = gravity;
-        leaf.tip_force = tip_force;
-        for (gap, (xy, z)) in leaf.coupling.iter_mut().zip(coupling) {
-            *gap = if coupled { [xy, xy, z] } else { [0.0; 3] };
-        }
-        for (j, rod) in leaf.rods.iter_mut().enumerate() {
-            rod.length = lengths[j];
-            rod.angle += angles[j];
-            rod.rest_curvature = rest[j].map(Profile::Constant);
-            let across = [couple[2], 0.8 * couple[2], 0.5 * couple[2]];
-            rod.couple_stiffness[2] = linear(&[0.0, 0.4, 1.0], &across);
-        }
+/// Leaves that are coupled alike along x and y.
+fn leaves() -> impl Strategy<Value = Scenario> {
+    common::random::leaves().prop_map(|mut leaf| {
+        leaf.coupling.iter_mut().for_each(|gap| gap[0] = gap[1]);
         leaf
-    }
+    })
 }
 
 /// Turned about `axis`, all loads.
@@ -160,10 +131,11 @@ proptest! {
         let of = &mut rod.rods[0];
         of.couple_stiffness[2] = of.couple_stiffness[1].clone();
         of.force_stiffness[2] = of.force_stiffness[1].clone();
+        let rest = DVec3::from_array(of.rest_curvature.each_ref().map(|u| u.at(0.0)));
+        of.rest_curvature = rest.to_array().map(Profile::Constant);
         let turn = DQuat::from_rotation_x(angle);
         let mut turned = rod.clone();
         turn_loads(&mut turned, turn);
-        let rest = DVec3::from_array(rod.rods[0].rest_curvature.each_ref().map(|u| u.at(0.0)));
         turned.rods[0].rest_curvature = (turn * rest).to_array().map(Profile::Constant);
         let map = DMat3::from_quat(turn);
         assert_does_the_same(&rod, &turned, map, |directors| map * directors * map.transpose());

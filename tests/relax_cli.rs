@@ -6,11 +6,15 @@ mod workplace;
 use std::fs;
 
 use serde_json::{Value, json};
-use workplace::{Json, Run, Workplace, all_refused, contains, floats, leaf, tells};
+use workplace::{Json, Run, Workplace, contains, floats, leaf, tells};
 
 const FILES: &str = "centerlines.csv figure.png figure.svg summary.json";
 
 const MODES: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
+
+fn with_modes() -> String {
+    FILES.replace("summary", "modes.csv modes.png modes.svg summary")
+}
 
 #[test]
 fn a_leaf_comes_to_rest_and_is_written_down() {
@@ -42,44 +46,36 @@ fn json_is_alone_on_standard_output() {
 }
 
 #[test]
-fn overrides_reach_the_scenario() {
-    let summary = summary(&Workplace::new(), "--set leaf.rods=3 --tolerance 1e-5");
-    tells(&summary, "rods=3 tolerance=1e-5");
+fn requests_reach_the_solver() {
+    workplace::all_tell(
+        0,
+        "
+        relax leaf.toml --set leaf.rods=3 --tolerance 1e-5 => rods=3 tolerance=1e-5
+        relax leaf.toml --method shooting --intervals 4 => intervals=4; by multiple shooting over 4 intervals
+        relax scenarios/paper/fig10.toml --set leaf.rods=5 --method shooting => outcome=saddle stable=false negative_eigenvalues=18; unstable equilibrium of index 18
+        ",
+    );
 }
 
 #[test]
 fn a_single_grid_claims_no_accuracy() {
     let place = Workplace::new();
-    let run = place.run("relax leaf.toml --json --segments 8");
+    let run = place.run("relax leaf.toml --json --segments 8 --modes 2");
     let summary = run.json();
-    tells(&summary, "segments=[8] error_estimate=null");
+    let told = "segments=[8] error_estimate=null eigenvalue_errors=null";
+    tells(&summary, told);
+    assert_eq!(floats(&summary["lowest_eigenvalues"]).len(), 2);
+    assert_eq!(place.table("out/small/modes.csv", MODES)[0][2], "");
     let success = summary["outcome"] == "converged";
     assert_eq!(run.status, Some(if success { 0 } else { 1 }));
     // A remark goes to standard error.
     assert!(success || !run.err.is_empty());
     // Written all the same.
-    place.holds("out/small", FILES);
+    place.holds("out/small", &with_modes());
 }
 
 #[test]
-fn bad_requests_are_refused_before_anything_is_written() {
-    all_refused(
-        "relax",
-        "leaf.toml --method newton => newton
-        leaf.toml --method newton => semi-implicit
-        leaf.toml --method implicit => semi-implicit
-        absent.toml => absent.toml: cannot be read
-        leaf.toml --segments few => invalid value 'few' for '--segments <N>'
-        leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
-        leaf.toml --modes 101 => --modes
-        leaf.toml --modes -1 => --modes
-        leaf.toml --modes all => --modes
-        leaf.toml --method shooting --segments 8 => --segments 8: shooting has no grid
-        leaf.toml --intervals 4 => --intervals 4: only the method shooting has intervals
-        leaf.toml --method explicit --keep-unstable => --keep-unstable: explicit motion leaves unstable equilibria; use the method semi-implicit
-        leaf.toml --method shooting --intervals 0 => --intervals 0: allowed are 1 to 4096",
-    );
-    all_refused("grow", "leaf.toml => grow");
+fn a_folder_that_is_a_file_is_refused() {
     let place = Workplace::new();
     place.write("plain", "a file");
     let message = "error: cannot write to the folder plain/out: plain is not a folder";
@@ -106,22 +102,6 @@ fn shooting_finds_a_stable_leaf() {
     let told = "method=shooting outcome=converged segments=[] intervals=1 stable=true";
     tells(&summary, told);
     contains(&place.picture("out/figure"), &["by single shooting"]);
-}
-
-#[test]
-fn intervals_are_as_asked() {
-    let (report, summary) = shoot(&Workplace::new(), "leaf.toml --intervals 4", 0);
-    contains(&report, &["by multiple shooting over 4 intervals"]);
-    assert_eq!(summary["intervals"], 4);
-}
-
-#[test]
-fn shooting_finds_a_saddle_and_calls_it_unstable() {
-    let fig10 = "scenarios/paper/fig10.toml --set leaf.rods=5";
-    let (report, summary) = shoot(&Workplace::new(), fig10, 0);
-    contains(&report, &["unstable equilibrium of index 18"]);
-    let told = "outcome=saddle stable=false negative_eigenvalues=18";
-    tells(&summary, told);
 }
 
 #[test]
@@ -165,8 +145,7 @@ fn modes_are_written_and_drawn_on_request() {
     let place = Workplace::new();
     let run = place.run("relax leaf.toml --modes 4").ends(0);
     run.says(&["figure.png, modes.csv, modes.svg, modes.png"]);
-    let with_modes = FILES.replace("summary", "modes.csv modes.png modes.svg summary");
-    place.holds("out/small", &with_modes);
+    place.holds("out/small", &with_modes());
 
     let summary = place.json("out/small/summary.json");
     let eigenvalues = floats(&summary["lowest_eigenvalues"]);
@@ -210,15 +189,6 @@ fn no_modes_are_null() {
     }
     let run = place.run("relax leaf.toml --modes 0");
     assert!(!run.out.contains("modes"));
-}
-
-#[test]
-fn one_grid_has_eigenvalues_without_errors() {
-    let place = Workplace::new();
-    let summary = summary(&place, "--segments 8 --modes 2");
-    assert_eq!(floats(&summary["lowest_eigenvalues"]).len(), 2);
-    assert_eq!(summary["eigenvalue_errors"], Value::Null);
-    assert_eq!(place.table("out/small/modes.csv", MODES)[0][2], "");
 }
 
 /// The flat shape of this soft leaf is a saddle.

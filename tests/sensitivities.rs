@@ -5,27 +5,13 @@ mod common;
 
 use std::f64::consts::TAU;
 
+use common::random::Draw;
 use common::*;
 use leafdyn::relax::{Mode, Reaction, Sensitivity};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 
 /// Leaves to be tried; `LEAFDYN_LEAVES` in the environment asks for more.
 const LEAVES: usize = 24;
-
-/// Numbers that are always the same: those of leaves far enough from where they would jump.
-struct Draw(usize);
-
-impl Draw {
-    fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.0 += 1;
-        let number = self.0 as f64;
-        low + (number * 0.618_033_988_749_895 + number.sqrt() * 0.37).fract() * (high - low)
-    }
-
-    fn list(&mut self, count: usize, low: f64, high: f64) -> Vec<f64> {
-        (0..count).map(|_| self.uniform(low, high)).collect()
-    }
-}
 
 /// A part of a scenario, and the keys that it has, between blanks.
 type Part = (String, &'static str);
@@ -99,7 +85,7 @@ fn held_tip(draw: &mut Draw, number: usize, rods: usize) -> Part {
 
 /// A random leaf, and keys of all kinds of it.
 fn random(number: usize) -> (String, Vec<&'static str>) {
-    let mut draw = Draw(101 * number);
+    let mut draw = Draw(number as u64);
     let rods = 1 + number % 4;
     let joined = !number.is_multiple_of(3);
     let (stiffness, its_keys) = stiffness(&mut draw, number, rods);

@@ -13,7 +13,17 @@ fn scenes() -> Vec<Scenario> {
     let paper = files("paper").into_iter();
     let paper = paper.flat_map(|file| [1, 2, 3, 5].map(|count| read(&file, &veins(count))));
     let classic = files("classic").into_iter().map(|file| read(&file, ""));
-    paper.chain(classic).collect()
+    // So soft that only many intervals succeed.
+    let soft = [
+        ("fig08", "load.tip_force=[5, 0, 0]"),
+        ("fig09", "load.gravity=[0, 0, -1]"),
+        ("fig10", "load.tip_force=[0, 0, 2]"),
+    ];
+    let soft = soft.map(|(figure, load)| {
+        let entries = format!("leaf.rods=5; stiffness.bending_2=2e-4; {load}");
+        scenario(&format!("paper/{figure}"), &entries)
+    });
+    paper.chain(classic).chain(soft).collect()
 }
 
 #[track_caller]

@@ -6,15 +6,6 @@ mod common;
 use common::*;
 use leafdyn::internals::bvp::Reason;
 
-/// Relaxed, shot from there, and shot alone.
-#[track_caller]
-fn all_agree(what: &str, leaf: &Scenario) {
-    let relaxed = settle(leaf, TIGHT);
-    agree(what, leaf, &relaxed, &shot_near(leaf, &relaxed), 1e-9);
-    let alone = shot_alone(leaf, &relaxed.shape.stations);
-    agree(what, leaf, &relaxed, &alone, 1e-9);
-}
-
 /// Veins that taper, with a soft joint, and curl at rest from half their length on.
 fn tapered() -> Scenario {
     let mut leaf = fig04(3);
@@ -72,9 +63,7 @@ fn angles_beyond_a_turn() {
     for (rod, turns) in leaf.rods.iter_mut().zip([1.0, -2.0, 0.0]) {
         rod.angle += turns * 2.0 * std::f64::consts::PI;
     }
-    all_agree("wound", &leaf);
-    let relaxed = settle(&leaf, 1e-8);
-    let shot = shot_near(&leaf, &relaxed);
+    let (relaxed, shot) = all_agree("wound", &leaf);
     for (a, b) in nodes(&relaxed.shape.rods).zip(nodes(&shot.rods)) {
         assert!(a.rotation.dot(b.rotation) > 0.0);
     }

@@ -113,8 +113,7 @@ fn all_veins_of_a_pair_would_move() {
     assert!(text.contains("all veins would move"), "{text}");
 }
 
-/// The critical length of `tests/lens.rs` and the critical weight of
-/// `tests/hanging_curved.rs`, without any eigenvalue being counted.
+/// A critical length of a lens and a critical weight of `tests/bifurcations.rs`, without any eigenvalue being counted.
 #[test]
 fn published_bifurcations_are_seen() {
     let long = |length: f64| format!("leaf.length=[1.0, {length:?}, 1.0]");
@@ -129,18 +128,6 @@ fn published_bifurcations_are_seen() {
     for off in [1.0 - 1e-3, 1.0 + 1e-3] {
         assert!(alone(&lens(off * length)).neutral.is_none());
         assert!(alone(&hanging(off * weight)).neutral.is_none());
-    }
-}
-
-/// The files and the paper's leaves are nowhere near a bifurcation.
-#[test]
-fn nothing_is_reported_of_ordinary_leaves() {
-    for (folder, entries) in [("classic", ""), ("paper", "leaf.rods=5")] {
-        for file in files(folder) {
-            let leaf = read(&file, entries);
-            let shot = shot_near(&leaf, &settle(&leaf, 1e-8));
-            assert!(shot.neutral.is_none(), "{}", leaf.name);
-        }
     }
 }
 

@@ -1,15 +1,22 @@
-//! What scripts rely on when they follow an equilibrium: files, exit statuses,
+//! What scripts rely on when they follow an equilibrium, and boundaries: files, exit statuses,
 //! messages, and results that do not depend on the threads.
 
 mod workplace;
 
 use serde_json::Value;
-use workplace::{Json, Workplace, contains, near, tells, timeless};
+use workplace::{Json, Workplace, all_tell, contains, near, pairs, tells, timeless};
 
 const FILES: &str = "trace.csv trace.json trace.png trace.svg";
 
 const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
     negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
+
+const BOUNDARY: &str = "curve,point,kind,load.tip_force[0],stiffness.bending_3,error_1,error_2,\
+    tip_x,tip_y,tip_z,error,index_before,index_behind";
+
+/// A column that buckles in one plane alone.
+const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+    --set stiffness.bending_2=1000 --vary load.tip_force[0]=0..-6";
 
 #[test]
 fn a_trace_is_a_table_a_summary_and_a_figure() {
@@ -27,22 +34,32 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
 }
 
-/// Every point is the leaf that `relax` finds there.
 #[test]
-fn points_are_what_relax_finds() {
+fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let place = Workplace::new();
-    let vary = "--vary load.gravity[2]=0..-3:4";
-    place.run(format!("trace leaf.toml --tolerance 1e-8 {vary} --out t"));
-    let rows = place.table("t/trace.csv", COLUMNS);
-    assert!(rows.len() > 6);
-    for row in rows.iter().step_by(3) {
-        let set = format!("--set load.gravity=[0,0,{}]", row[3]);
-        let relax = format!("relax leaf.toml --tolerance 1e-10 {set} --out r");
-        let leaf = place.told(0, relax);
-        let numbers: Vec<f64> = row[5..9].iter().map(|cell| cell.parse().unwrap()).collect();
-        near(&numbers[..3].into(), &leaf["tip"], 2e-8);
-        assert!(numbers[3] < 1e-8, "{row:?}");
-    }
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let run = place.run(format!("trace leaf.toml {COLUMN} {bending}"));
+    run.ends(0).says(&[
+        "load.tip_force[0] from 0.0 to -6.0",
+        "stiffness.bending_3 from 0.5 to 2.0",
+        "at stiffness.bending_3 = 1.0",
+        "branches cross: index 0 to 1",
+        "the end of a range",
+        "written",
+    ]);
+    let files = "boundary.csv boundary.json boundary.png boundary.svg";
+    place.holds("out/small", files);
+    let picture = place.picture("out/small/boundary");
+    let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
+    contains(&picture, &parts);
+    let rows = place.table("out/small/boundary.csv", BOUNDARY);
+    assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);
+    assert_eq!(rows[0][4], "0.5");
+    assert_eq!(rows.last().unwrap()[4], "2.0");
+    let json = place.json("out/small/boundary.json");
+    assert_eq!(json["complete"], true);
+    assert_eq!(json["curves"][0]["ends"][1], "reached");
+    assert_eq!(json["curves"][0]["points"].list().len(), rows.len());
 }
 
 /// A leaf without weight, soft across, loses its flatness at a fork; both its
@@ -86,34 +103,19 @@ fn a_leaf_that_is_pulled_obeys_hookes_law() {
     }
 }
 
-#[test]
-fn what_cannot_be_followed_is_refused() {
-    workplace::all_refused(
-        "trace leaf.toml --vary",
-        "leaf.rods=3..9 => a whole number has nothing between
-        method.step=1e-3..1 => setting of a method
-        dynamics.density=1..2 => no equilibrium
-        solve.tolerance=1e-3..1e-6 => changes no leaf
-        load.gravity[2]=1..1 => the same
-        stiffness.axial=100..-5 => greater than 0
-        load.gravity[2]=0..1 --points 1 => 2 or more
-        load.gravity[2]=0..1 --cross-section -1 => greater than 0
-        load.gravity[2]=0..1 --tolerance 5 => tolerance
-        load.gravity[2]=0..1 --segments 0 => segments",
-    );
-}
-
 /// What ends early is said, with what was found until then.
 #[test]
-fn a_branch_that_goes_on_is_an_outcome() {
-    let place = Workplace::new();
-    let few = "trace leaf.toml --vary load.gravity[2]=0..-3:100 --points 5";
-    let trace = place.told(1, few);
-    assert_eq!(trace["complete"], false);
-    let branch = &trace["branches"][0];
-    tells(branch, "end=most-points points=5");
-    contains(branch["remark"].text(), &["allow more"]);
-    place.holds("out/small", FILES);
+fn what_goes_on_is_an_outcome() {
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let short = COLUMN.replace("0..-6", "0..-1");
+    let table = format!(
+        "
+        trace leaf.toml --vary load.gravity[2]=0..-3:100 --points 5 => complete=false branches.0.end=most-points branches.0.points=5; allow more
+        trace leaf.toml {COLUMN} {bending}:100 --points 20 => complete=false curves.0.ends.1=most-points
+        trace leaf.toml {short} {bending} => complete=false; changes nowhere
+        "
+    );
+    all_tell(1, &table);
 }
 
 /// On the grid that is enough at its start, this branch would go over to one that only
@@ -137,24 +139,33 @@ fn a_branch_that_needs_finer_grids_gets_them() {
     assert_eq!(index("first"), index("last") + 1);
 }
 
-/// The rest length of one vein grows; veins are coupled at one end of the range only.
+/// One load, the rest length of one vein, and coupling, which may end where leaves do: no step
+/// leads beyond it.
 #[test]
 fn a_branch_ends_in_the_leaf_that_relax_finds_there() {
     let place = Workplace::new();
-    let stretched = "--set rest.stretch=[1.2,1,1,1,1]";
-    let coupled = "--set coupling.y=0 --set coupling.z=40";
-    for (varied, there, tolerance) in [
-        ("--vary rest.stretch[0]=1..1.2", stretched, 1e-6),
-        ("--set coupling.y=0 --vary coupling.z=0..40", coupled, 1e-8),
-    ] {
-        let follow = format!("trace leaf.toml {varied} --tolerance {tolerance}");
+    let table = "
+        load.gravity[2]=0..-3 => load.gravity=[0,0,-3]
+        rest.stretch[0]=1..1.2 => rest.stretch=[1.2,1,1,1,1]
+        coupling.z=0..40 => coupling.z=40
+        coupling.z=40..0 => coupling.z=0
+        coupling.z=2..1e-9 => coupling.z=1e-9
+    ";
+    for (varied, there) in pairs(table) {
+        let follow = format!("trace leaf.toml --vary {varied} --tolerance 1e-8 --out t");
         let trace = place.told(0, follow);
-        let branch = &trace["branches"][0];
+        let (branch, last) = (&trace["branches"][0], &trace["branches"][0]["last"]);
+        assert_eq!(branch["end"], "reached", "{trace}");
         assert!(branch["points"].count() < 40, "{branch}");
-        let fine = 0.1 * tolerance;
-        let relax = format!("relax leaf.toml {there} --tolerance {fine} --out r");
+        let end = varied.rsplit("..").next().unwrap();
+        assert_eq!(last["value"].as_f64(), end.parse().ok());
+        let relax = format!("relax leaf.toml --set {there} --tolerance 1e-9 --out r");
         let leaf = place.told(0, relax);
-        near(&branch["last"]["tip"], &leaf["tip"], 2.0 * tolerance);
+        near(&last["tip"], &leaf["tip"], 2e-8);
+        let row = place.table("t/trace.csv", COLUMNS).pop().unwrap();
+        let numbers: Vec<f64> = row[5..9].iter().map(|cell| cell.parse().unwrap()).collect();
+        near(&numbers[..3].into(), &leaf["tip"], 2e-8);
+        assert!(numbers[3] <= 1e-8, "{row:?}");
     }
 }
 
@@ -191,20 +202,6 @@ fn a_loop_is_closed() {
         // It goes through both crossings and to both sides.
         let number = branch["points"].count();
         assert!(number > 20, "{number}");
-    }
-}
-
-/// A range may end at the last leaf there is: no step leads beyond it.
-#[test]
-fn a_range_may_end_where_leaves_do() {
-    let place = Workplace::new();
-    for (range, end) in [("40..0", "0.0"), ("2..1e-9", "1e-9")] {
-        let trace = place.told(0, format!("trace leaf.toml --vary coupling.z={range}"));
-        assert_eq!(trace["branches"][0]["end"], "reached", "{trace}");
-        let last = &trace["branches"][0]["last"];
-        assert_eq!(last["value"].as_f64(), end.parse().ok());
-        let leaf = place.told(0, format!("relax leaf.toml --set coupling.z={end} --out r"));
-        near(&last["tip"], &leaf["tip"], 2e-6);
     }
 }
 

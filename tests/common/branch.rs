@@ -2,7 +2,7 @@
 
 use leafdyn::study::{Base, Trace, TraceRequest, trace};
 
-use crate::common::{base, extrapolate, path};
+use crate::common::{base, path};
 
 /// The text of a scenario that comes with the program.
 pub fn text(name: &str) -> String {
@@ -65,53 +65,4 @@ pub fn changes_at(what: &str, trace: &Trace, wanted: &[(f64, i64)], within: f64)
         let off = (value / wanted - 1.0).abs();
         assert!(off < within, "{what}: {value} is {off:.1e} off {wanted}");
     }
-}
-
-/// By how much, relatively, critical loads may be off: see [`critical`].
-pub const NEUTRAL: f64 = 1e-6;
-
-/// The critical value between `low` and `high` of a load that `unstable`
-/// judges on a grid of so many segments: bisected on four nested grids, each
-/// to the last digit, and extrapolated.
-///
-/// An eigenvalue counts as negative only where it can be told from zero, so
-/// that critical loads come out too high by the part [`NEUTRAL`] at most.
-#[track_caller]
-pub fn critical(
-    low: f64,
-    high: f64,
-    coarsest: usize,
-    unstable: impl Fn(f64, usize) -> bool,
-) -> f64 {
-    let on_grid = |segments| {
-        let (mut low, mut high) = (low, high);
-        assert!(!unstable(low, segments), "unstable at {low} already");
-        assert!(unstable(high, segments), "stable at {high} still");
-        for _ in 0..45 {
-            let middle = 0.5 * (low + high);
-            match unstable(middle, segments) {
-                true => high = middle,
-                false => low = middle,
-            }
-        }
-        0.5 * (low + high)
-    };
-    let values = [1, 2, 4, 8].map(|times| on_grid(coarsest * times));
-    extrapolate(&values, 0.25)
-}
-
-/// As [`critical`], for an inextensible and unshearable leaf: the limit of
-/// leaves of ever larger stretch and shear stiffness, which is passed on.
-#[track_caller]
-pub fn critical_of_rigid(
-    low: f64,
-    high: f64,
-    coarsest: usize,
-    unstable: impl Fn(f64, usize, f64) -> bool,
-) -> f64 {
-    let values = [1e4, 2e4, 4e4].map(|stiffness| {
-        let unstable = |load, segments| unstable(load, segments, stiffness);
-        critical(low, high, coarsest, unstable)
-    });
-    extrapolate(&values, 0.5)
 }

@@ -1,5 +1,7 @@
 //! Made-up measurements.
 
+use glam::DVec3;
+use leafdyn::relax::Equilibrium;
 use leafdyn::study::{Base, Data, Fit, FitOutcome, FitRequest, fit};
 
 use crate::common::random::Draw;
@@ -99,3 +101,32 @@ pub const PULLS: [[f64; 3]; 5] = [
     [2.0, 0.5, -0.5],
     [-0.3, 0.2, 1.0],
 ];
+
+/// Points on the first veins of a leaf, at every so many stations, as a table of some columns of
+/// rod, sigma, x, y, z and sd, with noise of the deviation sd (1e-4 is told if there is none); and the points.
+pub fn traced(
+    leaf: &Equilibrium,
+    [veins, every]: [usize; 2],
+    columns: &str,
+    sd: f64,
+    noise: &mut Draw,
+) -> (String, Vec<DVec3>) {
+    let (mut table, mut points) = (format!("{columns}\n"), Vec::new());
+    for (j, rod) in leaf.shape.rods[..veins].iter().enumerate() {
+        let stations = leaf.shape.stations.iter().zip(&rod.nodes);
+        for (sigma, node) in stations.step_by(every).skip(1) {
+            let [x, y, z] = node.position.to_array().map(|x| x + sd * noise.normal());
+            let cell = |column| match column {
+                "rod" => (j + 1).to_string(),
+                "sigma" => format!("{sigma:?}"),
+                "x" => format!("{x:?}"),
+                "y" => format!("{y:?}"),
+                "z" => format!("{z:?}"),
+                _ => format!("{:?}", if sd > 0.0 { sd } else { 1e-4 }),
+            };
+            table += &(columns.split(',').map(cell).collect::<Vec<_>>().join(",") + "\n");
+            points.push(DVec3::new(x, y, z));
+        }
+    }
+    (table, points)
+}

@@ -6,7 +6,6 @@
 pub mod branch;
 pub mod fit;
 pub mod motion;
-mod numerics;
 mod pairs;
 pub mod plane;
 pub mod random;
@@ -18,7 +17,6 @@ pub use std::f64::consts::PI;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
-pub use branch::{NEUTRAL, critical, critical_of_rigid};
 pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
@@ -29,7 +27,6 @@ pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::Base;
 pub use motion::TIMOSHENKO;
-pub use numerics::*;
 pub use pairs::pairs;
 pub use shot::*;
 
@@ -44,6 +41,14 @@ pub fn files(folder: &str) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries.map(|file| file.unwrap().path()).collect();
     files.sort();
     files
+}
+
+/// All scenario files; measured data stand beside theirs.
+pub fn scenario_files() -> Vec<PathBuf> {
+    let folders = ["paper", "classic", "motion", "study", "measured"];
+    let mut all = folders.map(files).concat();
+    all.retain(|file| file.extension().is_none_or(|kind| kind != "csv"));
+    all
 }
 
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
@@ -123,6 +128,11 @@ pub const RIGID: &str = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.s
 pub fn rod(overrides: &str) -> Scenario {
     let rod = Scenario::from_toml_with(ROD, "rod", &entries(overrides));
     rod.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The text of [`ROD`] whose tip is held where it is at rest.
+pub fn held(how: &str) -> String {
+    format!("{ROD}\ntip = {{ held = \"{how}\", position = [1.0, 0.0, 0.0] }}")
 }
 
 /// The numbers of a text of lines of columns; `#` begins a comment.
@@ -309,11 +319,6 @@ pub fn estimate(leaf: &Equilibrium) -> f64 {
 /// All nodes of some rods.
 pub fn nodes(rods: &[RodShape]) -> impl Iterator<Item = &NodeState> {
     rods.iter().flat_map(|rod| &rod.nodes)
-}
-
-/// `KEY=VALUE` for a vector.
-pub fn set_vector(key: &str, v: DVec3) -> String {
-    format!("{key}=[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
 }
 
 /// [`entries`] of the three stretch and shear stiffnesses.

@@ -7,23 +7,18 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 use crate::common::{asked, linear, paper_leaf};
 
-/// The next even number between 0 and 1 of a sequence that `state` begins, by the generator
+/// Random numbers, the same everywhere, of the sequence that a number begins, by the generator
 /// of Steele, Lea and Flood (OOPSLA 2014).
-pub fn splitmix64(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// Random numbers, the same everywhere, of the sequence that a number begins.
 pub struct Draw(pub u64);
 
 impl Draw {
     /// Between 0 and 1.
     pub fn even(&mut self) -> f64 {
-        splitmix64(&mut self.0)
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
@@ -120,58 +115,6 @@ fn kinked(value: f64, [first, second]: [f64; 2], times: [f64; 4], on: bool) -> P
     }
 }
 
-/// Constant, or with two kinks.
-fn crooked(value: impl Strategy<Value = f64>) -> impl Strategy<Value = Profile> {
-    let knots = (0.05..0.5, 0.55..0.95, 0.3..3.0, 0.3..2.0, 0.3..2.0);
-    (value, knots, prop::bool::weighted(0.4)).prop_map(|(value, (first, second, a, b, c), on)| {
-        kinked(value, [first, second], [1.0, a, b, c], on)
-    })
-}
-
-prop_compose! {
-    fn rods(count: usize)(
-        couple in prop::collection::vec(prop::array::uniform3(crooked(log_uniform(-1.5..1.5))), count),
-        force in prop::collection::vec(prop::array::uniform3(crooked(force_stiffness())), count),
-        rest in prop::collection::vec(prop::array::uniform3(crooked((-4.0..4.0).boxed())), count),
-        lengths in prop::collection::vec(0.5..1.5, count),
-        turns in prop::collection::vec(-0.5..0.5, count),
-    ) -> Scenario {
-        let mut leaf = paper_leaf(count, [1.0; 3], [1.0; 3], 0.0);
-        for (j, rod) in leaf.rods.iter_mut().enumerate() {
-            rod.length = lengths[j];
-            rod.angle += turns[j];
-            rod.couple_stiffness = couple[j].clone();
-            rod.force_stiffness = force[j].clone();
-            rod.rest_curvature = rest[j].clone();
-        }
-        leaf
-    }
-}
-
-prop_compose! {
-    /// One to five veins, each its own, under loads and couplings over two decades.
-    pub fn wild_leaves()(count in 1..6_usize)(
-        leaf in rods(count),
-        load in log_uniform(-1.0..1.2),
-        coupling in log_uniform(-1.0..3.0),
-        parts in prop::collection::vec(prop::array::uniform3(0.0..1.0), count - 1),
-        gravity in prop::array::uniform3(-1.0..1.0),
-        tip_force in prop::array::uniform3(-1.0..1.0),
-        tip_moment in prop::array::uniform3(-1.0..1.0),
-        joined in prop::bool::weighted(0.8),
-    ) -> Scenario {
-        let mut leaf: Scenario = leaf;
-        leaf.joined = joined;
-        leaf.gravity = gravity.map(|g| load * g);
-        leaf.tip_force = tip_force.map(|f| load * f);
-        leaf.coupling = parts.iter().map(|gap| gap.map(|part: f64| coupling * part)).collect();
-        if leaf.rods.len() == 1 {
-            leaf.tip_moment = tip_moment;
-        }
-        leaf
-    }
-}
-
 /// Constant, or with two of four kinks, some close together, that make its
 /// values up to thrice as large.
 fn mover_profile(decades: std::ops::Range<f64>) -> impl Strategy<Value = Profile> {
@@ -262,6 +205,30 @@ prop_compose! {
             rod.couple_stiffness = couple[j].clone();
             rod.force_stiffness = force[j].clone();
             rod.rest_curvature = rest[j].each_ref().map(|profile| profile.scaled(curved));
+        }
+        leaf
+    }
+}
+
+prop_compose! {
+    /// One to five veins, each its own, under loads and couplings over two decades.
+    pub fn wild_leaves()(count in 1..6_usize)(
+        leaf in uneven_rods(count),
+        load in log_uniform(-1.0..1.2),
+        coupling in log_uniform(-1.0..3.0),
+        parts in prop::collection::vec(prop::array::uniform3(0.0..1.0), count - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-1.0..1.0),
+        tip_moment in prop::array::uniform3(-1.0..1.0),
+        joined in prop::bool::weighted(0.8),
+    ) -> Scenario {
+        let mut leaf: Scenario = leaf;
+        leaf.joined = joined;
+        leaf.gravity = gravity.map(|g| load * g);
+        leaf.tip_force = tip_force.map(|f| load * f);
+        leaf.coupling = parts.iter().map(|gap| gap.map(|part: f64| coupling * part)).collect();
+        if leaf.rods.len() == 1 {
+            leaf.tip_moment = tip_moment;
         }
         leaf
     }

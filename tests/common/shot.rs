@@ -104,3 +104,15 @@ pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solutio
     let agree = found.position <= position && others <= 10.0 * position;
     assert!(agree, "{what}: {found:?}, energy {energy:.1e}");
 }
+
+/// Asserts that a relaxed leaf agrees with the boundary-value solutions from there and from
+/// arcs; returns both.
+#[track_caller]
+pub fn all_agree(what: &str, leaf: &Scenario) -> (Equilibrium, Solution) {
+    let relaxed = settle(leaf, TIGHT);
+    let near = shot_near(leaf, &relaxed);
+    agree(what, leaf, &relaxed, &near, 1e-9);
+    let alone = shot_alone(leaf, &relaxed.shape.stations);
+    agree(what, leaf, &relaxed, &alone, 1e-9);
+    (relaxed, near)
+}

@@ -2,6 +2,8 @@
 
 use leafdyn::scenario::{Scenario, ScenarioError};
 
+use crate::common::pairs;
+
 pub const VALID: &str = r#"# line 1
 name = "leaf"
 [leaf]
@@ -45,12 +47,13 @@ pub fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
     Scenario::from_toml_with(VALID, "leaf.toml", &overrides)
 }
 
-/// Tries what every line of a table gives: `refused!(by; given => parts of the message;)`.
-#[macro_export]
-macro_rules! refused {
-    ($by:expr; $($given:expr => $($part:expr),+;)+) => {
-        $($by($given, &[$($part),+]);)+
-    };
+/// Tries what every line of a table gives, `given => part & part` of the message, with `\\n` for
+/// the ends of lines.
+pub fn all_refused(table: &str, by: impl Fn(&str, &[&str])) {
+    for (given, said) in pairs(table) {
+        let [given, said] = [given, said].map(|text| text.replace("\\n", "\n"));
+        by(&given, &said.split(" & ").collect::<Vec<_>>());
+    }
 }
 
 #[track_caller]

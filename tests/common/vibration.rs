@@ -1,133 +1,71 @@
-//! Small vibrations of a leaf at rest: its stiffness and mass matrices, from
-//! the second derivatives of the segments, and the frequencies they give.
+//! Small vibrations of a leaf at rest: its stiffness and mass matrices, dense, and its modes.
 
 use glam::{DMat3, DVec3};
-use leafdyn::internals::leaf::{DiscreteLeaf, State};
+use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
+use leafdyn::internals::modes::{Eigenpair, Wanted, lowest};
 use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation::outer;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
-/// A leaf with its nodes' freedoms numbered: turns about and shifts along the
-/// lab axes. Bases are held; a joint tip is one point.
+use crate::common::Limit;
+use crate::common::motion::discrete;
+
+/// A leaf in a state, whose segments bear what their strains say, with its unknowns numbered:
+/// turns about and shifts along the lab axes. Bases are held; a joint tip is one point.
 pub struct Linear {
-    /// First freedom of the turn and of the shift of every node, rod by rod.
-    freedoms: Vec<Option<[usize; 2]>>,
-    /// Stiffness of the strains and loads, and of the coupling.
-    pub strains: DMatrix<f64>,
-    pub coupling: DMatrix<f64>,
+    numbers: SparsePattern,
+    rods: usize,
+    segments: usize,
+    stiffness: DMatrix<f64>,
     /// One over the root of the mass matrix.
     pub per_root_mass: DMatrix<f64>,
 }
 
-/// Frequencies, lowest first, and modes as columns.
-pub struct Modes {
-    pub frequencies: Vec<f64>,
-    pub modes: DMatrix<f64>,
-}
-
-fn add(matrix: &mut DMatrix<f64>, (row, column): (usize, usize), block: &DMat3) {
-    for c in 0..3 {
-        for r in 0..3 {
-            matrix[(row + r, column + c)] += block.col(c)[r];
-        }
-    }
-}
-
 impl Linear {
     pub fn new(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
-        let (rods, n) = (leaf.rods(), leaf.segments());
-        let joined = leaf.leaf.joined() && rods > 1;
-        let mut freedoms = Vec::new();
-        let mut count = 0;
-        let mut next = || {
-            count += 3;
-            count - 3
-        };
-        let mut tip = None;
-        for _ in 0..rods {
-            freedoms.push(None);
-            for i in 1..=n {
-                let (turn, met) = (next(), tip.filter(|_| i == n && joined));
-                let shift = met.unwrap_or_else(&mut next);
-                tip = (i == n).then_some(shift).or(tip);
-                freedoms.push(Some([turn, shift]));
-            }
-        }
-        let zeros = || DMatrix::zeros(count, count);
+        let mut state = state.clone();
+        leaf.strain_forces(&mut state);
+        let mut system = System::new(leaf);
+        leaf.assemble(&state, &mut system);
+        let numbers = SparsePattern::new(&system).unwrap();
+        let zeros = DMatrix::zeros(numbers.size(), numbers.size());
         let mut linear = Linear {
-            freedoms,
-            strains: zeros(),
-            coupling: zeros(),
-            per_root_mass: zeros(),
+            rods: leaf.rods(),
+            segments: leaf.segments(),
+            stiffness: zeros.clone(),
+            per_root_mass: zeros,
+            numbers,
         };
-        linear.add_segments(leaf, state);
-        linear.add_coupling(leaf);
-        linear.add_masses(leaf, physics, state);
+        for k in 0..linear.numbers.size() {
+            let node = |j: usize, i: usize| {
+                let [turn, shift] = linear.numbers.unknowns(j, i);
+                let unit = |c: usize| if c < 3 { turn + c } else { shift + c - 3 } == k;
+                [0, 1, 2, 3, 4, 5].map(|c| f64::from(u8::from(unit(c))))
+            };
+            let rod = |j: usize| (1..=linear.segments).map(|i| node(j, i)).collect();
+            let field = (0..linear.rods).map(rod).collect();
+            let forces = linear.numbers.product(&system, &field);
+            let column = linear.numbered(|j, i| forces[j][i - 1]);
+            linear.stiffness.set_column(k, &column);
+        }
+        linear.add_masses(leaf, physics, &state);
         linear
     }
 
-    fn add_segments(&mut self, leaf: &DiscreteLeaf, state: &State) {
-        for j in 0..leaf.rods() {
-            for i in 0..leaf.segments() {
-                // Exact, however stiff.
-                let section = leaf.section(j, i).condense(f64::INFINITY);
-                let idle = leaf.segment(state, j, i, DVec3::ZERO);
-                let strain = idle.v(&section) - section.rest_strain;
-                let force = idle.frame * (strain / section.compliance);
-                let k = leaf.segment(state, j, i, force).hessian(&section);
-                let node = state.base(j) + i;
-                // Turn and shift of the left end, turn and shift of the right.
-                let rows = [
-                    [k.aa, -k.xa.transpose(), k.ab, k.xa.transpose()],
-                    [-k.xa, k.xx, -k.xb, -k.xx],
-                    [k.ab.transpose(), -k.xb.transpose(), k.bb, k.xb.transpose()],
-                    [k.xa, -k.xx, k.xb, k.xx],
-                ];
-                let ends = [self.freedoms[node], self.freedoms[node + 1]];
-                for (r, row) in rows.iter().enumerate() {
-                    for (c, block) in row.iter().enumerate() {
-                        if let (Some(a), Some(b)) = (ends[r / 2], ends[c / 2]) {
-                            add(&mut self.strains, (a[r % 2], b[c % 2]), block);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn add_coupling(&mut self, leaf: &DiscreteLeaf) {
-        let n = leaf.segments();
-        let joined = leaf.leaf.joined();
-        for gap in 1..leaf.rods() {
-            for i in 1..=n {
-                if i == n && joined {
-                    continue;
-                }
-                let spring = leaf.leaf.coupling(gap - 1) * leaf.grid.weight(i);
-                let nodes = [(gap - 1) * (n + 1) + i, gap * (n + 1) + i];
-                let [a, b] = nodes.map(|node| self.freedoms[node].unwrap()[1]);
-                let block = DMat3::from_diagonal(spring);
-                for (at, sign) in [((a, a), 1.0), ((b, b), 1.0), ((a, b), -1.0), ((b, a), -1.0)] {
-                    add(&mut self.coupling, at, &(sign * block));
-                }
-            }
-        }
-    }
-
     fn add_masses(&mut self, leaf: &DiscreteLeaf, physics: &Physics, state: &State) {
-        let mut masses = vec![0.0; self.strains.nrows()];
-        for j in 0..leaf.rods() {
-            for i in 1..=leaf.segments() {
-                let node = state.base(j) + i;
-                let [turn, shift] = self.freedoms[node].unwrap();
-                let inertia = physics.inertia(leaf, j, i);
-                let d1 = state.q[node] * DVec3::X;
-                let own = (inertia.transverse / inertia.polar()).sqrt() - 1.0;
-                let root = inertia.transverse.sqrt().recip();
-                let root = root * (DMat3::IDENTITY + own * outer(d1, d1));
-                add(&mut self.per_root_mass, (turn, turn), &root);
-                masses[shift] += inertia.mass;
+        let mut masses = vec![0.0; self.numbers.size()];
+        for (j, i) in leaf.each(1..=self.segments) {
+            let node = state.base(j) + i;
+            let [turn, shift] = self.numbers.unknowns(j, i);
+            let inertia = physics.inertia(leaf, j, i);
+            let d1 = state.q[node] * DVec3::X;
+            let own = (inertia.transverse / inertia.polar()).sqrt() - 1.0;
+            let root = inertia.transverse.sqrt().recip();
+            let root = root * (DMat3::IDENTITY + own * outer(d1, d1));
+            for (r, c) in (0..9).map(|k| (k / 3, k % 3)) {
+                self.per_root_mass[(turn + r, turn + c)] = root.col(c)[r];
             }
+            masses[shift] += inertia.mass;
         }
         for (shift, mass) in masses.into_iter().enumerate() {
             for c in (0..3).filter(|_| mass > 0.0) {
@@ -137,60 +75,49 @@ impl Linear {
     }
 
     /// Stiffness over mass, symmetric.
-    pub fn scaled(&self, stiffness: &DMatrix<f64>) -> DMatrix<f64> {
-        let root = &self.per_root_mass;
-        let count = root.nrows();
-        // A row has three entries at most.
-        let row = |r: usize| -> Vec<(usize, f64)> {
-            let near = r.saturating_sub(2)..(r + 3).min(count);
-            let entries = near.map(|c| (c, root[(r, c)]));
-            entries.filter(|(_, value)| *value != 0.0).collect()
-        };
-        let rows: Vec<_> = (0..count).map(row).collect();
-        let times = |matrix: &DMatrix<f64>| {
-            let entry = |r, (k, value): &(usize, f64)| matrix[(*k, r)] * value;
-            DMatrix::from_fn(count, count, |r, c| {
-                rows[c].iter().map(|of| entry(r, of)).sum()
-            })
-        };
-        // Transposed on the way, twice.
-        times(&times(stiffness))
+    pub fn scaled(&self) -> DMatrix<f64> {
+        &self.per_root_mass * &self.stiffness * &self.per_root_mass
     }
 
-    /// Frequencies and modes.
-    pub fn modes(&self) -> Modes {
-        let all = self.scaled(&(&self.strains + &self.coupling));
-        let eigen = SymmetricEigen::new(all);
-        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        let modes = (&self.per_root_mass * &eigen.eigenvectors).select_columns(&order);
-        let frequencies = order.iter().map(|&k| eigen.eigenvalues[k].sqrt()).collect();
-        Modes { frequencies, modes }
-    }
-
-    /// A shape, given by increments of all nodes, in the numbering of the freedoms.
-    pub fn numbered(&self, shape: &[[f64; 6]]) -> DVector<f64> {
-        let mut numbered = DVector::zeros(self.strains.nrows());
-        for (freedoms, increment) in self.freedoms.iter().zip(shape) {
-            for (at, part) in freedoms.iter().flatten().zip(increment.chunks(3)) {
-                numbered.rows_mut(*at, 3).copy_from_slice(part);
+    /// Increments of nodes, or forces on them, as one vector; of a joint tip the first rod's.
+    pub fn numbered(&self, node: impl Fn(usize, usize) -> [f64; 6]) -> DVector<f64> {
+        let mut all = DVector::zeros(self.numbers.size());
+        for j in (0..self.rods).rev() {
+            for i in 1..=self.segments {
+                let of = node(j, i);
+                for (at, part) in self.numbers.unknowns(j, i).into_iter().zip(of.chunks(3)) {
+                    all.rows_mut(at, 3).copy_from_slice(part);
+                }
             }
         }
-        numbered
+        all
     }
+}
 
-    /// The state displaced by `size` times a mode, whose largest entry is one.
-    pub fn displaced(&self, state: &State, mode: DVector<f64>, size: f64) -> State {
-        let factor = size / mode.amax();
-        let mut displaced = state.clone();
-        for (node, freedoms) in self.freedoms.iter().enumerate() {
-            if let Some([turn, shift]) = freedoms {
-                let of = |at: usize| [0, 1, 2].map(|c| mode[at + c]);
-                let [a, b] = [turn, shift].map(|&at| of(at));
-                let increment = [a[0], a[1], a[2], b[0], b[1], b[2]];
-                displaced.advance(node, &increment, factor);
-            }
-        }
-        displaced
+/// The lowest modes of a leaf in a state.
+pub fn modes(leaf: &Leaf, state: &State, count: usize, near: &[Vec<[f64; 6]>]) -> Vec<Eigenpair> {
+    let grid = discrete(leaf, state.segments());
+    let mut state = state.clone();
+    grid.strain_forces(&mut state);
+    let wanted = Wanted {
+        count,
+        accuracy: 1e-7,
+        near,
+        time: &Limit::default(),
+    };
+    lowest(&grid, &Physics::new(leaf), &state, wanted).unwrap()
+}
+
+/// The state displaced by a mode, the largest turn or shift being `size`.
+pub fn displaced(state: &State, mode: &Eigenpair, size: f64) -> State {
+    let largest = mode
+        .shape
+        .iter()
+        .flatten()
+        .fold(0.0, |m: f64, x| m.max(x.abs()));
+    let mut displaced = state.clone();
+    for (node, increment) in mode.shape.iter().enumerate() {
+        displaced.advance(node, increment, size / largest);
     }
+    displaced
 }

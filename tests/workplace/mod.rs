@@ -269,13 +269,26 @@ impl Json for Value {
     }
 }
 
-/// Asserts that a JSON object tells this, as in `outcome=converged stable=true`.
+/// Asserts that a JSON object tells this, as in `outcome=converged shooting.stable=true`.
 #[track_caller]
 pub fn tells(object: &Value, entries: &str) {
     for entry in entries.split(' ') {
         let (key, wanted) = entry.split_once('=').expect("key=value");
         let wanted: Value = serde_json::from_str(wanted).unwrap_or_else(|_| wanted.into());
-        assert_eq!(object[key], wanted, "{key}");
+        let found = object.pointer(&format!("/{}", key.replace('.', "/")));
+        assert_eq!(found, Some(&wanted), "{key}");
+    }
+}
+
+/// Runs what every line of a table names, `arguments => entries; part | part`: the JSON tells the
+/// entries, and the report has all parts, with one exit status.
+pub fn all_tell(status: i32, table: &str) {
+    for (arguments, told) in pairs(table) {
+        let place = Workplace::new();
+        let (entries, parts) = told.split_once("; ").unwrap_or((told, ""));
+        tells(&place.told(status, arguments), entries);
+        let parts: Vec<&str> = parts.split(" | ").collect();
+        place.run(arguments).ends(status).says(&parts);
     }
 }
 
