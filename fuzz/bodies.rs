@@ -121,7 +121,7 @@ pub fn stopped() -> (TempDir, Scenario) {
     let mut recording =
         Recording::begin(folder.path(), &mut simulation, &Selection::default()).unwrap();
     let frame = simulation.next_frame().unwrap();
-    recording.add(&simulation, &frame).unwrap();
+    recording.add(&mut simulation, &frame).unwrap();
     recording.checkpointer().write().unwrap().unwrap();
     drop(recording);
     (folder, scenario)

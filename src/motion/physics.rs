@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
 use crate::rotation::outer;
-use crate::scenario::Dynamics;
+use crate::scenario::{Dynamics, Schedule};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments.
@@ -72,9 +72,7 @@ impl Physics {
         let densities = dynamics.density.iter().map(|density| density.at(0.5));
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
-        let still = dynamics.gravity.is_constant()
-            && dynamics.tip_force.is_constant()
-            && dynamics.tip_moment.is_constant();
+        let still = schedules(&dynamics).iter().all(|load| load.is_constant());
         let mut physics = Physics {
             constant_loads: None,
             knots: knots(&dynamics, time),
@@ -115,27 +113,23 @@ impl Physics {
 
     /// The loads at a time.
     pub fn loads(&self, time: f64) -> Loads {
-        if let Some(loads) = self.constant_loads {
-            return loads;
-        }
-        let (d, at) = (&self.dynamics, time * self.time);
-        self.scaled([d.gravity.at(at), d.tip_force.at(at), d.tip_moment.at(at)])
+        let at = time * self.time;
+        self.loads_by(|load| load.at(at))
     }
 
     /// The means of the loads over an interval.
     pub fn mean_loads(&self, interval: [f64; 2]) -> Loads {
+        let [from, to] = interval.map(|time| time * self.time);
+        self.loads_by(|load| load.mean(from, to))
+    }
+
+    /// The loads with these values, without dimensions.
+    fn loads_by(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> Loads {
         if let Some(loads) = self.constant_loads {
             return loads;
         }
-        let (d, [from, to]) = (&self.dynamics, interval.map(|time| time * self.time));
-        let loads = [&d.gravity, &d.tip_force, &d.tip_moment];
-        self.scaled(loads.map(|load| load.mean(from, to)))
-    }
-
-    /// Gravity, and the force and the moment on a tip, without dimensions.
-    fn scaled(&self, loads: [[f64; 3]; 3]) -> Loads {
-        let [gravity, tip_force, tip_moment] = loads.map(DVec3::from_array);
-        let force = self.scale.force();
+        let loads = schedules(&self.dynamics).map(|load| DVec3::from_array(value(load)));
+        let ([gravity, tip_force, tip_moment], force) = (loads, self.scale.force());
         Loads {
             gravity: gravity * (self.scale.length / force),
             tip_force: tip_force / force,
@@ -156,10 +150,8 @@ impl Physics {
     /// knots, in the scenario's unit.
     pub fn too_short_a_pulse(&self) -> Option<f64> {
         let (d, shortest) = (&self.dynamics, SHORTEST * self.time);
-        let loads = [&d.gravity, &d.tip_force, &d.tip_moment];
-        let of_loads = loads
-            .into_iter()
-            .find_map(|load| load.pulse_within(shortest));
+        let mut loads = schedules(d).into_iter();
+        let of_loads = loads.find_map(|load| load.pulse_within(shortest));
         of_loads.or_else(|| d.rest.pulse_within(shortest))
     }
 
@@ -195,17 +187,19 @@ impl Physics {
 /// Shortest step to a knot, in units of time: the accelerations of shorter ones are rounding.
 const SHORTEST: f64 = 1e-6;
 
+/// Gravity, and the force and the moment on a tip.
+fn schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
+    [&dynamics.gravity, &dynamics.tip_force, &dynamics.tip_moment]
+}
+
 /// The knots of everything that varies in time, over the unit of time.
 fn knots(dynamics: &Dynamics, unit: f64) -> Vec<f64> {
-    let mut knots = Vec::new();
-    for load in [&dynamics.gravity, &dynamics.tip_force, &dynamics.tip_moment] {
-        if !load.is_constant() {
-            knots.extend(load.at.iter().map(|time| time / unit));
-        }
-    }
-    if !dynamics.rest.is_constant() {
-        knots.extend(dynamics.rest.at.iter().map(|time| time / unit));
-    }
+    let loads = schedules(dynamics).into_iter();
+    let loads = loads.filter(|load| !load.is_constant());
+    let rest = Some(&dynamics.rest).filter(|rest| !rest.is_constant());
+    let knots = loads.flat_map(|load| &load.at);
+    let knots = knots.chain(rest.into_iter().flat_map(|rest| &rest.at));
+    let mut knots: Vec<f64> = knots.map(|time| time / unit).collect();
     knots.sort_by(f64::total_cmp);
     knots
 }

@@ -39,12 +39,8 @@ struct RodRate<'s> {
     rest_stretch: Slope<'s>,
 }
 
-/// The derivative of a profile.
-enum Slope<'s> {
-    None,
-    Constant(f64),
-    Along(Vec<(f64, &'s Profile)>),
-}
+/// The derivative of a profile: a weighted sum of profiles, without terms if it is zero.
+struct Slope<'s>(Vec<(f64, &'s Profile)>);
 
 impl<'s> Slope<'s> {
     fn of(
@@ -52,27 +48,22 @@ impl<'s> Slope<'s> {
         unit: f64,
         profile: impl Fn(&'s Scenario) -> &'s Profile,
     ) -> Self {
-        let profiles = || terms.iter().map(|(weight, s)| (weight * unit, profile(s)));
-        let (_, first) = (terms[0].0, profile(&terms[0].1));
-        if profiles().all(|(_, other)| other == first) {
-            return Slope::None;
+        let first = profile(&terms[0].1);
+        let profiles = terms.iter().map(|(weight, s)| (weight * unit, profile(s)));
+        let mut profiles: Vec<_> = profiles.collect();
+        if profiles.iter().all(|(_, other)| *other == first) {
+            profiles.clear();
         }
-        if profiles().all(|(_, other)| matches!(other, Profile::Constant(_))) {
-            return Slope::Constant(profiles().map(|(weight, p)| weight * p.at(0.0)).sum());
-        }
-        Slope::Along(profiles().collect())
+        Slope(profiles)
     }
 
     fn at(&self, sigma: f64) -> f64 {
-        match self {
-            Slope::None => 0.0,
-            Slope::Constant(value) => *value,
-            Slope::Along(terms) => terms.iter().map(|(weight, p)| weight * p.at(sigma)).sum(),
-        }
+        let terms = self.0.iter().map(|(weight, p)| weight * p.at(sigma));
+        terms.fold(0.0, |sum, term| sum + term)
     }
 
     fn is_none(&self) -> bool {
-        matches!(self, Slope::None)
+        self.0.is_empty()
     }
 }
 
