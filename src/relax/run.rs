@@ -58,8 +58,10 @@ pub struct Run<'a, 'o> {
     pub leaf: &'a Leaf,
     /// The full leaf, if `leaf` is half of it or restricted to its plane.
     pub whole: Option<&'a Leaf>,
-    /// The leaf solved for: `leaf`, or what a `completed` run reduced it to.
-    pub solved: &'a Leaf,
+    /// Rods solved for.
+    pub solved: usize,
+    /// Whether they are solved for in their plane.
+    pub planar: bool,
     /// Displacements that would follow from neglecting shear, and stretch.
     pub effects: [Option<f64>; 2],
     pub options: &'o Options,
@@ -78,6 +80,8 @@ pub struct Run<'a, 'o> {
     pub linear: Option<Linear>,
     /// The linear system of the last grid, for reuse.
     pub spare_system: Option<System>,
+    /// Whether a grid was added for the nodes of the finest one.
+    pub added_for_nodes: bool,
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly_stable: bool,
@@ -109,7 +113,8 @@ impl<'a, 'o> Run<'a, 'o> {
         Run {
             leaf,
             whole: None,
-            solved: leaf,
+            solved: leaf.rods(),
+            planar: leaf.planar(),
             effects: [None; 2],
             options,
             tolerance,
@@ -122,6 +127,7 @@ impl<'a, 'o> Run<'a, 'o> {
             estimate: None,
             linear: None,
             spare_system: None,
+            added_for_nodes: false,
             index: None,
             clearly_stable: false,
             remaining: 0.0,
