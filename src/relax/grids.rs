@@ -3,6 +3,7 @@
 use crate::leaf::{Grid, State};
 use crate::memory;
 use crate::newton::Stop;
+use crate::relax::fields::fields;
 use crate::relax::level::{Level, positions};
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
@@ -50,7 +51,7 @@ impl Run<'_, '_> {
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             self.estimate_accuracy();
-            if self.accurate() && self.check_stability(false)? {
+            if self.accurate() && self.check_stability(false)? && !self.needs_another_grid() {
                 return Ok(true);
             }
             if self.out_of_time() {
@@ -64,9 +65,23 @@ impl Run<'_, '_> {
         }
     }
 
+    /// Whether all nodes of the finest grid are requested and the leaf is not accurate enough
+    /// there; then one more grid is added.
+    fn needs_another_grid(&mut self) -> bool {
+        let enough = !self.options.every_node || self.integrated().is_some();
+        if enough || self.added_for_nodes || self.finer().is_none() {
+            return false;
+        }
+        let levels: Vec<&Level> = self.levels.iter().collect();
+        let columns = self.table.columns();
+        let fields = fields(&levels, columns, (self.error(), self.tolerance), true, None);
+        self.added_for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
+        self.added_for_nodes
+    }
+
     /// Continues to a `finer` grid with all unknowns of a leaf at rest.
     pub fn continue_on(&mut self, finer: Grid) -> Result<bool, Stop> {
-        self.solved = self.leaf;
+        self.solved = self.leaf.rods();
         self.settle_on(finer)?;
         self.refine()
     }

@@ -5,6 +5,7 @@ mod correction;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
+mod fields;
 mod follow;
 mod grids;
 mod grip;

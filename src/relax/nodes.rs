@@ -4,39 +4,32 @@ use crate::leaf::RodFields;
 use crate::relax::level::Level;
 use crate::relax::richardson::Richardson;
 use crate::relax::shape;
-use crate::relax::stencil::Stencil;
 use glam::{DQuat, DVec3};
 
-/// A node's values that are extrapolated: position, quaternion, n and m along the directors.
-pub type Node = [f64; 13];
+/// Values carried per node through the extrapolation: position, quaternion, n, m.
+const FIELDS: usize = 13;
 
-/// Nodes of the interpolation of lower order.
-const LOWER: usize = 5;
+pub type Node = [f64; FIELDS];
 
 /// The leaf's fields after `columns` extrapolations at the ends of `parts` equal parts of its
 /// grids, rod after rod, dimensionless.
 pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodFields>> {
     let finest = &levels[levels.len() - 1];
+    let rods = 0..finest.leaf.rods();
     if columns == 0 {
-        let rods = 0..finest.leaf.rods();
         return rods.map(|j| on_grid(finest, j, parts)).collect();
     }
-    let fields = |node: &Node| {
-        let (x, q, resultants) = unpacked(node);
+    let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
+    let node = |values: &Node| {
+        let (x, q, resultants) = unpacked(values);
         let [n, m] = resultants.map(|vector| q * vector);
         RodFields { x, q, n, m }
     };
-    let rods = values(levels, columns, parts);
-    let rods = rods.iter().map(|rod| rod.iter().map(fields).collect());
-    rods.collect()
-}
-
-/// The same as the values that are extrapolated.
-pub fn values(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<Node>> {
-    let finest = &levels[levels.len() - 1];
-    let used = &levels[levels.len() - 1 - columns..];
-    let rod = |j: usize| extrapolated(used, &rotations(finest, j), j, parts);
-    (0..finest.leaf.rods()).map(rod).collect()
+    let rod = |j: usize| {
+        let nodes = RodNodes::new(&used, finest, j).extrapolated(parts);
+        nodes.iter().map(node).collect()
+    };
+    rods.map(rod).collect()
 }
 
 /// The fields of a rod on one grid.
@@ -52,82 +45,53 @@ fn on_grid(level: &Level, j: usize, parts: usize) -> Vec<RodFields> {
     rotations.step_by(stride).map(node).collect()
 }
 
-/// The same at all nodes of the finest grid. Nodes added by a grid have the extrapolation of the
-/// grids from there on, plus the remainder of that of the coarser grids, which is small and
-/// smooth, interpolated between their nodes. Also returns an estimate of the error of positions by
-/// this interpolation: the largest difference from one of lower order, summed over the grids.
-pub fn every_node(levels: &[Level], columns: usize) -> (Vec<Vec<Node>>, f64) {
-    let used = levels.len() - 1 - columns;
-    let finest = &levels[levels.len() - 1];
-    let signs: Vec<_> = (0..finest.leaf.rods())
-        .map(|j| rotations(finest, j))
-        .collect();
-    let on = |first: usize, j: usize, level: &Level| {
-        let levels = &levels[first.max(used)..];
-        extrapolated(levels, &signs[j], j, level.leaf.segments())
-    };
-    let rods = 0..signs.len();
-    let mut rods: Vec<Vec<Node>> = rods.map(|j| on(0, j, &levels[0])).collect();
-    let mut error = 0.0;
-    for (k, level) in levels.iter().enumerate().skip(1) {
-        let coarser = &levels[k - 1].leaf;
-        let stencil = |&at: &f64| {
-            let ([stencil, _], [lower, _]) = (
-                <Stencil>::at(coarser, at),
-                Stencil::<LOWER>::at(coarser, at),
-            );
-            (stencil, lower)
-        };
-        let stencils: Vec<_> = level.leaf.grid.sigma().iter().map(stencil).collect();
-        let mut largest = 0.0_f64;
-        for (j, known) in rods.iter_mut().enumerate() {
-            let mut nodes = on(k, j, level);
-            let own = nodes
-                .iter()
-                .step_by(level.leaf.segments() / coarser.segments());
-            let change = |(a, b): (&Node, &Node)| -> Node { std::array::from_fn(|k| a[k] - b[k]) };
-            let changes: Vec<Node> = known.iter().zip(own).map(change).collect();
-            let position = |i: usize| DVec3::from_slice(&changes[i]);
-            for (node, (stencil, lower)) in nodes.iter_mut().zip(&stencils) {
-                let difference = stencil.value(position) - lower.value(position);
-                largest = largest.max(difference.length());
-                for (i, weight) in stencil.terms() {
-                    (node.iter_mut().zip(&changes[i])).for_each(|(sum, it)| *sum += weight * it);
-                }
-            }
-            *known = nodes;
+/// The nodes of a rod on several grids, each computed on first use and cached: nodes common to
+/// several grids are used repeatedly.
+pub struct RodNodes<'l> {
+    rod: usize,
+    /// Quaternions on the finest grid, continuous in sign.
+    signs: Vec<DQuat>,
+    levels: Vec<(&'l Level, Vec<Option<Node>>)>,
+}
+
+impl<'l> RodNodes<'l> {
+    /// On `levels`; quaternions have the signs of those on the finest.
+    pub fn new(levels: &[&'l Level], finest: &Level, rod: usize) -> Self {
+        let none = |level: &&'l Level| (*level, vec![None; level.leaf.segments() + 1]);
+        RodNodes {
+            rod,
+            signs: rotations(finest, rod),
+            levels: levels.iter().map(none).collect(),
         }
-        error += largest;
     }
-    (rods, error)
-}
 
-/// The values of a rod extrapolated over `levels` at the ends of so many parts; its quaternions on
-/// the finest grid are `signs`.
-fn extrapolated(levels: &[Level], signs: &[DQuat], j: usize, parts: usize) -> Vec<Node> {
-    let on = |Level { leaf, state }: &Level| {
-        let stride = leaf.segments() / parts;
-        let node = |i: usize| -> Node {
-            let k = state.base(j) + i * stride;
-            let [n, m] = shape::resultants(leaf, state, j, i * stride);
-            // q and -q are the same rotation: all grids must use the same sign.
-            let q = with_sign_of(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
-            let x = state.x[k];
-            [
-                x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
-            ]
-        };
-        (leaf.segments(), (0..=parts).flat_map(node).collect())
-    };
-    let table: Richardson = levels.iter().map(on).collect();
-    table.column(levels.len() - 1).as_chunks().0.to_vec()
-}
-
-/// The same as position, rotation, and force and moment along the directors.
-pub fn unpacked(node: &Node) -> (DVec3, DQuat, [DVec3; 2]) {
-    let vector = |k: usize| DVec3::from_slice(&node[k..]);
-    let q = DQuat::from_slice(&node[3..]).normalize();
-    (vector(0), q, [vector(7), vector(10)])
+    /// The extrapolated fields at the ends of `parts` equal parts of the grid, from the grids
+    /// that have these nodes.
+    pub fn extrapolated(&mut self, parts: usize) -> Vec<Node> {
+        let (rod, signs) = (self.rod, &self.signs);
+        let mut table = Richardson::default();
+        let mut count = 0;
+        for (level, known) in &mut self.levels {
+            let segments = level.leaf.segments();
+            if !segments.is_multiple_of(parts) {
+                continue;
+            }
+            let stride = segments / parts;
+            let values = (0..=parts).flat_map(|i| {
+                *known[i * stride].get_or_insert_with(|| {
+                    let state = &level.state;
+                    let k = state.base(rod) + i * stride;
+                    let [n, m] = shape::resultants(&level.leaf, state, rod, i * stride);
+                    // q and -q are the same rotation: all grids must use the same sign.
+                    let q = with_sign_of(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
+                    components(state.x[k], q, n, m)
+                })
+            });
+            table.push(segments, values.collect());
+            count += 1;
+        }
+        table.column(count - 1).as_chunks().0.to_vec()
+    }
 }
 
 /// Quaternions of rod `j` at all nodes, continuous in sign.
@@ -144,6 +108,20 @@ pub fn continuous(rotations: &[DQuat]) -> Vec<DQuat> {
         before
     };
     rotations.iter().map(same).collect()
+}
+
+/// The components of a node's fields, with force and moment along its directors.
+pub fn components(x: DVec3, q: DQuat, n: DVec3, m: DVec3) -> Node {
+    [
+        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
+    ]
+}
+
+/// The same as position, rotation, force and moment.
+pub fn unpacked(node: &Node) -> (DVec3, DQuat, [DVec3; 2]) {
+    let vector = |k: usize| DVec3::from_slice(&node[k..]);
+    let q = DQuat::from_slice(&node[3..]).normalize();
+    (vector(0), q, [vector(7), vector(10)])
 }
 
 /// Of q and -q the one nearer to `other`.

@@ -24,8 +24,11 @@ pub struct Place {
     /// Stations between the same knots.
     near: Vec<f64>,
     /// Index of the first of them.
-    first: usize,
+    pub first: usize,
 }
+
+/// Stations with the weights of the values there.
+pub type Values = Vec<(usize, f64)>;
 
 /// Stations with the weights of the value and of the slope there.
 pub type Slopes = Vec<(usize, f64, f64)>;
@@ -50,10 +53,28 @@ impl Place {
         }
     }
 
-    /// The Hermite polynomial through values and slopes at the nearest stations, `fewer` than are
-    /// possible, and the monic polynomial that vanishes there together with its slope.
-    pub fn hermite(&self, fewer: usize) -> (Slopes, f64) {
-        let count = HERMITE.min(self.near.len()).saturating_sub(fewer).max(1);
+    /// The Hermite polynomial through values and slopes at the nearest stations, as many as
+    /// possible.
+    pub fn hermite(&self) -> Slopes {
+        self.reduced_hermite(0)
+    }
+
+    /// The number of stations of the Hermite polynomial with `fewer` stations less.
+    fn count(&self, fewer: usize) -> usize {
+        HERMITE.min(self.near.len()).saturating_sub(fewer).max(1)
+    }
+
+    /// The monic polynomial that vanishes at these stations together with its slope.
+    fn node_polynomial(&self, fewer: usize) -> f64 {
+        let count = self.count(fewer);
+        let (first, _) = weights(&self.near, self.at, count);
+        let near = &self.near[first..first + count];
+        near.iter().map(|node| (self.at - node).powi(2)).product()
+    }
+
+    /// The Hermite polynomial through `fewer` stations less.
+    fn reduced_hermite(&self, fewer: usize) -> Slopes {
+        let count = self.count(fewer);
         let (first, lagrange) = weights(&self.near, self.at, count);
         let near = &self.near[first..first + count];
         let each = lagrange.iter().enumerate().map(|(i, weight)| {
@@ -63,15 +84,26 @@ impl Place {
             let value = squared * (1.0 - 2.0 * slope * away);
             (self.first + first + i, value, squared * away)
         });
-        let vanishing = near.iter().map(|node| (self.at - node).powi(2)).product();
-        (each.collect(), vanishing)
+        each.collect()
     }
 
     /// The Lagrange polynomial through the nearest stations.
-    pub fn lagrange(&self) -> Slopes {
+    pub fn lagrange(&self) -> Values {
         let (first, weights) = weights(&self.near, self.at, LAGRANGE);
-        let stations = (self.first + first..).zip(weights);
-        stations.map(|(i, weight)| (i, weight, 0.0)).collect()
+        (self.first + first..).zip(weights).collect()
+    }
+
+    /// The Lagrange polynomial through the nearest stations other than this one, and that of
+    /// two fewer.
+    pub fn leave_one_out(&self) -> [Values; 2] {
+        let mut near = self.near.clone();
+        let own = near.iter().position(|at| *at == self.at);
+        own.map(|own| near.remove(own));
+        [LAGRANGE, LAGRANGE - 2].map(|count| {
+            let (first, weights) = weights(&near, self.at, count);
+            let station = |i: usize| self.first + i + usize::from(own.is_some_and(|own| i >= own));
+            (first..).map(station).zip(weights).collect()
+        })
     }
 }
 
@@ -99,15 +131,9 @@ impl Differences {
     /// Adds the differences at a point, of values interpolated with the given weights.
     pub fn add(&mut self, place: &Place, value: impl Fn(&Slopes) -> DVec3) {
         let panel = self.panels.entry(place.first).or_default();
-        let interpolated = |fewer| {
-            let (weights, vanishing) = place.hermite(fewer);
-            (value(&weights), vanishing)
-        };
-        let [
-            (best, first_vanishes),
-            (second, second_vanishes),
-            (third, third_vanishes),
-        ] = [0, 1, 2].map(interpolated);
+        let [best, second, third] = [0, 1, 2].map(|fewer| value(&place.reduced_hermite(fewer)));
+        let [first_vanishes, second_vanishes, third_vanishes] =
+            [0, 1, 2].map(|fewer| place.node_polynomial(fewer));
         let coefficients = [
             (second - third).length() / third_vanishes,
             (best - second).length() / second_vanishes,
@@ -128,5 +154,31 @@ impl Differences {
             })
         });
         errors.fold(0.0, f64::max)
+    }
+}
+
+/// Largest error measures of the polynomials between two knots, and of those of lower order,
+/// kept knot by knot since the order may differ.
+pub struct ErrorMeasures(Vec<[f64; 2]>);
+
+impl ErrorMeasures {
+    /// Zero, for a number of stations.
+    pub fn new(stations: usize) -> Self {
+        ErrorMeasures(vec![[0.0; 2]; stations])
+    }
+
+    /// Adds the measures at a point between the knots whose first station is `first`.
+    pub fn add(&mut self, first: usize, measures: [f64; 2]) {
+        let largest = self.0[first].iter_mut().zip(measures);
+        largest.for_each(|(largest, measure)| *largest = largest.max(measure));
+    }
+
+    /// The error estimate of the polynomials, no less than `part` of the measures.
+    pub fn error(&self, part: f64) -> f64 {
+        let error = |&[best, second]: &[f64; 2]| match second > best {
+            true => best * (best / second).max(part),
+            false => best,
+        };
+        self.0.iter().map(error).fold(0.0, f64::max)
     }
 }

@@ -5,15 +5,14 @@ use crate::newton::Stop;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
+use crate::relax::fields::{Fields, fields};
 use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
-use crate::relax::nodes::{self, Node, with_sign_of};
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
-use crate::relax::shape;
 use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Assembles the result.
 pub fn equilibrium(
@@ -25,19 +24,26 @@ pub fn equilibrium(
     let finest = run.levels.last().expect("the grid it failed on, at least");
     let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
     let columns = run.table.columns();
+    let series: Vec<&Level> = run.levels.iter().collect();
     let error = run.error();
-    let (stations, rods, between) = fields(run, columns, error.unwrap_or(0.0));
+    let Fields {
+        stations,
+        rods,
+        between,
+    } = fields(
+        &series,
+        columns,
+        (error, run.tolerance),
+        run.options.every_node,
+        run.integrated(),
+    );
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);
     let (grid, lines) = centerlines(run, finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
-    let segments: Vec<usize> = run
-        .levels
-        .iter()
-        .map(|level| level.leaf.segments())
-        .collect();
+    let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
     Equilibrium {
         scenario: scenario.name.clone(),
         method: run.options.method,
@@ -48,7 +54,7 @@ pub fn equilibrium(
         energy: Some(potential(run, columns) * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
-        reaction: reaction(&run.levels, columns),
+        reaction: reaction(&series, columns),
         stability: Stability {
             negative_eigenvalues: run.index,
             modes: None,
@@ -61,7 +67,7 @@ pub fn equilibrium(
         model: Model::new(
             rods.len(),
             (
-                run.solved.rods(),
+                run.solved,
                 run.planar && run.index == Some(0) && flat(finest),
             ),
             &segments,
@@ -88,75 +94,11 @@ pub fn equilibrium(
     }
 }
 
-/// Segments of the coarsest grid from which on its nodes are enough stations.
-const STATIONS: usize = 8;
-
-/// Stations, the rods there in the scenario's units, and the error of the positions in addition
-/// to `error`, that at the nodes of the coarsest grid. The stations are these nodes or, if they
-/// are few, those of the next grid, and all if every node is requested: of a leaf that was
-/// integrated to the tolerance those of the integration, otherwise those of the finest grid, if
-/// interpolation between the nodes of the coarsest keeps the tolerance.
-fn fields(run: &Run, columns: usize, error: f64) -> (Vec<f64>, Vec<RodShape>, f64) {
-    let (first, finest) = (&run.levels[0].leaf.grid, &run.levels[run.levels.len() - 1]);
-    let (every_node, few) = (run.options.every_node, first.segments() < STATIONS);
-    let unpacked = |rod: &Vec<Node>| rod.iter().map(nodes::unpacked).collect();
-    let on_coarsest = || {
-        let rods = nodes::values(&run.levels, columns, first.segments());
-        (first.clone(), rods.iter().map(unpacked).collect(), 0.0)
-    };
-    let (grid, rods, between): (_, Vec<Vec<_>>, _) = match run.integrated() {
-        Some((estimate, integrated)) => {
-            let grid = match every_node {
-                true => estimate.grid.clone(),
-                false if few && estimate.grid != *first => first.refined(),
-                false => first.clone(),
-            };
-            let stride = estimate.grid.segments() / grid.segments();
-            let rod = |(j, rod): (usize, &Vec<RodFields>)| {
-                // Quaternions have the signs of the finest grid.
-                let mut q = finest.state.q[finest.state.base(j)];
-                let node = |node: &RodFields| {
-                    q = with_sign_of(node.q, q);
-                    let resultants = [node.n, node.m].map(|vector| q.inverse() * vector);
-                    (node.x, q.normalize(), resultants)
-                };
-                rod.iter().step_by(stride).map(node).collect()
-            };
-            let rods = estimate.rods.iter().enumerate().map(rod).collect();
-            (grid, rods, (integrated - error).max(0.0))
-        }
-        None if run.levels.len() > 1 && (every_node || few) => {
-            let (rods, between) = nodes::every_node(&run.levels, columns);
-            match error <= run.tolerance && error + between > run.tolerance {
-                true => on_coarsest(),
-                false => (
-                    finest.leaf.grid.clone(),
-                    rods.iter().map(unpacked).collect(),
-                    between,
-                ),
-            }
-        }
-        None => on_coarsest(),
-    };
-    let leaf = run.leaf;
-    let rod = |(j, rod): (usize, &Vec<_>)| {
-        let node = |(&(x, q, resultants), sigma): (&(DVec3, DQuat, [DVec3; 2]), &f64)| {
-            shape::node(leaf, (j, *sigma), (x, q), resultants)
-        };
-        RodShape {
-            length: leaf.length(j) * leaf.scale.length,
-            nodes: rod.iter().zip(grid.sigma()).map(node).collect(),
-        }
-    };
-    let rods = rods.iter().enumerate().map(rod).collect();
-    (grid.sigma().to_vec(), rods, between)
-}
-
 /// The reaction at a held tip, after `columns` extrapolations.
-fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
+fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     let leaf = &levels[0].leaf.leaf;
     let held = leaf.held.as_ref()?;
-    let on = |level: &Level| {
+    let on = |level: &&Level| {
         let (force, moments) = level.leaf.reaction(&level.state);
         let all = [force].into_iter().chain(moments);
         let values = all.flat_map(|it| it.to_array()).collect();

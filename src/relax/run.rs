@@ -58,9 +58,9 @@ pub struct Run<'a, 'o> {
     pub leaf: &'a Leaf,
     /// The full leaf, if `leaf` is half of it.
     pub whole: Option<&'a Leaf>,
-    /// The leaf solved for: `leaf`, or what a `completed` run reduced it to.
-    pub solved: &'a Leaf,
-    /// Whether to tell that it stays in its plane, as nothing acts out of it.
+    /// Rods solved for.
+    pub solved: usize,
+    /// Whether to tell that they stay in their plane, as nothing acts out of it.
     pub planar: bool,
     /// Displacements that would follow from neglecting shear, and stretch.
     pub effects: [Option<f64>; 2],
@@ -80,6 +80,8 @@ pub struct Run<'a, 'o> {
     pub linear: Option<Linear>,
     /// The linear system of the last grid, for reuse.
     pub spare_system: Option<System>,
+    /// Whether a grid was added for the nodes of the finest one.
+    pub added_for_nodes: bool,
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly_stable: bool,
@@ -111,7 +113,7 @@ impl<'a, 'o> Run<'a, 'o> {
         Run {
             leaf,
             whole: None,
-            solved: leaf,
+            solved: leaf.rods(),
             planar: false,
             effects: [None; 2],
             options,
@@ -125,6 +127,7 @@ impl<'a, 'o> Run<'a, 'o> {
             estimate: None,
             linear: None,
             spare_system: None,
+            added_for_nodes: false,
             index: None,
             clearly_stable: false,
             remaining: 0.0,

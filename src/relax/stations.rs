@@ -74,17 +74,18 @@ impl Equilibrium {
         };
         let mut between = 0.0_f64;
         let rods = self.shape.rods.iter().enumerate().map(|(j, rod)| {
-            let rotations: Vec<DQuat> = rod.nodes.iter().map(|node| node.rotation).collect();
-            let rotations = continuous(&rotations);
+            let known = NodalFields::new(rod);
             let mut differences = Differences::default();
             let nodes = places.iter().map(|place| {
                 if let Some(node) = place.node {
                     return rod.nodes[node];
                 }
                 if at_rest {
-                    differences.add(place, |weights| position(weights, rod));
+                    differences.add(place, |weights| {
+                        sum(weights, &known.positions, &known.tangents)
+                    });
                 }
-                at(place, at_rest, (rod, &rotations), &scenario.rods[j])
+                known.at(place, at_rest, &scenario.rods[j])
             });
             let nodes = nodes.collect();
             between = between.max(differences.error());
@@ -114,65 +115,77 @@ fn finest(shape: &Shape) -> Vec<f64> {
     stations
 }
 
-/// The sum of values and slopes at the nodes of a vein with these weights.
-fn sum(weights: &Slopes, vein: &RodShape, of: impl Fn(&NodeState) -> [DVec3; 2]) -> DVec3 {
-    let term = |&(i, value, slope): &(usize, f64, f64)| {
-        let [values, slopes] = of(&vein.nodes[i]);
-        value * values + slope * slopes
-    };
-    weights.iter().map(term).sum()
+/// The fields of a vein at its stations along the lab axes, with derivatives with respect to
+/// the fraction of the length.
+struct NodalFields {
+    positions: Vec<DVec3>,
+    tangents: Vec<DVec3>,
+    rotations: Vec<[f64; 4]>,
+    turns: Vec<[f64; 4]>,
+    forces: Vec<DVec3>,
+    moments: Vec<DVec3>,
+    torques: Vec<DVec3>,
 }
 
-/// The derivative of a node's position with respect to the fraction of the length.
-fn tangent(vein: &RodShape, node: &NodeState) -> DVec3 {
-    node.rotation * node.v * vein.length
-}
-
-fn position(weights: &Slopes, vein: &RodShape) -> DVec3 {
-    sum(weights, vein, |node| [node.position, tangent(vein, node)])
-}
-
-/// The state of a vein at a place, its strains by the constitutive law of the rod; `rotations` are
-/// those of its nodes, continuous in sign. Away from equilibrium the equations do not give the
-/// slopes.
-fn at(
-    place: &Place,
-    at_rest: bool,
-    (vein, rotations): (&RodShape, &[DQuat]),
-    rod: &Rod,
-) -> NodeState {
-    let lagrange = place.lagrange();
-    let hermite = match at_rest {
-        true => &place.hermite(0).0,
-        false => &lagrange,
-    };
-    let mut q = [0.0; 4];
-    for &(i, value, slope) in hermite {
-        let u = vein.nodes[i].u * (0.5 * vein.length);
-        let turn = (rotations[i] * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array();
-        for ((q, own), turn) in q.iter_mut().zip(rotations[i].to_array()).zip(turn) {
-            *q += value * own + slope * turn;
+impl NodalFields {
+    fn new(rod: &RodShape) -> Self {
+        let each = |of: &dyn Fn(&NodeState) -> DVec3| rod.nodes.iter().map(of).collect::<Vec<_>>();
+        let tangent = |node: &NodeState| node.rotation * node.v * rod.length;
+        let rotations: Vec<DQuat> = rod.nodes.iter().map(|node| node.rotation).collect();
+        let rotations = continuous(&rotations);
+        let turn = |(q, node): (&DQuat, &NodeState)| {
+            let u = node.u * (0.5 * rod.length);
+            (*q * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array()
+        };
+        NodalFields {
+            positions: each(&|node| node.position),
+            tangents: each(&tangent),
+            turns: rotations.iter().zip(&rod.nodes).map(turn).collect(),
+            rotations: rotations.iter().map(|q| q.to_array()).collect(),
+            forces: each(&|node| node.rotation * node.n),
+            moments: each(&|node| node.rotation * node.m),
+            // m' = -r' x n.
+            torques: each(&|node| (node.rotation * node.n).cross(tangent(node))),
         }
     }
-    let rotation = DQuat::from_array(q).normalize();
-    let to_directors = rotation.conjugate();
-    let force = |node: &NodeState| node.rotation * node.n;
-    let n = to_directors * sum(&lagrange, vein, |node| [force(node), DVec3::ZERO]);
-    let m = to_directors
-        * sum(hermite, vein, |node| {
-            // m' = -r' x n.
-            let slope = force(node).cross(tangent(vein, node));
-            [node.rotation * node.m, slope]
-        });
-    let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(place.at)));
-    NodeState {
-        position: position(hermite, vein),
-        rotation,
-        v: rod.rest_stretch.at(place.at) * DVec3::X + n / triple(&rod.force_stiffness),
-        u: triple(&rod.rest_curvature) + m / triple(&rod.couple_stiffness),
-        n,
-        m,
+
+    /// The state at a point, its strains by the constitutive law of the rod. Away from equilibrium
+    /// the equations do not give the slopes.
+    fn at(&self, place: &Place, at_rest: bool, rod: &Rod) -> NodeState {
+        let lagrange: Slopes = (place.lagrange().into_iter())
+            .map(|(i, weight)| (i, weight, 0.0))
+            .collect();
+        let hermite = match at_rest {
+            true => &place.hermite(),
+            false => &lagrange,
+        };
+        let mut q = [0.0; 4];
+        for &(i, value, slope) in hermite {
+            for (k, q) in q.iter_mut().enumerate() {
+                *q += value * self.rotations[i][k] + slope * self.turns[i][k];
+            }
+        }
+        let rotation = DQuat::from_array(q).normalize();
+        let to_directors = rotation.conjugate();
+        let n = to_directors * sum(&lagrange, &self.forces, &self.forces);
+        let m = to_directors * sum(hermite, &self.moments, &self.torques);
+        let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(place.at)));
+        NodeState {
+            position: sum(hermite, &self.positions, &self.tangents),
+            rotation,
+            v: rod.rest_stretch.at(place.at) * DVec3::X + n / triple(&rod.force_stiffness),
+            u: triple(&rod.rest_curvature) + m / triple(&rod.couple_stiffness),
+            n,
+            m,
+        }
     }
+}
+
+fn sum(weights: &Slopes, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
+    let terms = weights.iter();
+    terms
+        .map(|&(i, value, slope)| value * values[i] + slope * slopes[i])
+        .sum()
 }
 
 #[cfg(test)]
