@@ -51,6 +51,29 @@ fn a_column_is_straight_below_its_load_and_bent_above() {
     }
 }
 
+/// The index of the straight round column is 2 k between its k-th and its next load, (k - 1/2)^2
+/// pi^2, whatever modes are requested. Grids are stiffer: up to 1 % beyond the third load the
+/// three coarsest have the index before it.
+#[test]
+fn the_index_of_a_straight_column_that_is_kept_is_right_beside_every_load() {
+    for (k, of_euler) in [(1, 9.0), (2, 25.0), (3, 49.0)] {
+        for (beyond, index) in [(-1e-3, 2 * k), (1e-3, 2 * (k + 1))] {
+            for modes in [0, 3] {
+                let options = Options {
+                    modes,
+                    ..keeping(Options::default())
+                };
+                let scenario = column(EULER * of_euler * (1.0 + beyond), 1e3, 1.0);
+                let found = relaxed(&scenario, &options).stability;
+                let what = format!("load {k}, {beyond}, {modes} modes");
+                assert_eq!(found.negative_eigenvalues, Some(index), "{what}");
+                let listed = found.modes.map_or(0, |modes| modes.len());
+                assert_eq!(listed, modes, "{what}");
+            }
+        }
+    }
+}
+
 /// A column held at its tip, and the tip's travel at which it buckles: with P/EA = e the
 /// load of Euler is P (1 - e).
 fn held(how: &str, other: f64, beyond: f64) -> Scenario {

@@ -25,4 +25,4 @@ pub use mirror::{half_of, whole_fields, whole_of};
 pub use rate::{Forces, LeafRate, Response, at_constant_force};
 pub use sparse::{Bordered, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
-pub use system::{Solved, System};
+pub use system::{Solved, Sums, System};

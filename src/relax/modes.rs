@@ -80,6 +80,7 @@ pub struct Lowest {
 
 /// The lowest modes. `None` if they cannot be computed: the leaf is too large, unless they are
 /// `required`, or more modes are requested than a coarse grid has.
+/// Of more modes than the run's options request only the signs of the eigenvalues are needed.
 pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     let options = run.options;
     let finest = run.levels.last()?;
@@ -88,9 +89,11 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
         return None;
     }
     let physics = Physics::new(run.leaf);
-    let tolerance = match options.modes {
-        0 => SIGN_TOLERANCE,
-        _ => run.tolerance,
+    let requested = count <= options.modes;
+    let tolerance = if requested {
+        run.tolerance
+    } else {
+        SIGN_TOLERANCE
     };
     let on = |level: &Level, near: &[Vec<Increment>]| {
         let wanted = Wanted {
@@ -133,7 +136,7 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     }
     let (finest, pairs) = before?;
     let shapes = shapes(finest, &pairs);
-    if options.method.segments().is_none() && options.mode_shapes {
+    if requested && options.method.segments().is_none() && options.mode_shapes {
         refine(run, &mut series, pairs, on);
     }
     let unit = physics.time.powi(-2);

@@ -195,7 +195,10 @@ fn finished(
     let requested = run.options.modes;
     let count = match run.index {
         // A single grid allows no comparison.
-        Some(0) if !run.clearly_stable && run.segments().is_none() => requested.max(1),
+        _ if run.segments().is_some() => requested,
+        Some(0) if !run.clearly_stable => requested.max(1),
+        // Of a saddle one more than those that are negative on its grids.
+        Some(index @ 1..) => requested.max((index + 1).min(MOST_MODES)),
         _ => requested,
     };
     let result = |run: &Run, end: Result<bool, Stop>| {
@@ -233,7 +236,11 @@ fn finished(
     if undecided || negative > found.stability.negative_eigenvalues {
         found.decide(index_by_eigenvalues(&run, lowest.as_ref(), count));
     }
-    found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
+    let modes = match count > requested {
+        true => end.ok().and_then(|_| modes::lowest(&run, requested, false)),
+        false => lowest,
+    };
+    found.stability.modes = modes.map(|it| it.modes);
     (found, run.levels)
 }
 

@@ -11,9 +11,9 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{DiscreteLeaf, System};
+use crate::leaf::{DiscreteLeaf, State, Sums, System};
 use crate::newton::{
-    Equations, Newton, Stalled, Stop, at_saddle, cg_tolerance, converged, satisfies_lengths,
+    Equations, Newton, Stalled, Stop, Work, at_saddle, cg_tolerance, converged, satisfies_lengths,
 };
 use crate::relax::methods::Relaxation;
 use crate::relax::methods::damped_motion::Motion;
@@ -129,8 +129,7 @@ impl Relaxation<'_> {
         let mut motion = Motion::new(leaf);
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let mut stalled = Stalled::default();
-        let mut sums = leaf.assemble(&self.state, system);
-        self.work.force_evaluations += 1;
+        let mut sums = assembled(leaf, &self.state, system, self.work);
         for step in 0..MAX_STEPS {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 break;
@@ -167,15 +166,13 @@ impl Relaxation<'_> {
                 (self.progress)(step, size);
                 return Ok(remaining);
             }
-            let next = leaf.assemble(&trial, system);
-            self.work.force_evaluations += 1;
+            let next = assembled(leaf, &trial, system, self.work);
             (self.progress)(step, size);
             if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
                 if !motion.shorten() {
                     return Err(Stop::Stuck);
                 }
-                sums = leaf.assemble(&self.state, system);
-                self.work.force_evaluations += 1;
+                sums = assembled(leaf, &self.state, system, self.work);
                 continue;
             }
             if next.turn > RESOLVED_TURN {
@@ -204,7 +201,9 @@ impl Relaxation<'_> {
         Err(Stop::StepLimit)
     }
 
-    /// Solves for the next step with as long a time step as makes the matrix positive definite.
+    /// Factorises and solves for the next step, with as long a time step as makes the matrix
+    /// positive definite. A small shift keeps modes that are neutral up to rounding from
+    /// moving.
     fn solve_shortening(
         &mut self,
         leaf: &DiscreteLeaf,
@@ -212,7 +211,15 @@ impl Relaxation<'_> {
         motion: &mut Motion,
         tolerance: f64,
     ) -> Result<(), Stop> {
-        while !self.solve(leaf, system, motion, tolerance) {
+        loop {
+            let (shift, inertia) = match motion.inertia() {
+                Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
+                None => (leaf.neutral_shift(), None),
+            };
+            let (solver, work) = (&mut self.solver, &mut *self.work);
+            if solver.solve(system, shift, inertia, tolerance, work) {
+                return Ok(());
+            }
             if motion.resting {
                 return Err(Stop::Saddle);
             }
@@ -221,23 +228,11 @@ impl Relaxation<'_> {
                 return Err(Stop::Stuck);
             }
         }
-        Ok(())
     }
+}
 
-    /// Factorises and solves for the next time step of a motion; false if the matrix is not
-    /// positive definite. A small shift keeps modes that are neutral up to rounding from
-    /// moving.
-    fn solve(
-        &mut self,
-        leaf: &DiscreteLeaf,
-        system: &mut System,
-        motion: &Motion,
-        tolerance: f64,
-    ) -> bool {
-        let (shift, inertia) = match motion.inertia() {
-            Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
-            None => (leaf.neutral_shift(), None),
-        };
-        (self.solver).solve(system, shift, inertia, tolerance, self.work)
-    }
+/// Assembles the equations in a state.
+fn assembled(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> Sums {
+    work.force_evaluations += 1;
+    leaf.assemble(state, system)
 }
