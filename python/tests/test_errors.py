@@ -11,11 +11,6 @@ from leaves import fan, program
 import leafdyn
 
 TESTS = Path(__file__).parents[2] / "tests"
-TEXT = r'"((?:[^"\\]|\\.)*)"'
-
-
-def unescape(text: str) -> str:
-    return re.sub(r"\\\n\s*", "", text).replace('\\"', '"').replace("\\n", "\n").replace("\\\\", "\\")
 
 
 def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
@@ -23,10 +18,10 @@ def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
     source = (TESTS / "hostile_scenarios.rs").read_text()
     valid = (TESTS / "common" / "valid.rs").read_text().split('r#"', 1)[1].split('"#', 1)[0]
     rows = []
-    for table in re.findall(r"refused! \{ refused;\n(.*?)\n    \}", source, re.S):
-        for row in re.finditer(rf"{TEXT}\s*=>\s*((?:{TEXT}\s*,?\s*)+);", table):
-            parts = [unescape(part) for part in re.findall(TEXT, row.group(2))]
-            rows.append((unescape(row.group(1)), parts))
+    for table in re.findall(r'r#"([^#]*)"#;\s*all_refused\(table, refused\)', source):
+        for row in filter(str.strip, table.splitlines()):
+            line, said = (side.strip().replace("\\n", "\n") for side in row.split("=>", 1))
+            rows.append((line, said.split(" & ")))
     return valid, rows
 
 
