@@ -23,7 +23,7 @@ impl<const MOST: usize> Stencil<MOST> {
         let skipped = (centred as usize).min(points - count);
         let mut weights = [0.0; MOST];
         for (a, weight) in weights[..count].iter_mut().enumerate() {
-            *weight = lagrange(count, a, place - skipped as f64);
+            *weight = lagrange(count, a, place - skipped as f64).0;
         }
         Stencil {
             first: first + skipped,
@@ -62,8 +62,9 @@ impl<const MOST: usize> Stencil<MOST> {
         let place = (sigma - nodes[first]) / width;
         let (mut weights, mut slopes) = ([0.0; MOST], [0.0; MOST]);
         for (a, (weight, slope)) in weights.iter_mut().zip(&mut slopes).take(count).enumerate() {
-            *slope = lagrange_slope(count, a, place) / width;
-            *weight = lagrange(count, a, place) + beyond * *slope;
+            (*weight, *slope) = lagrange(count, a, place);
+            *slope /= width;
+            *weight += beyond * *slope;
         }
         [weights, slopes].map(|weights| Stencil {
             first,
@@ -73,24 +74,15 @@ impl<const MOST: usize> Stencil<MOST> {
     }
 }
 
-/// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
-/// the polynomial through all of them.
-fn lagrange(count: usize, a: usize, t: f64) -> f64 {
-    (0..count)
-        .filter(|&b| b != a)
-        .map(|b| (t - b as f64) / (a as f64 - b as f64))
-        .product()
-}
-
-/// Its derivative with `t`.
-fn lagrange_slope(count: usize, a: usize, t: f64) -> f64 {
-    let others = || (0..count).filter(|&b| b != a);
-    let without = |b: usize| {
-        let rest = others().filter(|&c| c != b);
-        let factors = rest.map(|c| (t - c as f64) / (a as f64 - c as f64));
-        factors.product::<f64>() / (a as f64 - b as f64)
-    };
-    others().map(without).sum()
+/// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of the
+/// polynomial through all of them, and its derivative with `t`.
+fn lagrange(count: usize, a: usize, t: f64) -> (f64, f64) {
+    let others = (0..count).filter(|&b| b != a);
+    others.fold((1.0, 0.0), |(weight, slope), b| {
+        let apart = a as f64 - b as f64;
+        let factor = (t - b as f64) / apart;
+        (weight * factor, slope * factor + weight / apart)
+    })
 }
 
 #[cfg(test)]
@@ -103,17 +95,19 @@ mod tests {
         for count in 2..=NODES {
             let t = 0.37 * count as f64;
             for degree in 0..count as i32 {
-                let sum = |weight: fn(usize, usize, f64) -> f64| -> f64 {
-                    let term = |a| weight(count, a, t) * (a as f64).powi(degree);
-                    (0..count).map(term).sum()
+                let term = |a: usize| {
+                    let (weight, slope) = lagrange(count, a, t);
+                    let value = (a as f64).powi(degree);
+                    (weight * value, slope * value)
                 };
+                let (weights, slopes): (Vec<f64>, Vec<f64>) = (0..count).map(term).unzip();
                 let slope = match degree {
                     0 => 0.0,
                     _ => f64::from(degree) * t.powi(degree - 1),
                 };
                 let size = (count as f64).powi(degree);
-                assert!((sum(lagrange) - t.powi(degree)).abs() < 1e-13 * size);
-                assert!((sum(lagrange_slope) - slope).abs() < 1e-12 * size);
+                assert!((weights.iter().sum::<f64>() - t.powi(degree)).abs() < 1e-13 * size);
+                assert!((slopes.iter().sum::<f64>() - slope).abs() < 1e-12 * size);
             }
         }
     }
