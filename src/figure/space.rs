@@ -32,6 +32,9 @@ impl Margins {
 /// Least distance between the ticks of an axis.
 const TICK_DISTANCE: f64 = 30.0;
 
+/// Least distance of a name from the right edge of the page.
+const PAGE_EDGE: f64 = 6.0;
+
 /// From the top of a vertical edge to its name.
 const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
@@ -260,14 +263,16 @@ impl<'s> Scene<'s> {
         for (edge, middle) in self.edges.iter().zip(middles) {
             let at = middle + label_offset(edge.out, distance);
             let name = self.setting.brief_axis(edge.axis, values);
-            // A long name extends away from its edge, or is placed on top of it.
+            // A long name extends away from its edge, on the page, or is placed on top of it.
+            let size = TEXT_SIZE + 1.0;
+            let most = page.width - Font::embedded().width(&name, size) - PAGE_EDGE;
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, Anchor::Middle),
                 0 => (at, Anchor::End),
-                1 => (at, Anchor::Start),
+                1 => (at.with_x(at.x.min(most)), Anchor::Start),
                 _ => (self.place(edge.to) + ABOVE, Anchor::End),
             };
-            page.centered_label(at, &name, TEXT_SIZE + 1.0, anchor, INK);
+            page.centered_label(at, &name, size, anchor, INK);
         }
         let taken = corners([self.low, self.high]).map(|corner| self.place(corner));
         let taken = taken.chain(middles);
