@@ -52,7 +52,7 @@ fn a_column_is_straight_below_its_load_and_bent_above() {
 }
 
 /// The index of the straight round column is 2 k between its k-th and its next load, (k - 1/2)^2
-/// pi^2, whatever modes are requested. Grids are stiffer: up to 1 % beyond the third load the
+/// pi^2, whatever modes are requested. Grids are stiffer: up to 0.8 % beyond the third load the
 /// three coarsest have the index before it.
 #[test]
 fn the_index_of_a_straight_column_that_is_kept_is_right_beside_every_load() {
