@@ -84,10 +84,10 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
 #[inline(always)]
 pub fn multiply_each<S: Simd>((a, aw): Quaternions<S>, (b, bw): Quaternions<S>) -> Quaternions<S> {
     let simd = aw.simd;
-    let (v, w) = (a.times(bw, b.scale(aw)) + a.cross(b), aw * bw - a.dot(b));
-    let length = w.times(w, v.dot(v));
+    let (v, w) = (a.mul_add(bw, b.scale(aw)) + a.cross(b), aw * bw - a.dot(b));
+    let length = w.mul_add(w, v.dot(v));
     let (half, three_halves) = (Lanes::splat(simd, 0.5), Lanes::splat(simd, 1.5));
-    let scale = length.times_from(half, three_halves);
+    let scale = length.neg_mul_add(half, three_halves);
     (v.scale(scale), w * scale)
 }
 
@@ -108,7 +108,7 @@ pub fn to_quaternion((v, w): Quaternions<Scalar>) -> DQuat {
 pub fn log(q: DQuat) -> DVec3 {
     let (w, cos) = from_quaternion(if q.w < 0.0 { -q } else { q });
     let off = cos - Lanes::from(1.0);
-    let [sigma, ..] = series(off.times(off, w.dot(w)));
+    let [sigma, ..] = series(off.mul_add(off, w.dot(w)));
     w.scale(sigma + sigma).into()
 }
 
@@ -124,22 +124,22 @@ pub fn directors<S: Simd>((s, sw): Quaternions<S>, scale: Lanes<S>) -> [Vectors<
     let one = Lanes::splat(scale.simd, 1.0);
     let r = s.scale(scale);
     let (xy, xz, yz) = (s.x * r.y, s.x * r.z, s.y * r.z);
-    let (not_x, not_z) = (s.x.times_from(r.x, one), s.z.times_from(r.z, one));
+    let (not_x, not_z) = (s.x.neg_mul_add(r.x, one), s.z.neg_mul_add(r.z, one));
     [
         Vectors::new(
-            s.y.times_from(r.y, not_z),
-            sw.times(r.z, xy),
-            sw.times_from(r.y, xz),
+            s.y.neg_mul_add(r.y, not_z),
+            sw.mul_add(r.z, xy),
+            sw.neg_mul_add(r.y, xz),
         ),
         Vectors::new(
-            sw.times_from(r.z, xy),
-            s.x.times_from(r.x, not_z),
-            sw.times(r.x, yz),
+            sw.neg_mul_add(r.z, xy),
+            s.x.neg_mul_add(r.x, not_z),
+            sw.mul_add(r.x, yz),
         ),
         Vectors::new(
-            sw.times(r.y, xz),
-            sw.times_from(r.x, yz),
-            s.y.times_from(r.y, not_x),
+            sw.mul_add(r.y, xz),
+            sw.neg_mul_add(r.x, yz),
+            s.y.neg_mul_add(r.y, not_x),
         ),
     ]
 }
@@ -159,8 +159,8 @@ pub fn series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
         });
         c = far.where_positive(delta - Lanes::splat(simd, NEAR), c);
     }
-    let b = c.times(delta, sixth);
-    [b.times(delta, one), b, c]
+    let b = c.mul_add(delta, sixth);
+    [b.mul_add(delta, one), b, c]
 }
 
 /// The rotation p = q0^* q1 between the two ends of a segment, as rotation vector psi, with
@@ -207,16 +207,16 @@ impl<S: Simd> Relative<S> {
         let [(a, aw), (b, bw)] = q;
         let simd = aw.simd;
         let (one, half) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.5));
-        let cos = aw.times(bw, a.dot(b));
+        let cos = aw.mul_add(bw, a.dot(b));
         let sign = one.where_positive(cos + Lanes::splat(simd, f64::MIN_POSITIVE), -one);
         let (b, bw) = (b.scale(sign), bw * sign);
         let (d, dw) = (b - a, bw - aw);
-        let delta = dw.times(dw, d.dot(d));
+        let delta = dw.mul_add(dw, d.dot(d));
         let [sigma, series_b, series_c] = series(delta);
         // 1/|s|^2 of the sum s of both.
         let inverse = (Lanes::splat(simd, 4.0) - delta).recip();
         let (twice, g) = (inverse + inverse, inverse * Lanes::splat(simd, 4.0));
-        let w = a.times_from(bw, b.scale(aw)) - a.cross(b);
+        let w = a.neg_mul_add(bw, b.scale(aw)) - a.cross(b);
         let half_g = g * half;
         let three = Lanes::splat(simd, 3.0);
         let relative = Relative {
@@ -227,8 +227,8 @@ impl<S: Simd> Relative<S> {
             k: -(series_b * g),
             second: [
                 -((half + series_b) * half_g),
-                sigma.times(half, -series_b) * half_g,
-                series_c.times(three, -series_b) * half_g * half_g,
+                sigma.mul_add(half, -series_b) * half_g,
+                series_c.mul_add(three, -series_b) * half_g * half_g,
             ],
         };
         (relative, directors((a + b, aw + bw), twice))
@@ -237,7 +237,7 @@ impl<S: Simd> Relative<S> {
     /// S a.
     #[inline(always)]
     pub fn derivative(&self, a: Vectors<S>) -> Vectors<S> {
-        self.w.times(self.k * self.w.dot(a), a.scale(self.sigma))
+        self.w.mul_add(self.k * self.w.dot(a), a.scale(self.sigma))
     }
 
     /// S diag(a) S plus the second derivatives of m . psi' with respect to delta (without the
@@ -253,8 +253,8 @@ impl<S: Simd> Relative<S> {
         let half = Lanes::splat(k.simd, 0.5);
         let (aw, along) = (a * w, w.dot(m));
         let v = aw.scale(self.sigma * k);
-        let v = w.times((half * k * k).times(w.dot(aw), c3 * along), v);
-        let v = m.times(c2, v);
+        let v = w.mul_add((half * k * k).mul_add(w.dot(aw), c3 * along), v);
+        let v = m.mul_add(c2, v);
         (a.scale(self.sigma * self.sigma), twice_c1 * along, v)
     }
 }

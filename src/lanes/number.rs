@@ -162,13 +162,13 @@ impl<S: Simd> Lanes<S> {
 
     /// self * factor + term.
     #[inline(always)]
-    pub fn times(self, factor: Self, term: Self) -> Self {
+    pub fn mul_add(self, factor: Self, term: Self) -> Self {
         self.with(self.simd.mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
     /// term - self * factor.
     #[inline(always)]
-    pub fn times_from(self, factor: Self, term: Self) -> Self {
+    pub fn neg_mul_add(self, factor: Self, term: Self) -> Self {
         self.with(self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
@@ -244,7 +244,7 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     fn pair<const N: usize>(self, terms: &mut [Self; N], count: usize) -> usize {
         for k in 0..count / 2 {
-            terms[k] = terms[2 * k + 1].times(self, terms[2 * k]);
+            terms[k] = terms[2 * k + 1].mul_add(self, terms[2 * k]);
         }
         if count % 2 == 1 {
             terms[count / 2] = terms[count - 1];

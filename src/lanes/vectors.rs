@@ -3,7 +3,7 @@
 use crate::lanes::number::{Four, GROUP, Lanes};
 use glam::DVec3;
 use pulp::{Scalar, Simd};
-use std::ops::{Add, Deref, Mul, Neg, Sub};
+use std::ops::{Add, Deref, Div, Mul, Neg, Sub};
 
 /// A vector for each of several neighbouring nodes, or rods.
 #[derive(Clone, Copy, Debug)]
@@ -52,16 +52,16 @@ impl<S: Simd> Vectors<S> {
     #[inline(always)]
     pub fn dot(self, other: Self) -> Lanes<S> {
         let zz = self.z * other.z;
-        self.x.times(other.x, self.y.times(other.y, zz))
+        self.x.mul_add(other.x, self.y.mul_add(other.y, zz))
     }
 
     /// Vector product.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         Vectors::new(
-            self.z.times_from(other.y, self.y * other.z),
-            self.x.times_from(other.z, self.z * other.x),
-            self.y.times_from(other.x, self.x * other.y),
+            self.z.neg_mul_add(other.y, self.y * other.z),
+            self.x.neg_mul_add(other.z, self.z * other.x),
+            self.y.neg_mul_add(other.x, self.x * other.y),
         )
     }
 
@@ -73,11 +73,11 @@ impl<S: Simd> Vectors<S> {
 
     /// term - self * factor.
     #[inline(always)]
-    pub fn times_from(self, factor: Lanes<S>, term: Self) -> Self {
+    pub fn neg_mul_add(self, factor: Lanes<S>, term: Self) -> Self {
         Vectors::new(
-            self.x.times_from(factor, term.x),
-            self.y.times_from(factor, term.y),
-            self.z.times_from(factor, term.z),
+            self.x.neg_mul_add(factor, term.x),
+            self.y.neg_mul_add(factor, term.y),
+            self.z.neg_mul_add(factor, term.z),
         )
     }
 
@@ -85,9 +85,9 @@ impl<S: Simd> Vectors<S> {
     #[inline(always)]
     pub fn less_cross(self, a: Self, b: Self) -> Self {
         Vectors::new(
-            a.y.times_from(b.z, a.z.times(b.y, self.x)),
-            a.z.times_from(b.x, a.x.times(b.z, self.y)),
-            a.x.times_from(b.y, a.y.times(b.x, self.z)),
+            a.y.neg_mul_add(b.z, a.z.mul_add(b.y, self.x)),
+            a.z.neg_mul_add(b.x, a.x.mul_add(b.z, self.y)),
+            a.x.neg_mul_add(b.y, a.y.mul_add(b.x, self.z)),
         )
     }
 
@@ -95,19 +95,13 @@ impl<S: Simd> Vectors<S> {
     #[inline(always)]
     pub fn along(self, directors: [Self; 3]) -> Self {
         let [d1, d2, d3] = directors;
-        d1.times(self.x, d2.times(self.y, d3.scale(self.z)))
+        d1.mul_add(self.x, d2.mul_add(self.y, d3.scale(self.z)))
     }
 
     /// Its components.
     #[inline(always)]
     pub fn array(self) -> [Lanes<S>; 3] {
         [self.x, self.y, self.z]
-    }
-
-    /// Component by component.
-    #[inline(always)]
-    pub fn over(self, other: Self) -> Self {
-        Vectors::new(self.x / other.x, self.y / other.y, self.z / other.z)
     }
 
     /// The components along `directors`.
@@ -130,11 +124,11 @@ impl<S: Simd> Vectors<S> {
 
     /// self * factor + term.
     #[inline(always)]
-    pub fn times(self, factor: Lanes<S>, term: Self) -> Self {
+    pub fn mul_add(self, factor: Lanes<S>, term: Self) -> Self {
         Vectors::new(
-            self.x.times(factor, term.x),
-            self.y.times(factor, term.y),
-            self.z.times(factor, term.z),
+            self.x.mul_add(factor, term.x),
+            self.y.mul_add(factor, term.y),
+            self.z.mul_add(factor, term.z),
         )
     }
 }
@@ -159,6 +153,7 @@ vectors_operator!(Add, add);
 vectors_operator!(Sub, sub);
 // Component by component.
 vectors_operator!(Mul, mul);
+vectors_operator!(Div, div);
 
 impl<S: Simd> Neg for Vectors<S> {
     type Output = Self;

@@ -217,13 +217,13 @@ impl Kernel for Combine<'_> {
                 if *weight != 0.0 {
                     let weight = Lanes::splat(simd, *weight);
                     for (sum, slope) in sums.iter_mut().zip(&slopes[g]) {
-                        *sum = Lanes::of(simd, slope, part).times(weight, *sum);
+                        *sum = Lanes::of(simd, slope, part).mul_add(weight, *sum);
                     }
                 }
             }
             for ((out, sum), field) in out.iter_mut().zip(&mut sums).zip(&self.fields[g]) {
                 let field = Lanes::of(simd, field, part);
-                *sum = sum.times(h, field);
+                *sum = sum.mul_add(h, field);
                 sum.put(out, part);
             }
             for (x, sum) in self.out.x.iter_mut().zip(sums) {

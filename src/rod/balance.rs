@@ -92,7 +92,7 @@ impl<S: Simd> Fields<S> {
         let law = |k: usize| Lanes::of(w.simd, &laws[k], part);
         let laws = |k: usize| Vectors::new(law(k), law(k + 1), law(k + 2));
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
-        let frame = directors(self.q, two / w.times(w, q.dot(q)));
+        let frame = directors(self.q, two / w.mul_add(w, q.dot(q)));
         let (n, m) = (self.n.onto(frame), self.m.onto(frame));
         let (length, strain, bend) = (law(0), laws(7) * n, laws(10) * m);
         let (v, u) = (laws(1) + strain, laws(4) + bend);

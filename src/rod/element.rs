@@ -79,7 +79,7 @@ impl<S: Simd> Element<S> {
             m: sections.couple_stiffness * (u - sections.rest_curvature),
             nu,
             w,
-            gap: w.times_from(sections.ds, dx),
+            gap: w.neg_mul_add(sections.ds, dx),
             relative,
         }
     }
@@ -95,8 +95,8 @@ impl<S: Simd> Element<S> {
     #[inline(always)]
     pub fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S> {
         let strain = self.w - sections.rest_strain;
-        let gamma = self.gap.times(sections.per_ds, strain);
-        let stretch = (gamma * gamma).over(sections.compliance);
+        let gamma = self.gap.mul_add(sections.per_ds, strain);
+        let stretch = gamma * gamma / sections.compliance;
         let bending = self.m.dot(self.u - sections.rest_curvature);
         let half = Lanes::splat(bending.simd, 0.5);
         half * sections.ds * (stretch.x + stretch.y + stretch.z + bending)
@@ -114,7 +114,7 @@ impl<S: Simd> Element<S> {
         let correction = sections.condensing * self.gap;
         let g_mu = self.nu.cross(self.w).scale(sections.ds);
         let g_mu = g_mu - self.law_rate_transposed(sections, correction);
-        let nu = correction.times(sections.per_ds, self.nu);
+        let nu = correction.mul_add(sections.per_ds, self.nu);
         self.pull_back(nu, g_mu, self.m)
     }
 
@@ -157,21 +157,21 @@ impl<S: Simd> Element<S> {
         let (nu, w, c, k) = (self.nu, self.w, sections.compliance, sections.condensing);
         let zero = Lanes::splat(k.x.simd, 0.0);
         let half = Lanes::splat(k.x.simd, 0.5);
-        let (d01, d02) = (nu.z.times_from(c.x, w.z), nu.y.times(c.x, -w.y));
-        let (d10, d12) = (nu.z.times(c.y, -w.z), nu.x.times_from(c.y, w.x));
-        let (d20, d21) = (nu.y.times_from(c.z, w.y), nu.x.times(c.z, -w.x));
+        let (d01, d02) = (nu.z.neg_mul_add(c.x, w.z), nu.y.mul_add(c.x, -w.y));
+        let (d10, d12) = (nu.z.mul_add(c.y, -w.z), nu.x.neg_mul_add(c.y, w.x));
+        let (d20, d21) = (nu.y.neg_mul_add(c.z, w.y), nu.x.mul_add(c.z, -w.x));
         let (k01, k02, k10) = (k.x * d01, k.x * d02, k.y * d10);
         let (k12, k20, k21) = (k.y * d12, k.z * d20, k.z * d21);
         let (w_nu, squares) = (w.dot(nu), nu * nu);
-        let xx = d10.times(k10, d20 * k20) - w.x * nu.x;
-        let yy = d01.times(k01, d21 * k21) - w.y * nu.y;
-        let zz = d02.times(k02, d12 * k12) - w.z * nu.z;
-        let xx = w_nu + xx - c.y.times(squares.z, c.z * squares.y);
-        let yy = w_nu + yy - c.x.times(squares.z, c.z * squares.x);
-        let zz = w_nu + zz - c.x.times(squares.y, c.y * squares.x);
-        let xy = c.z.times(nu.x * nu.y, d20 * k21) - half * w.x.times(nu.y, w.y * nu.x);
-        let xz = c.y.times(nu.x * nu.z, d10 * k12) - half * w.x.times(nu.z, w.z * nu.x);
-        let yz = c.x.times(nu.y * nu.z, d01 * k02) - half * w.y.times(nu.z, w.z * nu.y);
+        let xx = d10.mul_add(k10, d20 * k20) - w.x * nu.x;
+        let yy = d01.mul_add(k01, d21 * k21) - w.y * nu.y;
+        let zz = d02.mul_add(k02, d12 * k12) - w.z * nu.z;
+        let xx = w_nu + xx - c.y.mul_add(squares.z, c.z * squares.y);
+        let yy = w_nu + yy - c.x.mul_add(squares.z, c.z * squares.x);
+        let zz = w_nu + zz - c.x.mul_add(squares.y, c.y * squares.x);
+        let xy = c.z.mul_add(nu.x * nu.y, d20 * k21) - half * w.x.mul_add(nu.y, w.y * nu.x);
+        let xz = c.y.mul_add(nu.x * nu.z, d10 * k12) - half * w.x.mul_add(nu.z, w.z * nu.x);
+        let yz = c.x.mul_add(nu.y * nu.z, d01 * k02) - half * w.y.mul_add(nu.z, w.z * nu.y);
         [
             [
                 Vectors::new(zero, k10, k20),
@@ -236,9 +236,9 @@ impl<S: Simd> Element<S> {
         // P [tau], and [tau] P [tau].
         let q = [p[0].cross(tau), p[1].cross(tau), p[2].cross(tau)];
         let q_tau = [
-            q[1].times_from(tau.z, q[2].scale(tau.y)),
-            q[2].times_from(tau.x, q[0].scale(tau.z)),
-            q[0].times_from(tau.y, q[1].scale(tau.x)),
+            q[1].neg_mul_add(tau.z, q[2].scale(tau.y)),
+            q[2].neg_mul_add(tau.x, q[0].scale(tau.z)),
+            q[0].neg_mul_add(tau.y, q[1].scale(tau.x)),
         ];
         let none = Vectors::splat(simd, [0.0; 3]);
         let unit = |r: usize, value: Lanes<S>| {
@@ -256,14 +256,14 @@ impl<S: Simd> Element<S> {
         let (tau_rows, w_rows, y_rows) = (tau.array(), w.array(), y.array());
         let [mut eta_delta, mut xa, mut xb, mut aa, mut ab, mut bb] = [[none; 3]; 6];
         for r in 0..3 {
-            let row = q[r].times_from(half, across[r]);
-            eta_delta[r] = tau.times(g[r], row) - unit(r, tau_g);
+            let row = q[r].neg_mul_add(half, across[r]);
+            eta_delta[r] = tau.mul_add(g[r], row) - unit(r, tau_g);
         }
         let delta_eta = transposed(eta_delta);
         for r in 0..3 {
-            let row = q_tau[r].times_from(quarter, diagonal[r] + unit(r, multiple));
-            let row = tau.times(y_rows[r], y.times(tau_rows[r], row));
-            let delta_delta = w.times(v_rows[r], v.times(w_rows[r], row));
+            let row = q_tau[r].neg_mul_add(quarter, diagonal[r] + unit(r, multiple));
+            let row = tau.mul_add(y_rows[r], y.mul_add(tau_rows[r], row));
+            let delta_delta = w.mul_add(v_rows[r], v.mul_add(w_rows[r], row));
             let eta_eta = p[r].scale(quarter);
             let symmetric = (eta_delta[r] + delta_eta[r]).scale(half);
             let skew = (eta_delta[r] - delta_eta[r]).scale(half);
@@ -333,7 +333,7 @@ impl<S: Simd> Element<S> {
         let [alpha, beta] = [turns[0].onto(self.frame), turns[1].onto(self.frame)];
         let mu = (alpha + beta + (beta - alpha).cross(self.relative.tau)).scale(half);
         let d_mu = sections.compliance * self.nu.cross(mu) - self.w.cross(mu);
-        let gap = d_mu.times_from(sections.ds, dx.onto(self.frame) + self.gap);
+        let gap = d_mu.neg_mul_add(sections.ds, dx.onto(self.frame) + self.gap);
         let change = sections.condensing * gap.scale(sections.per_ds);
         change.along(self.frame)
     }

@@ -145,7 +145,7 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
                 if r >= TURNS {
                     let c = r - TURNS;
                     force[r] = force[r] + load[c];
-                    own[r][r] = stiffness[c].times(coupling_weight, own[r][r]);
+                    own[r][r] = stiffness[c].mul_add(coupling_weight, own[r][r]);
                 }
             }
         }
@@ -230,8 +230,8 @@ impl Kernel for Advance<'_> {
             let (element, sections) = rods.element(simd, i, part);
             let turns = [turn, turn_after];
             let change = element.force_increment(&sections, shift_after - shift, turns);
-            let n = change.times(step, gather(simd, rods.n, i, part));
-            let x = shift_after.times(step, gather(simd, rods.x, i + 1, part));
+            let n = change.mul_add(step, gather(simd, rods.n, i, part));
+            let x = shift_after.mul_add(step, gather(simd, rods.x, i + 1, part));
             let turned = exp_each(turn_after.scale(step));
             let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
             let mut numbers = [Four::default(); 10];

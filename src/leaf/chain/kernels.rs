@@ -35,7 +35,7 @@ impl Kernel for Factorize<'_> {
                 }
             }
             for k in 0..UNKNOWNS {
-                a[k][k] = masses[k / TURNS].times(weight, a[k][k]);
+                a[k][k] = masses[k / TURNS].mul_add(weight, a[k][k]);
             }
             // Rows above the diagonal become L^T, the diagonal 1/d.
             let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
@@ -49,7 +49,7 @@ impl Kernel for Factorize<'_> {
                     for r in k + 1..UNKNOWNS {
                         let l = row[r] * inverse;
                         for c in r..UNKNOWNS {
-                            a[r][c] = l.times_from(row[c], a[r][c]);
+                            a[r][c] = l.neg_mul_add(row[c], a[r][c]);
                         }
                         a[k][r] = l;
                     }
@@ -92,7 +92,7 @@ fn substitute<S: Simd>(
         let row = w[k];
         for r in k + 1..UNKNOWNS {
             for c in 0..UNKNOWNS {
-                w[r][c] = a[k][r].times_from(row[c], w[r][c]);
+                w[r][c] = a[k][r].neg_mul_add(row[c], w[r][c]);
             }
         }
         for c in 0..UNKNOWNS {
@@ -103,7 +103,7 @@ fn substitute<S: Simd>(
         for r in 0..UNKNOWNS {
             let t = w[k][r] * a[k][k];
             for c in r..UNKNOWNS {
-                schur[r][c] = t.times(w[k][c], schur[r][c]);
+                schur[r][c] = t.mul_add(w[k][c], schur[r][c]);
             }
         }
     }
@@ -132,7 +132,7 @@ impl Kernel for Forward<'_> {
                 for k in 0..UNKNOWNS {
                     for c in 0..UNKNOWNS {
                         let w = Lanes::of(simd, &w[off(k, c)], part);
-                        y[c] = before[k].times_from(w, y[c]);
+                        y[c] = before[k].neg_mul_add(w, y[c]);
                     }
                 }
             }
@@ -142,7 +142,7 @@ impl Kernel for Forward<'_> {
                 if k < count {
                     for r in k + 1..UNKNOWNS {
                         let l = Lanes::of(simd, &own[upper(k, r)], part);
-                        y[r] = y[k].times_from(l, y[r]);
+                        y[r] = y[k].neg_mul_add(l, y[r]);
                     }
                 }
             }
@@ -177,7 +177,7 @@ impl Kernel for Backward<'_> {
                 for k in 0..UNKNOWNS {
                     for c in 0..UNKNOWNS {
                         let w = Lanes::of(simd, &own[off(k, c)], part);
-                        y[k] = after[c].times_from(w, y[k]);
+                        y[k] = after[c].neg_mul_add(w, y[k]);
                     }
                 }
             }
@@ -187,13 +187,13 @@ impl Kernel for Backward<'_> {
                     y[k] = y[k] * Lanes::of(simd, &own[upper(k, k)], part);
                     for r in k + 1..UNKNOWNS {
                         let l = Lanes::of(simd, &own[upper(k, r)], part);
-                        y[k] = y[r].times_from(l, y[k]);
+                        y[k] = y[r].neg_mul_add(l, y[k]);
                     }
                 }
             }
             for k in 0..UNKNOWNS {
                 let b = Lanes::of(simd, &self.b[i][k], part);
-                product = b.times(y[k], product);
+                product = b.mul_add(y[k], product);
                 y[k].put(&mut self.y[i][k], part);
             }
             after = y;

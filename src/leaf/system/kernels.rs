@@ -35,7 +35,7 @@ impl Coupled<'_> {
         let behind = Four([own[1], own[2], own[3], last]);
         let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &before, part);
         let behind = Lanes::of(simd, &behind, part);
-        let pull = behind.times(Lanes::of(simd, &coupling[1][c], part), pull);
+        let pull = behind.mul_add(Lanes::of(simd, &coupling[1][c], part), pull);
         Lanes::splat(simd, -self.weights[i]) * pull
     }
 
@@ -71,7 +71,7 @@ impl Kernel for Product<'_> {
         for (i, p) in p.iter().enumerate() {
             for c in 0..6 {
                 let k_p = self.coupled.product(simd, self.group, (i, c), part);
-                sum = k_p.times(Lanes::of(simd, &p[c], part), sum);
+                sum = k_p.mul_add(Lanes::of(simd, &p[c], part), sum);
             }
         }
         sum.put(&mut self.product, part);
@@ -96,9 +96,9 @@ impl Kernel for Advance<'_> {
                 let solution = &mut self.group.solution[i][c];
                 let residual = &mut self.group.residual[i][c];
                 let p = Lanes::of(simd, &p[i][c], part);
-                p.times(alpha, Lanes::of(simd, solution, part))
+                p.mul_add(alpha, Lanes::of(simd, solution, part))
                     .put(solution, part);
-                k_p.times_from(alpha, Lanes::of(simd, residual, part))
+                k_p.neg_mul_add(alpha, Lanes::of(simd, residual, part))
                     .put(residual, part);
             }
         }
@@ -126,7 +126,7 @@ impl Kernel for Direction<'_> {
                     (&mut b_p[i][c], &residual[i][c]),
                 ] {
                     let new = Lanes::of(simd, new, part);
-                    Lanes::of(simd, old, part).times(beta, new).put(old, part);
+                    Lanes::of(simd, old, part).mul_add(beta, new).put(old, part);
                 }
             }
         }

@@ -74,21 +74,21 @@ impl Step<'_> {
         while at + S::F64_LANES <= nodes {
             let weight = Lanes::load(simd, weight, at);
             let force = Vectors::load(simd, &n_right, at) - Vectors::load(simd, &n_left, at);
-            let mut force = gravity.times(weight, force);
+            let mut force = gravity.mul_add(weight, force);
             let x = Vectors::load(simd, &x, at);
             if COUPLED {
                 let pull = (Vectors::load(simd, &before, at) - x) * to_before;
-                force = pull.times(Lanes::load(simd, coupled[0], at), force);
+                force = pull.mul_add(Lanes::load(simd, coupled[0], at), force);
                 let pull = (Vectors::load(simd, &after, at) - x) * to_after;
-                force = pull.times(Lanes::load(simd, coupled[1], at), force);
+                force = pull.mul_add(Lanes::load(simd, coupled[1], at), force);
             }
             let per_mass = Lanes::load(simd, per_mass, at);
             let old = Vectors::load(simd, &v, at);
-            let new = force.times(kick * per_mass, old.scale(keep));
+            let new = force.mul_add(kick * per_mass, old.scale(keep));
             new.store(&mut v, at);
-            new.times(step, x).store(&mut next, at);
+            new.mul_add(step, x).store(&mut next, at);
             let twice = old + new;
-            energy = (twice.dot(twice)).times(Lanes::load(simd, mass, at), energy);
+            energy = (twice.dot(twice)).mul_add(Lanes::load(simd, mass, at), energy);
             at += S::F64_LANES;
         }
         energy
@@ -127,21 +127,21 @@ impl Step<'_> {
         while at + S::F64_LANES <= nodes {
             let moment = Vectors::load(simd, &left, at) + Vectors::load(simd, &right, at);
             let before = Vectors::load(simd, &p, at);
-            let after = moment.times(half_kick, before.scale(keep));
+            let after = moment.mul_add(half_kick, before.scale(keep));
             after.store(&mut p, at);
             let (r, w) = quaternion(simd, &q, at);
             let (y, z) = (r.y + r.y, r.z + r.z);
             let d1 = Vectors::new(
-                r.y.times_from(y, r.z.times_from(z, one)),
-                r.x.times(y, w * z),
-                w.times_from(y, r.x * z),
+                r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
+                r.x.mul_add(y, w * z),
+                w.neg_mul_add(y, r.x * z),
             );
             let per_inertia = Lanes::load(simd, per_inertia, at);
             let per_spin = Lanes::load(simd, per_spin, at);
             let twice = before + after;
             let spin = d1.dot(twice);
-            energy = (twice.dot(twice)).times(per_inertia, energy);
-            energy = (spin * spin).times(per_spin, energy);
+            energy = (twice.dot(twice)).mul_add(per_inertia, energy);
+            energy = (spin * spin).mul_add(per_spin, energy);
 
             // Half angle about the body's own axis d1.
             let b = d1.dot(after) * (half_step * per_spin);
@@ -149,23 +149,23 @@ impl Step<'_> {
             let (mut c, mut s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
             if NORMALISE {
                 // Newton's iteration for the length, which is nearly one.
-                let scale = half.times_from(r.dot(r) + w * w, three_halves);
+                let scale = half.neg_mul_add(r.dot(r) + w * w, three_halves);
                 (c, s) = (c * scale, s * scale);
             }
             // q <- q (s, 0, 0, c)
             let spun = Vectors::new(
-                r.x.times(c, w * s),
-                r.y.times(c, r.z * s),
-                r.y.times_from(s, r.z * c),
+                r.x.mul_add(c, w * s),
+                r.y.mul_add(c, r.z * s),
+                r.y.neg_mul_add(s, r.z * c),
             );
-            let spun_w = r.x.times_from(s, w * c);
+            let spun_w = r.x.neg_mul_add(s, w * c);
             // Half angle about the angular momentum.
             let a = after.scale(half_step * per_inertia);
             let squared = a.dot(a);
             let (c, s) = (squared.polynomial(&COS), squared.polynomial(&SINC));
             let a = a.scale(s);
             // q <- (a, c) q
-            let turned = a.times(spun_w, spun.scale(c)) + a.cross(spun);
+            let turned = a.mul_add(spun_w, spun.scale(c)) + a.cross(spun);
             turned.x.store(q[0], at);
             turned.y.store(q[1], at);
             turned.z.store(q[2], at);

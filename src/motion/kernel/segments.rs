@@ -46,7 +46,7 @@ fn rate<S: Simd>(
         last.store(two, at);
         now.store(one, at);
     }
-    before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
+    before.mul_add(rates[2], last.mul_add(rates[1], now.scale(rates[0])))
 }
 
 /// The nodes of a block.
@@ -194,14 +194,14 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         let (a, aw) = quaternion(simd, &q0, at);
         let (b, bw) = quaternion(simd, &q1, at);
         let (d, dw) = (b - a, bw - aw);
-        let delta = d.x.times(d.x, d.y * d.y) + d.z.times(d.z, dw * dw);
+        let delta = d.x.mul_add(d.x, d.y * d.y) + d.z.mul_add(d.z, dw * dw);
         let inverse = (four - delta).max(least).recip();
         let twice = inverse + inverse;
-        let (even, odd) = (a.times_from(bw, b.scale(aw)), a.cross(b));
+        let (even, odd) = (a.neg_mul_add(bw, b.scale(aw)), a.cross(b));
         // Along the directors in the middle, and along the lab axes.
         let (w, w_lab) = (even - odd, even + odd);
         let series = series(delta);
-        let two_sigma = series.times(delta + delta, two);
+        let two_sigma = series.mul_add(delta + delta, two);
         // The moment A (2 sigma w - u0) = A2 2 sigma w + extra.
         let bend = Lanes::load(simd, bend, at);
         let load = |arrays: &[&[f64]; 3]| Vectors::load(simd, arrays, at);
@@ -211,26 +211,26 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         if CHANGES {
             extra = extra.scale(rest);
         }
-        extra.x = (excess_1 * two_sigma).times(w.x, extra.x);
+        extra.x = (excess_1 * two_sigma).mul_add(w.x, extra.x);
         if !ROUND {
-            extra.z = (excess_3 * two_sigma).times(w.z, extra.z);
+            extra.z = (excess_3 * two_sigma).mul_add(w.z, extra.z);
         }
         if CHANGES {
-            sums.rest = sums.rest + load(&rest_turn).dot(w.times(stiff, extra));
+            sums.rest = sums.rest + load(&rest_turn).dot(w.mul_add(stiff, extra));
         }
         if let Some((_, (one, two))) = &mut past {
             let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
             let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
-            extra = friction.times(retardation, extra);
+            extra = friction.mul_add(retardation, extra);
         }
         let along_extra = match ROUND {
             true => extra.x * w.x,
             false => extra.dot(w),
         };
         // |w|^2 = sin^2(psi/2).
-        let squared = (delta * delta).times_from(quarter, delta);
-        let along = stiff.times(squared, along_extra);
+        let squared = (delta * delta).neg_mul_add(quarter, delta);
+        let along = stiff.mul_add(squared, along_extra);
         let four_inverse = twice + twice;
         let c = series * (four_inverse + four_inverse) * along;
         let mut m = w_lab.scale(two_sigma * stiff - c);
@@ -243,8 +243,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         let directors = directors((a + b, aw + bw), twice);
         let n = if ROUND {
             let [d1, ..] = directors;
-            m = d1.times(two_sigma * extra.x, m);
-            d1.times(excess_1 * d1.dot(dx) - rest_force, dx.scale(shear))
+            m = d1.mul_add(two_sigma * extra.x, m);
+            d1.mul_add(excess_1 * d1.dot(dx) - rest_force, dx.scale(shear))
         } else {
             m = m + extra.scale(two_sigma).along(directors);
             let v = dx.onto(directors);
@@ -257,7 +257,7 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
                 let rate = rate((one, two), (v, at), rates, law.remember);
                 let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
-                extra = friction.times(retardation, extra);
+                extra = friction.mul_add(retardation, extra);
             }
             extra.along(directors) + dx.scale(shear)
         };
