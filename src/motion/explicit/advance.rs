@@ -1,11 +1,11 @@
 //! Motion to a given time, snapshots, and saved states.
 
 use super::Explicit;
+use super::kernel::Forces;
+use super::packs::{Pack, vector};
 use crate::leaf::State;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::kernel::Forces;
 use crate::motion::method::{Method, Snapshot, Stopped, Velocity, pass_count};
-use crate::motion::nodes::{Pack, vector};
 use glam::DVec3;
 
 /// Part of a step below which differences of time are rounding.

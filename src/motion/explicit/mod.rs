@@ -18,21 +18,26 @@
 //! which the motion returns. The path does not depend on the times asked for.
 
 mod advance;
+mod fictitious;
+mod kernel;
+mod packs;
+mod stable;
 #[cfg(test)]
 mod tests;
 mod work;
 
+pub use stable::StableStep;
+
 use super::energy_balance::{EnergyBalance, Exchange};
-use super::fictitious;
 use super::friction::rates;
-use super::kernel::{self, Array, Block, Law, Layout, Step};
 use super::method::Method;
-use super::nodes::{self, Pack, vector};
 use super::physics::Physics;
-use super::stable::StableStep;
+use crate::lanes::widest_arch;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
 use glam::{DQuat, DVec3};
+use kernel::{Array, Block, Law, Layout, Step};
+use packs::{Pack, vector};
 use pulp::Arch;
 use rayon::prelude::*;
 use work::VaryingWork;
@@ -103,11 +108,11 @@ impl Explicit {
         let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
         let tip_mass = |j| physics.inertia(&leaf, j, last).mass;
         let tip_weight = |j| leaf.grid.weight(last) * leaf.leaf.length(j);
-        let layout = nodes::layout(&leaf);
-        let positions = nodes::positions(&leaf, state, layout);
+        let layout = packs::layout(&leaf);
+        let positions = packs::positions(&leaf, state, layout);
         let mut explicit = Explicit {
-            arch: kernel::widest_arch(),
-            packs: nodes::packs(&leaf, &physics, state, layout),
+            arch: widest_arch(),
+            packs: packs::at_rest(&leaf, &physics, state, layout),
             next: positions.clone(),
             positions,
             layout,

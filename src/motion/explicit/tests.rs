@@ -100,7 +100,7 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
     // Of many segments, differences of larger forces are left.
     let rounding = 1e-14 * n.max(100) as f64;
     let allowed = rounding * largest.fold(0.0, f64::max);
-    for arch in [kernel::widest_arch(), lanes::arch(), Arch::Scalar] {
+    for arch in [widest_arch(), lanes::arch(), Arch::Scalar] {
         let mut explicit = explicit(leaf.clone(), &state);
         explicit.arch = arch;
         explicit.set_damping(0.0);

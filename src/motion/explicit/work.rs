@@ -5,8 +5,8 @@
 //! the excess over the loads at time 0 is counted, which have a potential.
 
 use super::Explicit;
+use super::packs::vector;
 use crate::leaf::{DiscreteLeaf, Loads};
-use crate::motion::nodes::vector;
 use crate::motion::physics::Physics;
 use glam::DVec3;
 

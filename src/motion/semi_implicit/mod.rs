@@ -16,11 +16,9 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
-mod closing;
 mod curves;
 mod exchange;
 mod initial;
-mod lag;
 mod step;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};

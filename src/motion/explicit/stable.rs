@@ -7,7 +7,7 @@
 //! 9.2). The shares are arbitrary; here they are in proportion to the stiffness with which
 //! each segment holds the node, so that a short or stiff segment has most of a mass
 //! that it alone moves fast. With the rate of internal friction from three
-//! strains (see [`super::friction::rates`]) a mode with the part K of its squared frequency
+//! strains (see [`crate::motion::friction::rates`]) a mode with the part K of its squared frequency
 //! from strains and C from coupling satisfies
 //!
 //! ```text
@@ -17,8 +17,8 @@
 //! with roots inside the unit circle while a + 4 b < 4; external damping
 //! does not change that.
 
-use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
+use crate::motion::physics::Physics;
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;
 use std::array::from_fn;

@@ -8,9 +8,9 @@
 //! Methods for Transient Analysis, 1983).
 
 use super::kernel::{Layout, Node};
-use super::nodes::{Pack, materials, node_data};
-use super::physics::Physics;
+use super::packs::{Pack, materials, node_data};
 use crate::leaf::DiscreteLeaf;
+use crate::motion::physics::Physics;
 
 /// Part of the squared frequency 4 of a segment that is due to the rotations of its
 /// ends, the rest being due to their translations. Slow motions are mostly translations:

@@ -1,9 +1,9 @@
 //! Conversion of the leaf to the arrays of the explicit method, and back.
 
 use super::kernel::{Array, Layout, Material, Motion, Node, Past, StepTotals, blocks};
-use super::method::Velocity;
-use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
+use crate::motion::method::Velocity;
+use crate::motion::physics::Physics;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ pub fn positions(leaf: &DiscreteLeaf, state: &State, layout: Layout) -> [Array; 
 }
 
 /// The packs of a leaf at rest.
-pub fn packs(leaf: &DiscreteLeaf, physics: &Physics, state: &State, layout: Layout) -> Vec<Pack> {
+pub fn at_rest(leaf: &DiscreteLeaf, physics: &Physics, state: &State, layout: Layout) -> Vec<Pack> {
     let node = |j, i| node_data(leaf, physics, j, i);
     let materials = materials(layout, node).into_iter().enumerate();
     let packs = materials.map(|(p, material)| {
