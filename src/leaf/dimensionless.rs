@@ -92,7 +92,7 @@ impl Leaf {
     /// The same in given units, so that leaves that differ in length or stiffness are
     /// comparable.
     pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
-        let profiles = scenario.rods.iter().flat_map(law);
+        let profiles = scenario.rods.iter().flat_map(Rod::profiles);
         // The profiles of the masses only matter for motions.
         let Dynamics {
             density,
@@ -205,7 +205,11 @@ impl Leaf {
     /// Whether sections are the same all along each rod.
     pub fn uniform(&self) -> bool {
         let constant = |profile: &Profile| matches!(profile, Profile::Constant(_));
-        self.scenario.rods.iter().flat_map(law).all(constant)
+        self.scenario
+            .rods
+            .iter()
+            .flat_map(Rod::profiles)
+            .all(constant)
     }
 
     /// Section of rod `j` at `sigma`, for a segment that is the fraction
@@ -236,14 +240,4 @@ impl Leaf {
     fn rod(&self, j: usize) -> &Rod {
         &self.scenario.rods[j]
     }
-}
-
-/// All profiles in the constitutive law of a rod.
-fn law(rod: &Rod) -> impl Iterator<Item = &Profile> {
-    let triples = [
-        &rod.couple_stiffness,
-        &rod.force_stiffness,
-        &rod.rest_curvature,
-    ];
-    triples.into_iter().flatten().chain([&rod.rest_stretch])
 }

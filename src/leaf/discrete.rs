@@ -26,8 +26,6 @@ pub struct DiscreteLeaf {
     /// Coupling of each gap, per unit of sigma; the last may be the one between
     /// a rod and its image.
     coupling: Vec<DVec3>,
-    /// Trapezoidal weights of the nodes as fractions of the length.
-    weights: Vec<f64>,
     /// Part of the loads that acts: one, except during continuation in the loads.
     pub load_factor: f64,
     /// The loads.
@@ -44,13 +42,11 @@ impl DiscreteLeaf {
             .collect();
         let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
-        let weights = (0..=n).map(|i| grid.weight(i)).collect();
         DiscreteLeaf {
             leaf: leaf.clone(),
             grid,
             sections,
             coupling,
-            weights,
             load_factor: 1.0,
             loads: leaf.loads,
         }
@@ -205,16 +201,11 @@ impl DiscreteLeaf {
         (force, moments)
     }
 
-    /// Trapezoidal weight of node `i` as a fraction of the length.
-    pub(super) fn weight(&self, i: usize) -> f64 {
-        self.weights[i]
-    }
-
     /// Weight of node `i` in the masses: zero at a held tip, which does not move.
     pub(super) fn moving_weight(&self, i: usize) -> f64 {
         match self.leaf.held {
             Some(_) if i == self.segments() => 0.0,
-            _ => self.weights[i],
+            _ => self.grid.weight(i),
         }
     }
 
@@ -238,7 +229,7 @@ impl DiscreteLeaf {
     pub(super) fn coupling_weight(&self, i: usize) -> f64 {
         match self.leaf.joined() && i == self.segments() {
             true => 0.0,
-            false => self.weights[i],
+            false => self.grid.weight(i),
         }
     }
 
@@ -282,7 +273,7 @@ impl DiscreteLeaf {
             x(!last, k + nodes),
         ];
         let load = RodLoads::of(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
-        let weights = [self.weights[i], self.coupling_weight(i)];
+        let weights = [self.grid.weight(i), self.coupling_weight(i)];
         let (force, energy) = load.at(x.map(Vectors::from), weights, i == self.segments());
         (force.into(), energy.into())
     }

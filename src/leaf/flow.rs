@@ -1,6 +1,7 @@
 //! Integration of the equilibrium equations along the rods of a leaf, by the explicit
 //! Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
 
+use super::chain::lanes_of;
 use super::discrete::DiscreteLeaf;
 use super::loads::{GroupLoads, RodLoads, group_loads};
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, arch, run};
@@ -79,7 +80,7 @@ impl<'a> Flow<'a> {
             leaf,
             arch: arch(),
             loads: (0..groups)
-                .map(|group| group_loads(rods_of(group, leaf.rods()).map(load)))
+                .map(|group| group_loads(lanes_of(group, leaf.rods()).map(load)))
                 .collect(),
             stage: Stage {
                 fields: fields.clone(),
@@ -104,7 +105,7 @@ impl<'a> Flow<'a> {
     ) {
         let rods = self.leaf.rods();
         for (g, group) in self.fields.iter_mut().enumerate() {
-            for (lane, j) in rods_of(g, rods).into_iter().enumerate() {
+            for (lane, j) in lanes_of(g, rods).into_iter().enumerate() {
                 let RodFields { x, q, n, m } = begin(j);
                 let vectors = [(0, x), (3, DVec3::new(q.x, q.y, q.z)), (7, n), (10, m)];
                 for (first, vector) in vectors {
@@ -163,18 +164,12 @@ impl<'a> Flow<'a> {
     fn look_up_laws(&mut self, sigma: f64) {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
-            let sections = rods_of(g, rods).map(|j| leaf.section(j, sigma, 1.0));
+            let sections = lanes_of(g, rods).map(|j| leaf.section(j, sigma, 1.0));
             laws(sections.each_ref())
         };
         self.laws.clear();
         self.laws.extend((0..rods.div_ceil(GROUP)).map(group));
     }
-}
-
-/// The rods of a group; lanes without a rod repeat the last.
-#[inline(always)]
-fn rods_of(group: usize, rods: usize) -> [usize; GROUP] {
-    std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
 }
 
 struct Slopes<'a> {

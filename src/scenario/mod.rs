@@ -133,7 +133,7 @@ pub struct Rod {
 }
 
 impl Rod {
-    /// All its profiles.
+    /// All profiles in its constitutive law.
     pub(crate) fn profiles(&self) -> impl Iterator<Item = &Profile> {
         let triples = [
             &self.couple_stiffness,

@@ -1,7 +1,7 @@
 //! The loops over the segments of a group of rods.
 
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors};
-use crate::leaf::chain::{Increments, TURNS};
+use crate::leaf::chain::{Increments, TURNS, lanes_of};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
 use crate::leaf::state::State;
@@ -27,7 +27,7 @@ pub struct Rods<'a> {
 impl<'a> Rods<'a> {
     pub fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
         let (n, last) = (leaf.segments(), leaf.rods() - 1);
-        let rods: [usize; GROUP] = std::array::from_fn(|lane| (GROUP * group + lane).min(last));
+        let rods = lanes_of(group, leaf.rods());
         let x = |j: usize| &state.x[state.base(j)..][..=n];
         Rods {
             leaf,
@@ -129,7 +129,10 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
                 own = hessian.own[1];
             }
             let tip = i + 1 == n;
-            let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
+            let weights = [
+                rods.leaf.grid.weight(i + 1),
+                rods.leaf.coupling_weight(i + 1),
+            ];
             let [before, behind] = rods.beside;
             let x = [
                 gather(simd, before, i + 1, part),

@@ -229,3 +229,9 @@ impl TipFactor {
 pub fn group_and_lane(j: usize) -> (usize, usize) {
     (j / GROUP, j % GROUP)
 }
+
+/// The rods of a group, lane by lane; lanes without a rod repeat the last.
+#[inline(always)]
+pub fn lanes_of(group: usize, rods: usize) -> [usize; GROUP] {
+    std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
+}

@@ -19,26 +19,17 @@ impl HeldRate {
     /// `None` if the tips are free, or their holder does not move.
     pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
         let held = leaf.held.as_ref()?;
-        let first = terms[0].1.held_tip.as_ref()?;
         let of = |value: &dyn Fn(&Scenario) -> f64| change(terms, value);
         let axis =
             |axis: usize| of(&|s| s.held_tip.as_ref().map_or(0.0, |held| held.position[axis]));
         let shift = DVec3::from_array([0, 1, 2].map(axis)) / leaf.scale.length;
-        let clamp = |s: &Scenario, j: usize| -> Clamp {
-            let held = s.held_tip.as_ref().or(Some(first));
-            let clamps = held.and_then(|held| held.clamps.as_ref());
-            clamps.map_or(
-                Clamp {
-                    angle: 0.0,
-                    twist: 0.0,
-                },
-                |clamps| clamps[j],
-            )
-        };
+        let clamp = |s: &Scenario, j: usize| Some(s.held_tip.as_ref()?.clamps.as_ref()?[j]);
         // The angle about e3, then the twist about the resulting d1, as in the clamp's definition.
         let turn = |(j, own): (usize, &Clamp)| {
             let d1 = DQuat::from_rotation_z(own.angle) * DVec3::X;
-            of(&|s| clamp(s, j).angle) * DVec3::Z + of(&|s| clamp(s, j).twist) * d1
+            let angle = of(&|s| clamp(s, j).map_or(0.0, |clamp| clamp.angle));
+            let twist = of(&|s| clamp(s, j).map_or(0.0, |clamp| clamp.twist));
+            angle * DVec3::Z + twist * d1
         };
         let clamps = held.clamps.iter().flatten().enumerate();
         let turns: Vec<DVec3> = clamps.map(turn).collect();

@@ -52,6 +52,9 @@ pub(crate) struct Group {
     residual: Vec<Increments>,
     z: Vec<Increments>,
     b_p: Vec<Increments>,
+    /// Whether the last factorisation succeeded.
+    definite: bool,
+    /// Its part of a scalar product.
     partial: f64,
 }
 
@@ -174,8 +177,7 @@ impl System {
     }
 
     /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a rotary and a
-    /// translational part on its diagonal, to the right-hand side a moment and a force. Used
-    /// for the inertia in a time step.
+    /// translational part on its diagonal, to the right-hand side a moment and a force.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let (group, lane) = group_and_lane(j);
         let group = &mut self.groups[group];
@@ -378,6 +380,7 @@ impl Group {
             residual: zeros.clone(),
             z: zeros.clone(),
             b_p: zeros,
+            definite: false,
             partial: 0.0,
         }
     }

@@ -46,10 +46,9 @@ impl System {
                 per_weight: group.masses,
                 weights,
             };
-            let definite = group.matrix.factorize(arch, &masses, any_sign);
-            group.partial = if definite { 1.0 } else { -1.0 };
+            group.definite = group.matrix.factorize(arch, &masses, any_sign);
         });
-        if self.groups.iter().any(|group| group.partial < 0.0) {
+        if !self.groups.iter().all(|group| group.definite) {
             return false;
         }
         if !self.joined {
