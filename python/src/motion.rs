@@ -183,7 +183,7 @@ impl Motion {
 
     #[getter]
     fn method(&self) -> &'static str {
-        self.state().simulation.scheme().name()
+        self.state().simulation.scheme().word()
     }
 
     /// The summary and the pictures of the outputs that were kept.

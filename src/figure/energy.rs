@@ -18,7 +18,7 @@ const KEY: f64 = 200.0;
 pub fn notes(record: &Record) -> Vec<String> {
     let mut notes = vec![
         format!("N = {}", record.rods),
-        format!("{} method", record.scheme.name()),
+        format!("{} method", record.scheme),
         format!("{} segments a vein", record.segments),
     ];
     if record.stopped.is_some() {

@@ -21,7 +21,11 @@ pub(super) struct Item<'e> {
 impl Entries {
     /// The value of a key, if it is given.
     pub(super) fn given(&self, key: Key) -> Option<Item<'_>> {
-        self.is_given(key).then(|| self.item(key).ok())?
+        if self.is_given(key) {
+            self.item(key).ok()
+        } else {
+            None
+        }
     }
 
     /// The value of a key as given, or its default.

@@ -51,16 +51,13 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
         ))
     };
     let sections: Vec<_> = (0..rods).map(section).collect();
-    check(entries, &sections)?;
+    check(entries, entries.item(sides[1])?, &sections)?;
     Ok(Some(sections))
 }
 
 /// Refuses stiffnesses and masses that are too large or too small, and flat sections of
 /// auxetic materials, for which Cowper's formula has no meaning.
-fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
-    let Some(item) = size(entries) else {
-        return Ok(());
-    };
+fn check(entries: &Entries, size: Item, sections: &[Arc<Section>]) -> Result<()> {
     for (rod, section) in sections.iter().enumerate() {
         entries.item(Key::Poisson)?.entry(rod).ensure(
             section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
@@ -78,7 +75,7 @@ fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
     for property in stiffness.chain(masses) {
         for (rod, profile) in profiles(sections, property).into_iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
-                item.entry(rod).ensure(
+                size.entry(rod).ensure(
                     MAGNITUDES.contains(&value),
                     format_args!(
                         "gives a stiffness or mass of {value:.3e}, which must lie between \

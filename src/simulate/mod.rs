@@ -57,13 +57,6 @@ words! {
     }
 }
 
-impl Scheme {
-    /// The name used on the command line and in `summary.json`.
-    pub fn name(self) -> &'static str {
-        self.word()
-    }
-}
-
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -116,7 +109,7 @@ impl Simulation {
                 start(&DiscreteLeaf::new(&leaf, grid.clone()))
             }
             // Held tips are moved to their positions by the relaxation.
-            Start::Released | Start::AtRest => at_rest(&leaf, &physics, &grid, tolerance)?,
+            Start::Released | Start::AtRest => at_rest(&leaf, &grid, tolerance)?,
         };
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let rigid = discrete.stiffest() == 0.0;
@@ -343,7 +336,7 @@ fn explicit(
 }
 
 /// The equilibrium under the loads and with the rest shape at time 0.
-fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
+fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
         method: relax::Method::default().on_grid(Some(grid.segments())),
@@ -351,7 +344,7 @@ fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Resul
         ..relax::Options::default()
     };
     let found = relax::relax(&scenario, &options, &mut |_| {})?;
-    if !found.outcome.is_success() || !physics.clamped() {
+    if !found.outcome.is_success() {
         return Err(Refused::NoRest {
             outcome: found.outcome.word(),
         });

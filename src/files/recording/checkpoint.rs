@@ -58,7 +58,7 @@ impl Identity {
             scenario: scenario.name.clone(),
             // As text, floating-point numbers keep every digit.
             content: Checksum::of(format_args!("{scenario:?}")).to_string(),
-            method: simulation.scheme().name().into(),
+            method: simulation.scheme().word().into(),
             segments: simulation.segments(),
             step: simulation.longest_step().map(digits),
             tolerance: digits(simulation.tolerance()),
