@@ -90,7 +90,7 @@ impl Dynamics {
         Dynamics::of_density(rods, vec![Profile::Constant(density); rods.len()])
     }
 
-    /// The same under constant loads.
+    /// This motion under constant loads.
     pub fn with_loads(
         self,
         gravity: [f64; 3],

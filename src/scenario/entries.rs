@@ -93,7 +93,7 @@ impl Entries {
         Ok(())
     }
 
-    /// The same with entries or parts of them replaced, as in
+    /// These entries with some of them, or parts of them, replaced, as in
     /// [`Scenario::from_toml_with`](super::Scenario::from_toml_with).
     ///
     /// # Errors
@@ -278,7 +278,7 @@ impl Entries {
 fn left_out(key: Key) -> Option<&'static Value> {
     static VALUES: LazyLock<Vec<Option<Value>>> = LazyLock::new(|| {
         let value = |key: Key| match key.left_out() {
-            LeftOut::Means(text) => parse(text).ok().map(|value| value_of(&value)),
+            LeftOut::Default(text) => parse(text).ok().map(|value| value_of(&value)),
             _ => None,
         };
         Key::all().map(value).collect()

@@ -1,14 +1,32 @@
-//! The value of a key, or a part of it, with its place for messages.
+//! The value of a key, or a part of it, with its place for messages: converted to numbers, for
+//! every form that a key can have.
 
 use std::fmt::Display;
+use std::str::FromStr;
 
 use toml::Value;
 
-use super::entries::Entries;
+use super::entries::{Entries, number};
 use super::error::{Result, ScenarioError};
 use super::excerpt::shorten;
-use super::key::{Form, Key, LeftOut};
+use super::key::{Form, Key, LeftOut, Range};
 use super::part::Part;
+use super::{Profile, Schedule};
+
+/// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
+/// stiffnesses must not overflow.
+pub(super) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
+const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
+     shear_2 and shear_3 only, not in a profile";
+const LIST_OF_NUMBERS: &str = "a list of numbers";
+const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+const ONE_PER_KNOT: &str = "one per entry of at";
+const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const PROFILE_IS: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const LOAD_IN_TIME: &str =
+    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
 
 /// The value of a key, or a part of it.
 #[derive(Clone, Copy)]
@@ -45,7 +63,7 @@ impl Entries {
         let has = |table: &str| self.source.tables.contains(&table);
         let (table, name) = key.parts();
         let example = match key.left_out() {
-            LeftOut::Refused(example) => example,
+            LeftOut::Required(example) => example,
             _ => "...",
         };
         let entry = format!("a line such as `{name} = {example}`");
@@ -61,7 +79,7 @@ impl Entries {
             _ => false,
         };
         let others = Key::all().filter(|other| *other != key && !self.is_given(*other));
-        let others = others.filter(|other| matches!(other.left_out(), LeftOut::Refused(_)));
+        let others = others.filter(|other| matches!(other.left_out(), LeftOut::Required(_)));
         let others: Vec<&str> = others.filter(needed).map(Key::path).collect();
         let also = match others.is_empty() {
             true => String::new(),
@@ -159,5 +177,198 @@ impl<'e> Item<'e> {
             key: Some(self.key()),
             problem: format!("{path}{part} = {found}: {problem}"),
         }
+    }
+
+    pub(super) fn text(&self) -> Result<&'e str> {
+        (self.value.as_str()).ok_or_else(|| self.refuse("must be text in quotes"))
+    }
+
+    /// One of the words that `allowed` names.
+    pub(super) fn word<T: FromStr>(&self, allowed: &str) -> Result<T> {
+        let word = self.value.as_str().and_then(|word| word.parse().ok());
+        word.ok_or_else(|| self.refuse(allowed))
+    }
+
+    pub(super) fn switch(&self) -> Result<bool> {
+        (self.value.as_bool()).ok_or_else(|| self.refuse("must be true or false"))
+    }
+
+    /// A whole number from 1 to `most`.
+    pub(super) fn whole(&self, most: usize) -> Result<usize> {
+        let whole = self.value.as_integer();
+        let whole = whole.and_then(|whole| usize::try_from(whole).ok());
+        let whole = whole.filter(|whole| (1..=most).contains(whole));
+        whole.ok_or_else(|| {
+            self.refuse(format_args!(
+                "must be a whole number from 1 to {most}, without a decimal point"
+            ))
+        })
+    }
+
+    /// A number in the range of its key.
+    pub(super) fn number(&self) -> Result<f64> {
+        self.number_in(self.key().form().range())
+    }
+
+    fn number_in(&self, range: Range) -> Result<f64> {
+        let value = number(self.value);
+        let value = value.ok_or_else(|| self.refuse("must be a number"))?;
+        let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
+        let problem = match value {
+            _ if value.is_nan() && !self.shown().contains("nan") => {
+                "is not a number a computer can hold (the largest is 1.8e308)"
+            }
+            _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
+            _ if positive && value <= 0.0 => "must be greater than 0",
+            f64::INFINITY if range == Range::PositiveOrInfinite => return Ok(value),
+            f64::INFINITY if positive => INFINITE,
+            f64::INFINITY => "must be a finite number",
+            _ if positive && !MAGNITUDES.contains(&value) => {
+                "must lie between 1e-50 and 1e50: choose other units"
+            }
+            _ if range == Range::NotNegative && value < 0.0 => "must not be negative",
+            _ => return Ok(value),
+        };
+        Err(self.refuse(problem))
+    }
+
+    /// Three numbers.
+    pub(super) fn vector(&self) -> Result<[f64; 3]> {
+        let needed = "a list of three numbers [x, y, z]";
+        let mut vector = [0.0; 3];
+        let components = self.list_of(3, "one per axis x, y, z", needed)?;
+        for (component, item) in vector.iter_mut().zip(components) {
+            *component = item.number_in(Range::Finite)?;
+        }
+        Ok(vector)
+    }
+
+    /// A number for each of `count` rods or gaps: one for all, or a list.
+    pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
+        if number(self.value).is_some() {
+            return Ok(vec![self.number()?; count]);
+        }
+        let (each, counted) = match self.key().form() {
+            Form::PerGap(_) => ("gap between neighbouring rods", "leaf.rods - 1"),
+            _ => ("rod", "leaf.rods"),
+        };
+        let because = format!("one per {each} ({counted})");
+        let needed = match self.key().form() {
+            Form::Quantity(_) => format!("a number, a list of {count} (one per rod), or {PROFILE}"),
+            _ => format!("a number or a list of {count} (one per {each})"),
+        };
+        let list = self.list_of(count, &because, &needed)?;
+        list.map(|item| item.number()).collect()
+    }
+
+    /// A profile for each of `rods` rods.
+    pub(super) fn quantity(&self, rods: usize) -> Result<Vec<Profile>> {
+        if !self.value.is_table() {
+            let numbers = self.one_each(rods)?;
+            return Ok(numbers.into_iter().map(Profile::Constant).collect());
+        }
+        let [at, value] = self.pair("value", PROFILE_IS)?;
+        let at = at.increasing(true)?;
+        let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
+        let mut list = value.array(&needed)?;
+        if (list.next()).is_none_or(|first| !first.value.is_array()) {
+            return Ok(vec![value.linear(&at)?; rods]);
+        }
+        let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
+        lists.map(|list| list.linear(&at)).collect()
+    }
+
+    /// A profile that has these values at the knots `at`.
+    fn linear(&self, at: &[f64]) -> Result<Profile> {
+        // Infinity cannot be interpolated between knots.
+        let range = match self.key().form().range() {
+            Range::PositiveOrInfinite => Range::Positive,
+            range => range,
+        };
+        let values = self.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let value = values
+            .map(|item| item.number_in(range))
+            .collect::<Result<_>>()?;
+        let at = at.to_vec();
+        Ok(Profile::Linear { at, value })
+    }
+
+    /// A load in time.
+    pub(super) fn vectors_in_time(&self) -> Result<Schedule<[f64; 3]>> {
+        let [at, value] = self.pair("value", LOAD_IN_TIME)?;
+        let at = at.increasing(false)?;
+        let needed = "a list of lists of three numbers [x, y, z]";
+        let value = value.list_of(at.len(), ONE_PER_KNOT, needed)?;
+        let value = value.map(|item| item.vector()).collect::<Result<_>>()?;
+        Ok(Schedule { at, value })
+    }
+
+    /// A factor in time.
+    pub(super) fn factors_in_time(&self) -> Result<Schedule<f64>> {
+        let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
+        let at = at.increasing(false)?;
+        let value = factor.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let value = value.map(|item| item.number()).collect::<Result<_>>()?;
+        Ok(Schedule { at, value })
+    }
+
+    /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
+    fn increasing(&self, fractions: bool) -> Result<Vec<f64>> {
+        let (what, least, too_few) = match fractions {
+            true => (
+                "knots",
+                2,
+                "at least two knots are needed, the first at 0 and the last at 1",
+            ),
+            false => ("times", 1, "at least one time is needed"),
+        };
+        let list = self.array(LIST_OF_NUMBERS)?;
+        let count = list.len();
+        self.ensure(count >= least, too_few)?;
+        let mut at: Vec<f64> = Vec::with_capacity(count);
+        for item in list {
+            let next = item.number_in(Range::Finite)?;
+            let starts = !fractions || !at.is_empty() || next == 0.0;
+            item.ensure(starts, "must start at 0 (the base)")?;
+            if let Some(before) = at.last() {
+                item.ensure(
+                    next > *before,
+                    format_args!(
+                        "must be greater than the entry before it, {before}: \
+                         {what} rise strictly (write a step as a steep ramp)"
+                    ),
+                )?;
+            }
+            at.push(next);
+            let ends = !fractions || at.len() < count || next == 1.0;
+            item.ensure(ends, "must end at 1 (the tip)")?;
+        }
+        Ok(at)
+    }
+
+    /// The entries of a list; `needed` describes it in the error if it is not one.
+    fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+        let Some(list) = self.value.as_array() else {
+            return Err(self.refuse(format_args!("must be {needed}")));
+        };
+        let whole = *self;
+        Ok((0..list.len()).map(move |index| whole.entry(index)))
+    }
+
+    /// The entries of a list that must have `count` of them, `because` of what; `needed`
+    /// describes the list in the error if it is not one.
+    fn list_of(
+        &self,
+        count: usize,
+        because: &str,
+        needed: &str,
+    ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+        let list = self.array(needed)?;
+        let found = list.len();
+        self.ensure(
+            found == count,
+            format_args!("has {found} entries: must have {count}, {because}"),
+        )?;
+        Ok(list)
     }
 }

@@ -1,7 +1,7 @@
 //! The table of the keys that a scenario may have, one row per key.
 //!
-//! A new key needs a row here, a field of the checked scenario, and a line in `check`
-//! that reads it.
+//! A new key needs a row here, a field of the checked scenario, a line in `check` that reads
+//! it, and one in `json` that writes it.
 
 use super::excerpt::shorten;
 use Form::*;
@@ -19,7 +19,7 @@ pub(crate) enum Form {
     Number(Range),
     /// A number for all rods, or a list with one for each.
     PerRod(Range),
-    /// The same, or a profile along the rods.
+    /// A number for all rods, a list with one for each, or a profile along the rods.
     Quantity(Range),
     /// A number for all gaps between neighbouring rods, or a list.
     PerGap(Range),
@@ -46,11 +46,11 @@ pub(crate) enum Range {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LeftOut {
     /// It is required; the message gives this example of a value.
-    Refused(&'static str),
+    Required(&'static str),
     /// This default value.
-    Means(&'static str),
+    Default(&'static str),
     /// A value that follows from others, or none.
-    Follows,
+    Derived,
 }
 
 impl Form {
@@ -95,101 +95,101 @@ macro_rules! keys {
 
 keys! {
     /// the leaf's name.
-    Name "name": Text, [0, 0, 0], Refused("\"my-leaf\"");
+    Name "name": Text, [0, 0, 0], Required("\"my-leaf\"");
     /// name of the unit of length.
-    UnitLength "units.length": Text, [0, 0, 0], Follows;
+    UnitLength "units.length": Text, [0, 0, 0], Derived;
     /// name of the unit of force.
-    UnitForce "units.force": Text, [0, 0, 0], Follows;
+    UnitForce "units.force": Text, [0, 0, 0], Derived;
     /// number of rods.
-    Rods "leaf.rods": Whole, [0, 0, 0], Refused("5");
+    Rods "leaf.rods": Whole, [0, 0, 0], Required("5");
     /// lengths L of the rods.
-    Length "leaf.length": PerRod(Positive), [1, 0, 0], Refused("1.0");
+    Length "leaf.length": PerRod(Positive), [1, 0, 0], Required("1.0");
     /// angles of the rods at the base, in radians.
-    Fan "leaf.fan": Fan, [0, 0, 0], Refused("\"symmetric\"");
+    Fan "leaf.fan": Fan, [0, 0, 0], Required("\"symmetric\"");
     /// whether the tips share one point.
-    Joined "leaf.joined": Switch, [0, 0, 0], Means("true");
+    Joined "leaf.joined": Switch, [0, 0, 0], Default("true");
     /// A1, against torsion.
-    Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// A2, against bending about d2: up and down, out of the leaf's surface.
-    Bending2 "stiffness.bending_2": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    Bending2 "stiffness.bending_2": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// A3, against bending about d3: sideways, within the leaf's surface.
-    Bending3 "stiffness.bending_3": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    Bending3 "stiffness.bending_3": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// H1, against stretch; `inf`: inextensible.
-    Axial "stiffness.axial": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    Axial "stiffness.axial": Quantity(PositiveOrInfinite), [0, 1, 0], Required("100.0");
     /// H2, against shear along d2; `inf`: unshearable.
-    Shear2 "stiffness.shear_2": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    Shear2 "stiffness.shear_2": Quantity(PositiveOrInfinite), [0, 1, 0], Required("100.0");
     /// H3, against shear along d3; `inf`: unshearable.
-    Shear3 "stiffness.shear_3": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    Shear3 "stiffness.shear_3": Quantity(PositiveOrInfinite), [0, 1, 0], Required("100.0");
     /// form of the rods' section, from which their stiffnesses follow.
-    SectionShape "section.shape": Text, [0, 0, 0], Refused("\"circle\"");
+    SectionShape "section.shape": Text, [0, 0, 0], Required("\"circle\"");
     /// diameter of a circle.
-    Diameter "section.diameter": Quantity(Positive), [1, 0, 0], Refused("0.1");
+    Diameter "section.diameter": Quantity(Positive), [1, 0, 0], Required("0.1");
     /// width of an ellipse or a rectangle, along d2.
-    Width "section.width": Quantity(Positive), [1, 0, 0], Refused("0.4");
+    Width "section.width": Quantity(Positive), [1, 0, 0], Required("0.4");
     /// thickness of an ellipse or a rectangle, along d3.
-    Thickness "section.thickness": Quantity(Positive), [1, 0, 0], Refused("0.1");
+    Thickness "section.thickness": Quantity(Positive), [1, 0, 0], Required("0.1");
     /// E, Young's modulus.
-    Young "section.young": Quantity(Positive), [-2, 1, 0], Refused("0.3");
+    Young "section.young": Quantity(Positive), [-2, 1, 0], Required("0.3");
     /// nu, Poisson's ratio.
-    Poisson "section.poisson": Quantity(Finite), [0, 0, 0], Means("0.3");
+    Poisson "section.poisson": Quantity(Finite), [0, 0, 0], Default("0.3");
     /// mass per volume.
-    MassDensity "section.mass_density": Quantity(Positive), [-4, 1, 2], Follows;
+    MassDensity "section.mass_density": Quantity(Positive), [-4, 1, 2], Derived;
     /// u0_1, twist at rest; positive turns d2 towards d3 on the way to the tip.
-    RestTwist "rest.twist": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    RestTwist "rest.twist": Quantity(Finite), [-1, 0, 0], Default("0.0");
     /// u0_2, curvature at rest about d2; positive bends the rod down, towards -d3.
-    RestBend2 "rest.bend_2": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    RestBend2 "rest.bend_2": Quantity(Finite), [-1, 0, 0], Default("0.0");
     /// u0_3, curvature at rest about d3; positive bends the rod sideways, towards +d2.
-    RestBend3 "rest.bend_3": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    RestBend3 "rest.bend_3": Quantity(Finite), [-1, 0, 0], Default("0.0");
     /// growth of the rest length, a factor.
-    RestStretch "rest.stretch": Quantity(Positive), [0, 0, 0], Means("1.0");
+    RestStretch "rest.stretch": Quantity(Positive), [0, 0, 0], Default("1.0");
     /// coupling along e1: force per displacement and length of leaf.
-    CouplingX "coupling.x": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    CouplingX "coupling.x": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// coupling along e2.
-    CouplingY "coupling.y": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    CouplingY "coupling.y": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// coupling along e3.
-    CouplingZ "coupling.z": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    CouplingZ "coupling.z": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// force per length of rod.
-    Gravity "load.gravity": Vector, [-1, 1, 0], Means("[0.0, 0.0, 0.0]");
+    Gravity "load.gravity": Vector, [-1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead force on the joint tip, or on every tip.
-    TipForce "load.tip_force": Vector, [0, 1, 0], Means("[0.0, 0.0, 0.0]");
+    TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
-    TipMoment "load.tip_moment": Vector, [1, 1, 0], Means("[0.0, 0.0, 0.0]");
+    TipMoment "load.tip_moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// how the tips are held.
-    TipHeld "tip.held": Text, [0, 0, 0], Means("\"free\"");
+    TipHeld "tip.held": Text, [0, 0, 0], Default("\"free\"");
     /// where the joint tip, or the only rod's, is held.
-    TipPosition "tip.position": Vector, [1, 0, 0], Follows;
+    TipPosition "tip.position": Vector, [1, 0, 0], Derived;
     /// of a clamped tip, the angles of the rods there, in radians.
-    TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Means("0.0");
+    TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
-    TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Means("0.0");
+    TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// wanted accuracy, relative to the longest rod.
-    Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Means("1e-6");
+    Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
     /// rho, mass per length of rod.
-    Density "dynamics.density": Quantity(Positive), [-2, 1, 2], Follows;
+    Density "dynamics.density": Quantity(Positive), [-2, 1, 2], Derived;
     /// rho I, moment of inertia per length about d2 and d3.
-    RotaryInertia "dynamics.rotary_inertia": Quantity(Positive), [0, 1, 2], Follows;
+    RotaryInertia "dynamics.rotary_inertia": Quantity(Positive), [0, 1, 2], Derived;
     /// radius of the section, in place of rho I.
-    SectionRadius "dynamics.section_radius": Quantity(Positive), [1, 0, 0], Follows;
+    SectionRadius "dynamics.section_radius": Quantity(Positive), [1, 0, 0], Derived;
     /// viscous force per length and velocity.
-    ExternalDamping "dynamics.external_damping": Number(NotNegative), [-2, 1, 1], Follows;
+    ExternalDamping "dynamics.external_damping": Number(NotNegative), [-2, 1, 1], Derived;
     /// retardation time of the material.
-    InternalDamping "dynamics.internal_damping": Number(NotNegative), [0, 0, 1], Means("0.0");
+    InternalDamping "dynamics.internal_damping": Number(NotNegative), [0, 0, 1], Default("0.0");
     /// how long the leaf is followed.
-    Duration "dynamics.duration": Number(Positive), [0, 0, 1], Follows;
+    Duration "dynamics.duration": Number(Positive), [0, 0, 1], Derived;
     /// time between two outputs.
-    OutputInterval "dynamics.output_interval": Number(Positive), [0, 0, 1], Follows;
+    OutputInterval "dynamics.output_interval": Number(Positive), [0, 0, 1], Derived;
     /// whether the base is held.
-    Clamped "dynamics.clamped": Switch, [0, 0, 0], Means("true");
+    Clamped "dynamics.clamped": Switch, [0, 0, 0], Default("true");
     /// where the motion begins.
-    Start "dynamics.start": Text, [0, 0, 0], Means("\"released\"");
+    Start "dynamics.start": Text, [0, 0, 0], Default("\"released\"");
     /// gravity in time.
-    GravityInTime "dynamics.gravity": VectorInTime, [-1, 1, 0], Follows;
+    GravityInTime "dynamics.gravity": VectorInTime, [-1, 1, 0], Derived;
     /// dead force in time.
-    TipForceInTime "dynamics.tip_force": VectorInTime, [0, 1, 0], Follows;
+    TipForceInTime "dynamics.tip_force": VectorInTime, [0, 1, 0], Derived;
     /// dead moment in time, one rod only.
-    TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Follows;
+    TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Derived;
     /// factor of the rest curvatures in time.
-    RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Follows;
+    RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Derived;
 }
 
 impl Key {

@@ -3,13 +3,11 @@
 //! defaults are always within the limits.
 
 use super::entries::Entries;
-use super::error::ScenarioError;
+use super::error::Result;
 use super::item::Item;
 use super::key::{Form, Key};
 use super::material;
 use super::{Profile, Rod, Scale, Scenario, longest};
-
-type Result = std::result::Result<(), ScenarioError>;
 
 /// The range of a dimensionless number.
 struct Limit {
@@ -22,7 +20,7 @@ struct Limit {
 }
 
 impl Limit {
-    fn check(&self, item: Item, value: f64) -> Result {
+    fn check(&self, item: Item, value: f64) -> Result<()> {
         let limit = match value {
             _ if value > self.most => self.most,
             _ if value < self.least => self.least,
@@ -34,8 +32,8 @@ impl Limit {
         )))
     }
 
-    /// The same for the extremes of a profile of each rod, in this unit.
-    fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result {
+    /// Checks the extremes of a profile of each rod, in this unit.
+    fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result<()> {
         for (index, profile) in profiles.iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
                 self.check(item.entry(index), value / unit)?;
@@ -140,7 +138,7 @@ const TOO_MANY: &str =
 const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
-pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result {
+pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
         (Key::Gravity, scenario.gravity, GRAVITY),
@@ -177,7 +175,7 @@ fn norm([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-fn rods(entries: &Entries, rods: &[Rod]) -> Result {
+fn rods(entries: &Entries, rods: &[Rod]) -> Result<()> {
     let check = |key, index, limit: &Limit, value| match entries.given(key) {
         Some(item) => limit.check(item.entry(index), value),
         None => Ok(()),
@@ -216,7 +214,7 @@ fn rods(entries: &Entries, rods: &[Rod]) -> Result {
     Ok(())
 }
 
-fn coupling(entries: &Entries, scenario: &Scenario) -> Result {
+fn coupling(entries: &Entries, scenario: &Scenario) -> Result<()> {
     let gaps = scenario.coupling.iter().zip(scenario.rods.windows(2));
     for (gap, (stiffness, rods)) in gaps.enumerate() {
         let [one, other] = [softest(&rods[0]), softest(&rods[1])];
@@ -233,7 +231,7 @@ fn coupling(entries: &Entries, scenario: &Scenario) -> Result {
     Ok(())
 }
 
-fn dynamics(entries: &Entries, scenario: &Scenario) -> Result {
+fn dynamics(entries: &Entries, scenario: &Scenario) -> Result<()> {
     let (scale, time) = (scenario.scale(), scenario.time());
     for (key, limit) in &DYNAMICS {
         let Some(item) = entries.given(*key) else {
@@ -250,7 +248,7 @@ fn dynamics(entries: &Entries, scenario: &Scenario) -> Result {
 }
 
 /// Masses that follow from sections.
-fn masses(entries: &Entries, scenario: &Scenario) -> Result {
+fn masses(entries: &Entries, scenario: &Scenario) -> Result<()> {
     let (Some(size), Some(density)) = (material::size(entries), entries.given(Key::MassDensity))
     else {
         return Ok(());
@@ -271,7 +269,7 @@ fn masses(entries: &Entries, scenario: &Scenario) -> Result {
     Ok(())
 }
 
-fn in_time(entries: &Entries, scenario: &Scenario) -> Result {
+fn in_time(entries: &Entries, scenario: &Scenario) -> Result<()> {
     let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
     if let Some(item) = entries.given(Key::OutputInterval) {
         // Rounding of the quotient must not count as an output.

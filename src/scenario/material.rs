@@ -5,10 +5,9 @@ use std::sync::Arc;
 use super::Profile;
 use super::entries::Entries;
 use super::error::Result;
-use super::item::Item;
+use super::item::{Item, MAGNITUDES};
 use super::key::Key;
 use super::section::{Outline, Property, Section};
-use super::value::MAGNITUDES;
 
 /// The entry with the size of the sections.
 pub(super) fn size(entries: &Entries) -> Option<Item<'_>> {

@@ -8,8 +8,8 @@ mod dynamics;
 mod entries;
 mod error;
 mod excerpt;
-mod form;
 mod item;
+mod json;
 mod key;
 mod limits;
 mod material;
@@ -21,7 +21,6 @@ mod schema;
 mod section;
 mod source;
 mod tip;
-mod value;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;

@@ -118,19 +118,7 @@ impl Part {
     pub(super) fn is_whole(&self) -> bool {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
-}
 
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let scale = if self.scale { "scale:" } else { "" };
-        write!(f, "{scale}{}", self.key.path())?;
-        self.list.map_or(Ok(()), |list| write!(f, ".{list}"))?;
-        let mut indices = self.indices.iter().flatten();
-        indices.try_for_each(|index| write!(f, "[{index}]"))
-    }
-}
-
-impl Part {
     /// Splits it into parts that are numbers, given its value: every entry of a list or a
     /// profile.
     pub(crate) fn numbers(self, value: &Value) -> Vec<Part> {
@@ -163,5 +151,15 @@ impl Part {
         let lists = self.list.is_none() || other.list.is_none() || self.list == other.list;
         let mut pairs = self.indices.iter().zip(other.indices);
         self.key == other.key && lists && pairs.all(|(one, two)| same(*one, two))
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let scale = if self.scale { "scale:" } else { "" };
+        write!(f, "{scale}{}", self.key.path())?;
+        self.list.map_or(Ok(()), |list| write!(f, ".{list}"))?;
+        let mut indices = self.indices.iter().flatten();
+        indices.try_for_each(|index| write!(f, "[{index}]"))
     }
 }

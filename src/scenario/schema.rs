@@ -17,7 +17,7 @@ pub fn schema() -> Value {
             if *known == table {
                 properties.insert(name.into(), entry(key));
                 // Alternatives, such as stiffnesses and sections, are not required here.
-                if matches!(key.left_out(), LeftOut::Refused(_)) && matches!(table, "" | "leaf") {
+                if matches!(key.left_out(), LeftOut::Required(_)) && matches!(table, "" | "leaf") {
                     required.push(name);
                 }
             }
@@ -72,7 +72,7 @@ fn entry(key: Key) -> Value {
     };
     entry["description"] = json!(key.description());
     // Defaults are TOML; those that are also JSON are included.
-    if let LeftOut::Means(text) = key.left_out()
+    if let LeftOut::Default(text) = key.left_out()
         && let Ok(value) = serde_json::from_str::<Value>(text)
     {
         entry["default"] = value;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DQuat;
 
 use super::entries::Entries;
-use super::error::ScenarioError;
+use super::error::Result;
 use super::item::Item;
 use super::key::Key;
 use super::{Rod, longest};
@@ -43,11 +43,7 @@ impl Clamp {
 }
 
 /// Reads `[tip]` of a leaf of these rods; `None` if the tips are free.
-pub(super) fn held(
-    entries: &Entries,
-    rods: &[Rod],
-    joined: bool,
-) -> Result<Option<HeldTip>, ScenarioError> {
+pub(super) fn held(entries: &Entries, rods: &[Rod], joined: bool) -> Result<Option<HeldTip>> {
     let item = entries.item(Key::TipHeld)?;
     let word = item.text()?;
     let clamped = word == "clamped";
@@ -109,7 +105,7 @@ pub(super) fn held(
 }
 
 /// Refuses positions that the rods cannot reach.
-fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<(), ScenarioError> {
+fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<()> {
     let distance = x.hypot(y).hypot(z);
     let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
     let most = FARTHEST * rods.iter().map(reach).fold(longest(rods), f64::max);
