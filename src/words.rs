@@ -10,13 +10,23 @@ pub struct UnknownWord {
     pub allowed: Vec<&'static str>,
 }
 
+/// Words of earlier releases, with those that replace them.
+const FORMER: [(&str, &str); 2] = [
+    ("multiple-shooting", "shooting"),
+    ("relaxed-shooting", "shooting-from-rest"),
+];
+
 /// The word that replaces one of an earlier release; any other stays.
 pub fn current(word: &str) -> &str {
-    match word {
-        "multiple-shooting" => "shooting",
-        "relaxed-shooting" => "shooting-from-rest",
-        word => word,
-    }
+    let replaced = FORMER.iter().find(|(former, _)| *former == word);
+    replaced.map_or(word, |(_, current)| current)
+}
+
+/// The words of earlier releases that this one replaces.
+#[cfg(feature = "cli")]
+pub fn former(word: &str) -> impl Iterator<Item = &'static str> {
+    let replaced = FORMER.iter().filter(move |(_, current)| *current == word);
+    replaced.map(|(former, _)| *former)
 }
 
 /// Declares an enum by the words for its variants, with `ALL` and `word()`, on which everything

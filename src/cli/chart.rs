@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::kit::*;
-use super::relax::possible_value;
 use crate::report::words::contender;
 use crate::study::{self, Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
 use crate::{files, relax};
@@ -23,7 +22,7 @@ pub struct Chart {
     seconds: f64,
 
     /// Chart these methods only
-    #[arg(long, value_name = "LIST", value_parser = words::<Contender>(Contender::ALL.map(|it| possible_value(it.word(), it.method))), value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_parser = words::<Contender>(Contender::ALL.map(Contender::word)), value_delimiter = ',')]
     methods: Vec<Contender>,
 
     /// Measurements of other programs, as benches/peers writes them; may repeat

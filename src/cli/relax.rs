@@ -1,7 +1,5 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
-use clap::builder::PossibleValue;
-
 use super::kit::*;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
 use crate::report::numbers::brief;
@@ -20,7 +18,7 @@ pub struct Relax {
     request: Request,
 
     /// How the leaf is brought to rest
-    #[arg(long, value_name = "NAME", value_parser = words::<Method>(Method::ALL.map(|it| possible_value(it.word(), it))), default_value_t)]
+    #[arg(long, value_name = "NAME", value_parser = words::<Method>(Method::ALL.map(Method::word)), default_value_t)]
     method: Method,
 
     /// One fixed grid of N segments a rod, without extrapolation; left out: as fine as the tolerance needs
@@ -59,16 +57,6 @@ pub struct Relax {
     /// Solve for the whole leaf, even if half of it would do
     #[arg(long)]
     full_model: bool,
-}
-
-/// The name of a method, with its alias from earlier releases, which is hidden.
-pub fn possible_value(word: &'static str, method: Method) -> PossibleValue {
-    let value = PossibleValue::new(word);
-    match method {
-        Method::Shooting { .. } => value.alias("multiple-shooting"),
-        Method::ShootingFromRest { .. } => value.alias("relaxed-shooting"),
-        _ => value,
-    }
 }
 
 fn update_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {

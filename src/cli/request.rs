@@ -18,7 +18,7 @@ use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
 use crate::scenario::Entries;
 use crate::study::Base;
-use crate::words::UnknownWord;
+use crate::words::{UnknownWord, former};
 
 pub use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
@@ -83,12 +83,14 @@ fn kinds(list: &str) -> Result<Kinds, String> {
         .map(Kinds)
 }
 
-/// Parses one of these words.
-pub fn words<T>(words: impl IntoIterator<Item = PossibleValue>) -> impl TypedValueParser<Value = T>
+/// Parses one of these words; those of earlier releases are hidden aliases.
+pub fn words<T>(words: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err = UnknownWord> + Clone + Send + Sync + 'static,
 {
-    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
+    let values = words.into_iter();
+    let values = values.map(|word| PossibleValue::new(word).aliases(former(word)));
+    PossibleValuesParser::new(values).try_map(|word| word.parse::<T>())
 }
 
 /// How a verb treats its scenarios.

@@ -27,7 +27,7 @@ pub struct Simulate {
     request: Request,
 
     /// How the leaf is moved; left out: explicit, unless a rod is rigid
-    #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(|it| it.word().into())))]
+    #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(Scheme::word)))]
     method: Option<Scheme>,
 
     /// N segments a rod; left out: 16, or as many as the rest shape needs
