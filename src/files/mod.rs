@@ -240,13 +240,13 @@ fn write_shapes(
     shapes: &[Shape],
     radii: &Radii,
 ) -> Result<(), FileError> {
-    for (number, Shape(_, stations, curves)) in shapes.iter().enumerate() {
+    for (number, shape) in shapes.iter().enumerate() {
         let part = vtk::part(list, number);
         if number == 0 {
             atomic::make_folder(folder.join(&part).parent().unwrap_or(folder))?;
         }
         write_named(folder, &part, |out| {
-            vtk::curves(curves, stations, radii, out)
+            vtk::curves(shape.curves, shape.stations, radii, out)
         })?;
     }
     Ok(())

@@ -57,15 +57,23 @@ pub trait Viewed: Reported {
     fn fill(&self, view: &mut View, units: &Units);
 }
 
-/// One of several shapes: its time or number, its stations and its centrelines.
-pub struct Shape<'r>(pub f64, pub &'r [f64], pub &'r [Vec<DVec3>]);
+/// One of several shapes.
+pub struct Shape<'r> {
+    /// Its time, or its number.
+    pub time: f64,
+    /// Fractions of the length at which its nodes are.
+    pub stations: &'r [f64],
+    /// The centrelines of its veins.
+    pub curves: &'r [Vec<DVec3>],
+}
 
 /// The instants of a motion.
 pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
     let film = record.film.iter();
-    film.map(|still| {
-        let time = record.moments[still.moment].time;
-        Shape(time, &record.stations, &still.curves)
+    film.map(|still| Shape {
+        time: record.moments[still.moment].time,
+        stations: &record.stations,
+        curves: &still.curves,
     })
     .collect()
 }
@@ -74,7 +82,11 @@ pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
 pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
     (points.enumerate())
-        .map(|(number, point)| Shape(number as f64, &point.stations, &point.curves))
+        .map(|(number, point)| Shape {
+            time: number as f64,
+            stations: &point.stations,
+            curves: &point.curves,
+        })
         .collect()
 }
 

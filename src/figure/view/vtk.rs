@@ -75,7 +75,7 @@ pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Res
         "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>"
     )?;
     for (k, shape) in shapes.iter().enumerate() {
-        let (time, file) = (shape.0, escaped(&part(name, k)));
+        let (time, file) = (shape.time, escaped(&part(name, k)));
         writeln!(
             out,
             "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>"

@@ -135,7 +135,7 @@ impl Checkpoint {
     }
 
     /// Adds the state of the motion, and the checksum.
-    pub fn with_state(mut self, state: &[f64]) -> Self {
+    fn with_state(mut self, state: &[f64]) -> Self {
         self.state = state.iter().map(|&number| digits(number)).collect();
         self.checksum = self.sum();
         self

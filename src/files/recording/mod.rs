@@ -27,7 +27,7 @@ use crate::shape::equally_spaced;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
 use checkpoint::{Checkpoint, Identity, Latest, damaged};
 use growing::{GrowingFile, kept_path};
-use motion::{Form, Size};
+use motion::{MotionFormat, Size};
 
 /// Shapes that a film strip shows.
 const STILLS: usize = 8;
@@ -62,7 +62,7 @@ const STILLS: usize = 8;
 pub struct Recording {
     folder: PathBuf,
     run: Identity,
-    form: Form,
+    format: MotionFormat,
     size: Size,
     stations: Vec<f64>,
     joined: bool,
@@ -89,9 +89,9 @@ impl Recording {
         let mut recording = Recording::new(folder, simulation, selection);
         if selection.kinds.iter().any(|kind| *kind != Kind::Json) {
             atomic::make_folder(folder)?;
-            let form = recording.form;
-            let start = form.start(recording.size, outputs(simulation));
-            let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
+            let format = recording.format;
+            let start = format.start(recording.size, outputs(simulation));
+            let motion = GrowingFile::begin(folder.join(format.file_name()), &start)?;
             let start = header(energy::COLUMNS);
             let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
             recording.growing = Some([motion, energy]);
@@ -125,7 +125,7 @@ impl Recording {
             let why = format!("its time {:e} is not that of its state", found.time);
             return Err(damaged(&folder.join(checkpoint::FILE_NAME), &why));
         }
-        let motion = folder.join(recording.form.file_name());
+        let motion = folder.join(recording.format.file_name());
         let motion = GrowingFile::resume(motion, &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
         let moments = energy.read(energy::read).ok();
@@ -150,7 +150,7 @@ impl Recording {
         Recording {
             folder: folder.into(),
             run: Identity::of(simulation, selection.stations),
-            form: Form::of(size, outputs(simulation)),
+            format: MotionFormat::of(size, outputs(simulation)),
             size,
             stations,
             joined: simulation.leaf().joined(),
@@ -166,7 +166,7 @@ impl Recording {
     /// Approximate number of bytes that the growing files still need; zero without these.
     pub fn expected_bytes(&self, simulation: &Simulation) -> u64 {
         let (all, made) = simulation.frames();
-        let output = self.form.bytes(self.size) + energy::BYTES;
+        let output = self.format.bytes(self.size) + energy::BYTES;
         match &self.growing {
             Some(_) => (all.saturating_sub(made) as u64).saturating_mul(output),
             None => 0,
@@ -185,12 +185,12 @@ impl Recording {
             self.last = frame.positions.clone();
             return Ok(());
         };
-        let (form, stations) = (self.form, &self.stations);
+        let (format, stations) = (self.format, &self.stations);
         let frame = match self.selection.stations {
             Some(_) => &frame.at(simulation.stations(), stations),
             None => frame,
         };
-        motion.append(|out| form.write(frame, stations, out))?;
+        motion.append(|out| format.write(frame, stations, out))?;
         if let Some(moment) = self.moments.last() {
             energy.append(|out| energy::write(moment, out))?;
         }
@@ -260,8 +260,8 @@ impl Recording {
         [motion, _]: &[GrowingFile; 2],
         outputs: &[usize],
     ) -> Result<Vec<Still>, FileError> {
-        let (form, size) = (self.form, self.size);
-        let positions = motion.read(|file| form.positions(size, outputs, file))?;
+        let (format, size) = (self.format, self.size);
+        let positions = motion.read(|file| format.positions(size, outputs, file))?;
         Ok(split(outputs, &positions, size))
     }
 
@@ -280,7 +280,7 @@ impl Recording {
         let mut latest = self.checkpointer.latest();
         if kinds.contains(&Kind::Csv) {
             let outputs = record.result.moments.len();
-            motion.replace_start(&self.form.start(self.size, outputs))?;
+            motion.replace_start(&self.format.start(self.size, outputs))?;
             files.push(motion.finish()?);
             files.push(energy.finish()?);
         }
@@ -291,10 +291,10 @@ impl Recording {
             file(checkpoint::FILE_NAME),
             kept_path(&file(energy::FILE_NAME)),
         ];
-        for form in [Form::Table, Form::Array] {
-            let motion = file(form.file_name());
+        for format in [MotionFormat::Csv, MotionFormat::Npy] {
+            let motion = file(format.file_name());
             obsolete.push(kept_path(&motion));
-            if form != self.form && kinds.contains(&Kind::Csv) {
+            if format != self.format && kinds.contains(&Kind::Csv) {
                 obsolete.push(motion);
             }
         }

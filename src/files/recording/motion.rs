@@ -25,9 +25,9 @@ const NPY_HEADER: usize = 128;
 
 /// The file format of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    Table,
-    Array,
+pub enum MotionFormat {
+    Csv,
+    Npy,
 }
 
 /// Size of a motion.
@@ -45,27 +45,27 @@ impl Size {
     }
 }
 
-impl Form {
+impl MotionFormat {
     /// The format for this number of outputs.
     pub fn of(size: Size, outputs: usize) -> Self {
         match size.rows().saturating_mul(outputs) {
-            0..=MOST_ROWS => Form::Table,
-            _ => Form::Array,
+            0..=MOST_ROWS => MotionFormat::Csv,
+            _ => MotionFormat::Npy,
         }
     }
 
     pub fn file_name(self) -> &'static str {
         match self {
-            Form::Table => "motion.csv",
-            Form::Array => "motion.npy",
+            MotionFormat::Csv => "motion.csv",
+            MotionFormat::Npy => "motion.npy",
         }
     }
 
     /// Bytes of an output, in a table approximately.
     pub fn bytes(self, size: Size) -> u64 {
         let row = match self {
-            Form::Table => COLUMNS.split(',').count() * DIGITS,
-            Form::Array => NUMBERS * size_of::<f64>(),
+            MotionFormat::Csv => COLUMNS.split(',').count() * DIGITS,
+            MotionFormat::Npy => NUMBERS * size_of::<f64>(),
         };
         (size.rows() as u64).saturating_mul(row as u64)
     }
@@ -73,22 +73,22 @@ impl Form {
     /// The header of a file with this number of outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
-            Form::Table => header(COLUMNS),
-            Form::Array => npy_header(size, outputs),
+            MotionFormat::Csv => header(COLUMNS),
+            MotionFormat::Npy => npy_header(size, outputs),
         }
     }
 
     pub fn write(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
         let nodes = 0..frame.positions.len();
         match self {
-            Form::Table => {
+            MotionFormat::Csv => {
                 let rows = nodes.map(|node| {
                     let (rod, station) = (node / stations.len(), node % stations.len());
                     (frame.time, rod + 1, stations[station], numbers(frame, node))
                 });
                 append_csv(rows, out)
             }
-            Form::Array => {
+            MotionFormat::Npy => {
                 let numbers = nodes.flat_map(|node| numbers(frame, node));
                 out.extend(numbers.flat_map(f64::to_le_bytes));
                 Ok(())
@@ -104,8 +104,8 @@ impl Form {
         file: BufReader<impl Read + Seek>,
     ) -> io::Result<Vec<DVec3>> {
         let positions = match self {
-            Form::Table => read_rows(size, outputs, file)?,
-            Form::Array => read_numbers(size, outputs, file)?,
+            MotionFormat::Csv => read_rows(size, outputs, file)?,
+            MotionFormat::Npy => read_numbers(size, outputs, file)?,
         };
         match positions.len() == outputs.len() * size.rows() {
             true => Ok(positions),
@@ -180,12 +180,12 @@ mod tests {
     use super::*;
     use crate::report::sample;
 
-    fn written(form: Form, frames: &[Frame]) -> (Size, Vec<u8>) {
+    fn written(format: MotionFormat, frames: &[Frame]) -> (Size, Vec<u8>) {
         let size = Size { rods: 3, nodes: 5 };
-        let mut bytes = form.start(size, frames.len());
+        let mut bytes = format.start(size, frames.len());
         let stations = [0.0, 0.25, 0.5, 0.75, 1.0];
         for frame in frames {
-            form.write(frame, &stations, &mut bytes).unwrap();
+            format.write(frame, &stations, &mut bytes).unwrap();
         }
         (size, bytes)
     }
@@ -193,23 +193,23 @@ mod tests {
     #[test]
     fn positions_are_read_back_to_the_last_digit() {
         let (_, frames) = sample::swing(3, 4);
-        for form in [Form::Table, Form::Array] {
-            let (size, bytes) = written(form, &frames[..6]);
+        for format in [MotionFormat::Csv, MotionFormat::Npy] {
+            let (size, bytes) = written(format, &frames[..6]);
             let file = BufReader::new(Cursor::new(bytes));
-            let read = form.positions(size, &[0, 2, 3, 5], file).unwrap();
+            let read = format.positions(size, &[0, 2, 3, 5], file).unwrap();
             for (positions, output) in read.chunks(15).zip([0, 2, 3, 5]) {
-                assert_eq!(*positions, frames[output].positions, "{form:?} {output}");
+                assert_eq!(*positions, frames[output].positions, "{format:?} {output}");
             }
         }
     }
 
     #[test]
     fn a_short_file_is_an_error() {
-        for form in [Form::Table, Form::Array] {
-            let (size, mut bytes) = written(form, &sample::swing(3, 4).1[..1]);
+        for format in [MotionFormat::Csv, MotionFormat::Npy] {
+            let (size, mut bytes) = written(format, &sample::swing(3, 4).1[..1]);
             bytes.truncate(bytes.len() - 200);
             let file = BufReader::new(Cursor::new(bytes));
-            assert!(form.positions(size, &[0], file).is_err());
+            assert!(format.positions(size, &[0], file).is_err());
         }
     }
 
@@ -226,8 +226,8 @@ mod tests {
     #[test]
     fn long_tables_are_arrays() {
         let size = Size { rods: 5, nodes: 17 };
-        assert_eq!(Form::of(size, 2352), Form::Table);
-        assert_eq!(Form::of(size, 2353), Form::Array);
-        assert_eq!(Form::of(size, usize::MAX), Form::Array);
+        assert_eq!(MotionFormat::of(size, 2352), MotionFormat::Csv);
+        assert_eq!(MotionFormat::of(size, 2353), MotionFormat::Npy);
+        assert_eq!(MotionFormat::of(size, usize::MAX), MotionFormat::Npy);
     }
 }
