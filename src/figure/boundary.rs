@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use super::boundary_sides::write_indices;
 use super::kit::*;
 use super::map::{DARKEST_INDEX, fill_index, name};
 use crate::branch::{Kind, value_between};
@@ -209,7 +210,7 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         if points().any(|point| point.kind == kind) {
-            key.marker(page, kind, "", (marker, INK));
+            key.marker(page, kind, "", marker, INK);
         }
     }
 }

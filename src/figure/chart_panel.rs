@@ -182,7 +182,7 @@ impl ChartPanel {
         }
         if !self.lanes().is_empty() {
             let note = "failed or not run: see above";
-            key.marker(page, "", note, (Marker::Cross, NOTE));
+            key.marker(page, "", note, Marker::Cross, NOTE);
         }
         if self.floor.is_some() {
             let note = "below what is known of the reference itself";

@@ -213,7 +213,7 @@ pub const GREEN: Color = Color(0, 158, 115);
 pub const VERMILION: Color = Color(213, 94, 0);
 pub const PURPLE: Color = Color(170, 90, 150);
 pub const ORANGE: Color = Color(230, 159, 0);
-pub const BROWN: Color = Color(120, 80, 45);
+const BROWN: Color = Color(120, 80, 45);
 pub const SLATE: Color = Color(60, 60, 66);
 /// Colours of the curves in one panel, in this order.
 pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];

@@ -86,7 +86,7 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
     axes.markers(page, line(&|r| r.data), Marker::Dot, DOT);
     let mut key = Key::right_of(cell);
     let bars = "with two standard deviations";
-    key.marker(page, "data", bars, (Marker::Dot, DOT));
+    key.marker(page, "data", bars, Marker::Dot, DOT);
     key.line(page, "model", "", Stroke::new(BLUE, 1.6));
     key.line(page, "95 % band", "what the data leave open", dashed);
 }
@@ -150,5 +150,5 @@ fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
     let mut key = Key::right_of(cell);
     let (sum, freedom) = (brief(fit.chi_squared), fit.degrees_of_freedom);
     let sum = format!("sum of squares {sum} for {freedom} degrees of freedom");
-    key.marker(page, "data less model", &sum, (Marker::Dot, INK));
+    key.marker(page, "data less model", &sum, Marker::Dot, INK);
 }

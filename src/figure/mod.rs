@@ -1,7 +1,4 @@
-//! Figures: a leaf from above, from the side, from the front and in space; for a
-//! check also the differences of both solutions; for a motion the energies over
-//! time, and the leaf at several instants; for a chart speed against accuracy, and
-//! cost against the number of veins; and the modes of a leaf at rest.
+//! Figures, one file or few for the result of each verb.
 //!
 //! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a
 //! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
@@ -10,6 +7,7 @@
 mod axes;
 mod axis;
 mod boundary;
+mod boundary_sides;
 mod chart;
 mod chart_panel;
 mod check;

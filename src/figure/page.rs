@@ -11,7 +11,7 @@ pub const HEADER: f64 = 74.0;
 pub const PANEL_TITLE: f64 = 24.0;
 /// Room below a panel, for its axis.
 pub const PANEL_AXIS: f64 = 48.0;
-pub const TITLE_SIZE: f64 = 19.0;
+const TITLE_SIZE: f64 = 19.0;
 pub const TEXT_SIZE: f64 = 12.0;
 pub const TICK_SIZE: f64 = 10.5;
 
@@ -229,8 +229,14 @@ impl Key {
         });
     }
 
-    pub fn marker(&mut self, page: &mut Drawing, name: &str, note: &str, marker: (Marker, Color)) {
-        let (marker, color) = marker;
+    pub fn marker(
+        &mut self,
+        page: &mut Drawing,
+        name: &str,
+        note: &str,
+        marker: Marker,
+        color: Color,
+    ) {
         self.entry(page, name, note, |page, cell| {
             marker.draw(page, cell.middle(), color)
         });

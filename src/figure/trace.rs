@@ -49,7 +49,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         let height = if place == 0 { DIAGRAM } else { MORE };
         let cell = Cell::left_of_key(below + PANEL_TITLE, height, KEY);
         drawing.group("branches", |page| {
-            draw_branches(page, trace, quantity, &shown, (cell, &letter()));
+            draw_branches(page, trace, quantity, &shown, cell, &letter());
             if place == 0 {
                 draw_key(page, trace, cell);
             }
@@ -59,7 +59,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = Cell::left_of_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
         drawing.group("law", |page| {
-            draw_law(page, trace, law, branch, (cell, &letter()))
+            draw_law(page, trace, law, branch, cell, &letter())
         });
         below = cell.end().y + PANEL_AXIS;
     }
@@ -190,7 +190,8 @@ fn draw_branches(
     trace: &Trace,
     quantity: TraceShow,
     shown: &[[usize; 2]],
-    (cell, letter): (Cell, &str),
+    cell: Cell,
+    letter: &str,
 ) {
     let at = |point: &TracePoint| (point.value, quantity.of(point));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
@@ -249,10 +250,10 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
     let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
     if critical().any(|point| !folds(point)) {
-        key.marker(page, "branches cross", "", (Marker::Diamond, INK));
+        key.marker(page, "branches cross", "", Marker::Diamond, INK);
     }
     if critical().any(folds) {
-        key.marker(page, "fold", "", (Marker::Ring, INK));
+        key.marker(page, "fold", "", Marker::Ring, INK);
     }
 }
 
@@ -283,7 +284,8 @@ fn draw_law(
     trace: &Trace,
     law: &Law,
     branch: &TraceBranch,
-    (cell, letter): (Cell, &str),
+    cell: Cell,
+    letter: &str,
 ) {
     let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
     let points: Vec<(f64, f64)> = (branch.points.iter())
@@ -311,7 +313,7 @@ fn draw_law(
     axes.markers(page, points, Marker::Dot, CURVES[0]);
     let mut key = Key::right_of(cell);
     let which = "of the first branch";
-    key.marker(page, "equilibria", which, (Marker::Dot, CURVES[0]));
+    key.marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
     let slope = format!("slope {}{}", short(law.slope), slope_unit(units));
     key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));
