@@ -207,7 +207,7 @@ impl Newton<'_> {
             if turn > RESOLVED_TURN {
                 return Err(Stop::Unresolved);
             }
-            let solved = linear.solve((state, previous), system, self.work);
+            let solved = linear.solve(state, previous, system, self.work);
             let tolerance = solved.ok_or(Stop::Stuck)?;
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
@@ -264,7 +264,8 @@ impl Linear<'_> {
     /// solution, or `None` if there is none.
     fn solve(
         &mut self,
-        (state, previous): (&State, f64),
+        state: &State,
+        previous: f64,
         system: &mut System,
         work: &mut Work,
     ) -> Option<f64> {

@@ -1,6 +1,7 @@
 //! Initial-value problems by the method DOP853 with step control.
 
-use super::equations::{Equations, RodState, STATE};
+use super::equations::Equations;
+use super::state::{RodState, STATE};
 use crate::tableau::{A, B, C, E3, E5, STAGES};
 
 /// Largest number of steps of an initial-value problem.

@@ -14,7 +14,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::arcs::{self, Arc};
-pub use super::state::{RodState, STATE, TANGENT};
+use super::state::{RodState, STATE};
 use crate::limit::Limit;
 use crate::scenario::{Profile, Rod, Scenario, ascending, longest};
 

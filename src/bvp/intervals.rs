@@ -7,14 +7,16 @@ use faer::Mat;
 use glam::DVec3;
 
 use super::dop853::{Integrator, Unbounded};
-use super::equations::{Equations, RodState, TANGENT, difference};
+use super::equations::{Equations, difference};
 use super::propagate::{LinearStep, Perturbations, group};
+use super::state::{RodState, TANGENT};
 use super::trajectory::{Nodes, Trajectory};
 
 /// Largest growth of a perturbation over one interval.
 pub const GROWTH: f64 = 1e3;
 
-/// Most intervals chosen automatically, summed over rods: they take most of a gigabyte.
+/// Most intervals chosen automatically, summed over rods: of N rods their matrices take
+/// 24 N MB (see [`crate::memory`]).
 const MOST_PIECES: usize = 4096;
 
 /// Accuracy of the integration that measures growth.

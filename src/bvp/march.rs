@@ -8,12 +8,13 @@
 
 use faer::{Col, ColRef, Mat};
 
-use super::equations::{Equations, TANGENT, Tip};
+use super::equations::{Equations, Tip};
 use super::intervals::Units;
+use super::state::TANGENT;
 
 /// Directions of the tip's conditions with singular values below this part
 /// of the largest count as undetermined.
-pub const SINGULAR: f64 = 1e-10;
+const SINGULAR: f64 = 1e-10;
 
 /// The condensed equations, factorised.
 pub struct March {

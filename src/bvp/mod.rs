@@ -1,9 +1,9 @@
 //! An independent method for the same equilibrium: the paper's boundary-value problem by
 //! multiple shooting.
 //!
-//! It shares with the relaxation only the checked scenario and the
-//! constitutive law: no grid, no element, no linear algebra. A solution found by both is
-//! therefore not an artefact of either.
+//! It shares with the relaxation only the checked scenario and, with its error estimate, the
+//! coefficients of a Runge-Kutta method: no grid, no element, no linear algebra. A solution
+//! found by both is therefore not an artefact of either.
 //!
 //! **Unknown functions.** The paper integrates 18 functions per rod: r, the nine
 //! components of three directors, n and m along the directors, by eqs (1) to (6)

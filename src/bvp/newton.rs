@@ -7,12 +7,13 @@
 //! corrections with corrections, and is therefore independent of the scaling of the
 //! equations and of their conditioning.
 
-use super::equations::{Equations, RodState};
+use super::equations::Equations;
 use super::intervals::{
     GROWTH, Integrated, Units, choose_intervals, integrate, responses, sensitivities,
 };
 use super::march::March;
 use super::solution::{Correction, Log, Neutral, Reason};
+use super::state::RodState;
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory;
 use crate::shape::equally_spaced;

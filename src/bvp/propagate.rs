@@ -5,7 +5,8 @@
 use std::ops::Range;
 
 use super::dop853::{Integrator, combine};
-use super::equations::{Derivatives, Equations, TANGENT};
+use super::equations::{Derivatives, Equations};
+use super::state::TANGENT;
 use crate::tableau::{A, B, C, STAGES};
 use glam::DMat3;
 
@@ -150,7 +151,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::bvp::equations::RodState;
+    use crate::bvp::state::RodState;
     use crate::scenario::Scenario;
 
     const END: f64 = 0.8;

@@ -4,7 +4,8 @@
 use glam::DVec3;
 
 use super::dop853::{Integrator, Unbounded};
-use super::equations::{Equations, RodState};
+use super::equations::Equations;
+use super::state::RodState;
 use crate::shape::{NodeState, RodShape};
 
 /// Ends of the intervals: 0 = sigma_0 < ... < sigma_K = 1, and the

@@ -48,7 +48,7 @@ impl ProgressLine {
                 grid,
                 step,
                 residual,
-            } => self.grids.fraction(grid, (step, residual), tolerance),
+            } => self.grids.fraction(grid, step, residual, tolerance),
             Progress::Shooting(now) => {
                 if self.shooting.is_none() {
                     self.next_phase();
@@ -116,12 +116,7 @@ impl Grids {
     /// Estimates the completed fraction of the work: the first grid, on which the leaf
     /// moves, counts as six Newton steps there, every other grid as two. Every grid reduces
     /// the error by about three digits.
-    fn fraction(
-        &mut self,
-        grid: usize,
-        (step, residual): (usize, f64),
-        tolerance: f64,
-    ) -> Option<f64> {
+    fn fraction(&mut self, grid: usize, step: usize, residual: f64, tolerance: f64) -> Option<f64> {
         const FIRST: f64 = 6.0;
         const LATER: f64 = 2.0;
         const DIGITS: f64 = 3.0;
@@ -252,7 +247,7 @@ mod tests {
     fn a_relaxation_goes_on_from_grid_to_grid() {
         let mut grids = Grids::default();
         let mut part = |grid: usize, step: usize, residual: f64| {
-            grids.fraction(grid, (step, residual), 1e-6).unwrap()
+            grids.fraction(grid, step, residual, 1e-6).unwrap()
         };
         let parts = [
             part(8, 1, 1.0),

@@ -250,8 +250,8 @@ impl DiscreteLeaf {
         RodLoad {
             dead: self.loads.gravity * (self.load_factor * self.leaf.length(j) * share),
             tip: tip_share * self.load_factor * self.loads.tip_force,
-            before: gap(j > 0, j.wrapping_sub(1)),
-            behind: gap(j + 1 < self.rods(), j),
+            previous: gap(j > 0, j.wrapping_sub(1)),
+            next: gap(j + 1 < self.rods(), j),
             image: 2.0 * DVec3::Y * gap(self.leaf.beside_image(j), j),
         }
     }

@@ -58,7 +58,7 @@ pub struct Flow<'a> {
 /// The fields of a Runge-Kutta stage.
 struct Stage {
     fields: Vec<GroupFields>,
-    /// Positions again, contiguous for each axis, with padding before the first rod and behind
+    /// Positions again, contiguous for each axis, with padding before the first rod and after
     /// the last, so that those of neighbours are adjacent.
     x: [Vec<f64>; 3],
 }
@@ -70,7 +70,7 @@ impl<'a> Flow<'a> {
             let mut load = leaf.rod_load(j);
             if leaf.leaf.in_plane(j) {
                 // The image of its neighbour pulls it back into the plane.
-                load.before.y = 0.0;
+                load.previous.y = 0.0;
             }
             load
         };
@@ -185,10 +185,10 @@ impl Kernel for Slopes<'_> {
         for (g, out) in self.out.iter_mut().enumerate() {
             let fields = Fields::of(simd, &self.stage.fields[g], part);
             let first = GROUP * g + part;
-            let [before, behind] =
+            let [previous, next] =
                 [first, first + 2].map(|at| Vectors::load(simd, &self.stage.x, at));
             let loads = RodLoads::of(simd, &self.loads[g], part);
-            let load = loads.at([before, fields.x, behind], [1.0; 2], false);
+            let load = loads.at([previous, fields.x, next], [1.0; 2], false);
             fields.slopes(&self.laws[g], load, part).put(out, part);
         }
     }

@@ -12,8 +12,8 @@ pub struct RodLoad {
     /// Force on the tip.
     pub tip: DVec3,
     /// Coupling with the previous rod, with the next, and with its own mirror image.
-    pub before: DVec3,
-    pub behind: DVec3,
+    pub previous: DVec3,
+    pub next: DVec3,
     pub image: DVec3,
 }
 
@@ -34,8 +34,8 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
     [
         vectors(|load| load.dead),
         vectors(|load| load.tip),
-        vectors(|load| load.before),
-        vectors(|load| load.behind),
+        vectors(|load| load.previous),
+        vectors(|load| load.next),
         vectors(|load| load.image),
     ]
 }
@@ -45,8 +45,8 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
 pub struct RodLoads<S: Simd> {
     dead: Vectors<S>,
     tip: Vectors<S>,
-    before: Vectors<S>,
-    behind: Vectors<S>,
+    previous: Vectors<S>,
+    next: Vectors<S>,
     image: Vectors<S>,
 }
 
@@ -61,8 +61,8 @@ impl<S: Simd> RodLoads<S> {
         RodLoads {
             dead: vectors(0),
             tip: vectors(1),
-            before: vectors(2),
-            behind: vectors(3),
+            previous: vectors(2),
+            next: vectors(3),
             image: vectors(4),
         }
     }
@@ -73,7 +73,7 @@ impl<S: Simd> RodLoads<S> {
     #[inline(always)]
     pub fn at(
         &self,
-        [before, x, behind]: [Vectors<S>; 3],
+        [previous, x, next]: [Vectors<S>; 3],
         [weight, coupling_weight]: [f64; 2],
         tip: bool,
     ) -> (Vectors<S>, Lanes<S>) {
@@ -85,16 +85,16 @@ impl<S: Simd> RodLoads<S> {
             force = force + self.tip;
         }
         let to_image = (self.image * x).scale(coupling_weight);
-        let stretch = behind - x;
-        let pull = (self.behind * stretch).scale(coupling_weight);
+        let stretch = next - x;
+        let pull = (self.next * stretch).scale(coupling_weight);
         let energy = half * (pull.dot(stretch) + to_image.dot(x)) - force.dot(x);
-        let push = (self.before * (x - before)).scale(coupling_weight);
+        let push = (self.previous * (x - previous)).scale(coupling_weight);
         (force + pull - push - to_image, energy)
     }
 
     /// The contribution of the coupling to the diagonal of nodes, per weight.
     #[inline(always)]
     pub fn stiffness(&self) -> Vectors<S> {
-        self.before + self.behind + self.image
+        self.previous + self.next + self.image
     }
 }

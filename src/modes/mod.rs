@@ -186,7 +186,7 @@ impl Vibration<'_> {
             if self.wanted.time.reached() {
                 return None;
             }
-            let bound = self.search((shift, &mut factor), (sought, limit), search, &mut found);
+            let bound = self.search(shift, &mut factor, sought, limit, search, &mut found);
             if found.len() < count {
                 sought = count - found.len();
                 if let Some(bound) = bound
@@ -257,8 +257,10 @@ impl Vibration<'_> {
     /// fewer if there are no more below a limit; see [`Lanczos::run`].
     fn search(
         &self,
-        (shift, factor): (f64, &mut SparseFactor),
-        (sought, limit): (usize, f64),
+        shift: f64,
+        factor: &mut SparseFactor,
+        sought: usize,
+        limit: f64,
         search: usize,
         found: &mut Vec<Mode>,
     ) -> Option<f64> {

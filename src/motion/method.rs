@@ -112,7 +112,7 @@ pub enum Stopped {
 }
 
 impl Stopped {
-    /// The word used in `summary.json`.
+    /// The word used in `motion.json`.
     pub fn word(self) -> &'static str {
         match self {
             Stopped::Diverged { .. } => "diverged",

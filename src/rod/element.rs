@@ -189,27 +189,20 @@ impl<S: Simd> Element<S> {
     /// F K F^T from the columns of K, F having the directors as columns.
     #[inline(always)]
     fn in_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
-        let (a, b, c) = (
-            a.along(self.frame),
-            b.along(self.frame),
-            c.along(self.frame),
-        );
-        [
-            Vectors::new(a.x, b.x, c.x).along(self.frame),
-            Vectors::new(a.y, b.y, c.y).along(self.frame),
-            Vectors::new(a.z, b.z, c.z).along(self.frame),
-        ]
+        let frame = self.frame;
+        let [a, b, c] = transposed([a.along(frame), b.along(frame), c.along(frame)]);
+        [a.along(frame), b.along(frame), c.along(frame)]
     }
 
     /// The same of a diagonal matrix K.
     #[inline(always)]
     fn diagonal_to_lab(&self, k: Vectors<S>) -> Rows<S> {
         let [d1, d2, d3] = self.frame;
-        let (a, b, c) = (d1.scale(k.x), d2.scale(k.y), d3.scale(k.z));
+        let [a, b, c] = transposed([d1.scale(k.x), d2.scale(k.y), d3.scale(k.z)]);
         [
-            Vectors::new(a.x, b.x, c.x).along(self.frame),
-            Vectors::new(a.y, b.y, c.y).along(self.frame),
-            Vectors::new(a.z, b.z, c.z).along(self.frame),
+            a.along(self.frame),
+            b.along(self.frame),
+            c.along(self.frame),
         ]
     }
 

@@ -229,7 +229,7 @@ impl Simulation {
         self.method.steps()
     }
 
-    /// Number of frames still to come, and of frames so far, without the first.
+    /// Number of frames of the whole motion, and of those so far, both without the first.
     pub fn frames(&self) -> (usize, usize) {
         (self.outputs, self.made)
     }

@@ -82,7 +82,7 @@ pub struct Still {
 }
 
 /// A simulation that has ended: its outcome and its outputs. In the units of
-/// the scenario. As JSON it is the `summary.json` of a simulation.
+/// the scenario. As JSON it is `motion.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
     /// Name of the scenario.

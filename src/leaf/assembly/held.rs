@@ -14,7 +14,7 @@ const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
 impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` (from 1) of
     /// rod `j`.
-    pub(super) fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
+    fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
         if let Some(held) = self.leaf.held.as_ref().filter(|_| i == self.segments()) {
             match held.clamps {
                 Some(_) => &[0, 1, 2, 3, 4, 5],

@@ -34,19 +34,20 @@ impl DiscreteLeaf {
     }
 
     /// Assembles the right-hand side for the first-order change that removes the `jumps` of a
-    /// leaf, given rod after rod at the midpoints of equal parts; `behind` are the segments
+    /// leaf, given rod after rod at the midpoints of equal parts; `tangents` are the segments
     /// that begin there.
     pub fn assemble_jumps(
         &self,
-        behind: &[Vec<Tangent>],
+        tangents: &[Vec<Tangent>],
         jumps: &[Vec<Jump>],
         system: &mut System,
     ) {
         let n = self.segments();
         let mut rhs = vec![vec![[0.0; 6]; n]; self.rods()];
-        for ((rhs, rod), behind) in rhs.iter_mut().zip(jumps).zip(behind) {
+        for ((rhs, rod), tangents) in rhs.iter_mut().zip(jumps).zip(tangents) {
             let part = n / rod.len();
-            for (k, (&[shift, turn, force, moment], tangent)) in rod.iter().zip(behind).enumerate()
+            for (k, (&[shift, turn, force, moment], tangent)) in
+                rod.iter().zip(tangents).enumerate()
             {
                 // After the change the segment beyond the node begins where the one before it
                 // ends.
@@ -92,8 +93,8 @@ mod tests {
         let mut system = System::new(&leaf);
         leaf.assemble(&state, &mut system);
         assert!(system.factorize(0.0));
-        let behind = leaf.tangent(&state, 0, SEGMENTS / 2);
-        leaf.assemble_jumps(&[vec![behind]], &[vec![jump]], &mut system);
+        let tangent = leaf.tangent(&state, 0, SEGMENTS / 2);
+        leaf.assemble_jumps(&[vec![tangent]], &[vec![jump]], &mut system);
         assert!(matches!(system.solve(None, 1e-12), Solved::Yes(_)));
         system.solution()[0].iter().map(shift).collect()
     }
@@ -111,9 +112,9 @@ mod tests {
     fn behind_a_jump_the_free_part_follows() {
         let zero = DVec3::ZERO;
         let jump = DVec3::new(0.1, -0.2, 0.3);
-        let behind = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
-        assert_moved([jump, zero, zero, zero], |sigma| behind(sigma) * jump);
-        let turned = |sigma: f64| behind(sigma) * jump.cross((sigma - 0.5) * DVec3::X);
+        let beyond = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
+        assert_moved([jump, zero, zero, zero], |sigma| beyond(sigma) * jump);
+        let turned = |sigma: f64| beyond(sigma) * jump.cross((sigma - 0.5) * DVec3::X);
         assert_moved([zero, jump, zero, zero], turned);
     }
 

@@ -124,7 +124,7 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
                             own[r][c] = own[r][c] + hessian.own[0][r][c];
                         }
                     }
-                    matrix.put(i - 1, &own, Some(&hessian.across), (active, part));
+                    matrix.put(i - 1, &own, Some(&hessian.across), active, part);
                 }
                 own = hessian.own[1];
             }
@@ -133,11 +133,11 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
                 rods.leaf.grid.weight(i + 1),
                 rods.leaf.coupling_weight(i + 1),
             ];
-            let [before, behind] = rods.beside;
+            let [previous, next] = rods.beside;
             let x = [
-                gather(simd, before, i + 1, part),
+                gather(simd, previous, i + 1, part),
                 gather(simd, rods.x, i + 1, part),
-                gather(simd, behind, i + 1, part),
+                gather(simd, next, i + 1, part),
             ];
             let (load, potential) = loads.at(x, weights, tip);
             energy = energy + potential;
@@ -156,7 +156,7 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
             (active * force[r]).put(&mut rhs[n - 1][r], part);
         }
         if MATRIX {
-            matrix.put(n - 1, &own, None, (active, part));
+            matrix.put(n - 1, &own, None, active, part);
         }
         if part == 0 {
             *sums = Sums::default();

@@ -83,12 +83,12 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             let mut before = excess(j, 0);
             for i in 1..=n {
-                let behind = if i < n { excess(j, i) } else { 0.0 };
+                let after = if i < n { excess(j, i) } else { 0.0 };
                 if self.moves(i)[0] {
-                    let matrix = DMat3::from_diagonal(DVec3::splat(-before - behind));
+                    let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
                     system.add(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
                 }
-                before = behind;
+                before = after;
             }
         }
     }

@@ -66,7 +66,7 @@ impl Kernel for Factorize<'_> {
                 }
             }
             if i + 1 < n {
-                schur = substitute(simd, &a, (node, factor), part);
+                schur = substitute(simd, &a, node, factor, part);
             }
         }
     }
@@ -78,7 +78,8 @@ impl Kernel for Factorize<'_> {
 fn substitute<S: Simd>(
     simd: S,
     a: &Block<S>,
-    (node, factor): (&Entries, &mut Entries),
+    node: &Entries,
+    factor: &mut Entries,
     part: usize,
 ) -> Block<S> {
     let zero = Lanes::splat(simd, 0.0);

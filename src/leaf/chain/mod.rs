@@ -104,7 +104,8 @@ impl Chain {
         i: usize,
         own: &rod::Block<S>,
         next: Option<&rod::Block<S>>,
-        (active, part): (Lanes<S>, usize),
+        active: Lanes<S>,
+        part: usize,
     ) {
         let node = &mut self.matrix[i];
         let zero = Lanes::splat(active.simd, 0.0);

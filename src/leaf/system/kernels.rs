@@ -20,7 +20,8 @@ impl Coupled<'_> {
     fn pull<S: Simd>(
         self,
         simd: S,
-        (i, c): (usize, usize),
+        i: usize,
+        c: usize,
         coupling: &[[Four; 3]; 2],
         part: usize,
     ) -> Lanes<S> {
@@ -31,26 +32,20 @@ impl Coupled<'_> {
         let own = self.p[self.group][i][3 + c].0;
         let first = at(self.group.wrapping_sub(1), GROUP - 1);
         let last = at(self.group + 1, 0);
-        let before = Four([first, own[0], own[1], own[2]]);
-        let behind = Four([own[1], own[2], own[3], last]);
-        let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &before, part);
-        let behind = Lanes::of(simd, &behind, part);
-        let pull = behind.mul_add(Lanes::of(simd, &coupling[1][c], part), pull);
+        let previous = Four([first, own[0], own[1], own[2]]);
+        let next = Four([own[1], own[2], own[3], last]);
+        let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &previous, part);
+        let next = Lanes::of(simd, &next, part);
+        let pull = next.mul_add(Lanes::of(simd, &coupling[1][c], part), pull);
         Lanes::splat(simd, -self.weights[i]) * pull
     }
 
     /// Component `c` of (B + E) p at node `i` of its group.
     #[inline(always)]
-    fn product<S: Simd>(
-        self,
-        simd: S,
-        of: &Group,
-        (i, c): (usize, usize),
-        part: usize,
-    ) -> Lanes<S> {
+    fn product<S: Simd>(self, simd: S, of: &Group, i: usize, c: usize, part: usize) -> Lanes<S> {
         let b_p = Lanes::of(simd, &of.b_p[i][c], part);
         match c.checked_sub(3) {
-            Some(c) => b_p + self.pull(simd, (i, c), &of.coupling, part),
+            Some(c) => b_p + self.pull(simd, i, c, &of.coupling, part),
             None => b_p,
         }
     }
@@ -70,7 +65,7 @@ impl Kernel for Product<'_> {
         let p = &self.coupled.p[self.coupled.group];
         for (i, p) in p.iter().enumerate() {
             for c in 0..6 {
-                let k_p = self.coupled.product(simd, self.group, (i, c), part);
+                let k_p = self.coupled.product(simd, self.group, i, c, part);
                 sum = k_p.mul_add(Lanes::of(simd, &p[c], part), sum);
             }
         }
@@ -92,7 +87,7 @@ impl Kernel for Advance<'_> {
         let p = &self.coupled.p[self.coupled.group];
         for i in 0..p.len() {
             for c in 0..6 {
-                let k_p = self.coupled.product(simd, self.group, (i, c), part);
+                let k_p = self.coupled.product(simd, self.group, i, c, part);
                 let solution = &mut self.group.solution[i][c];
                 let residual = &mut self.group.residual[i][c];
                 let p = Lanes::of(simd, &p[i][c], part);

@@ -236,8 +236,8 @@ impl System {
                 for c in 0..3 {
                     let block = group.matrix.diagonal(i, 3 + c, 3 + c);
                     for (lane, value) in block.0.iter_mut().enumerate() {
-                        let [before, behind] = group.coupling.map(|side| side[c].0[lane]);
-                        *value -= (before + behind) * weight;
+                        let [previous, next] = group.coupling.map(|side| side[c].0[lane]);
+                        *value -= (previous + next) * weight;
                     }
                 }
             }

@@ -244,7 +244,7 @@ impl Explicit {
         let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
-        self.step_packs(&loads, self.law(rest, remember), (keep, kick), drift);
+        self.step_packs(&loads, self.law(rest, remember), keep, kick, drift);
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
@@ -298,7 +298,7 @@ impl Explicit {
     }
 
     /// Moves all nodes except a shared tip; the previous positions are left in `next`.
-    fn step_packs(&mut self, loads: &Loads, law: Law, kick: (f64, f64), drift: f64) {
+    fn step_packs(&mut self, loads: &Loads, law: Law, keep: f64, kick: f64, drift: f64) {
         let (arch, layout) = (self.arch, self.layout);
         let mut loads = *loads;
         if self.tip_mass.is_some() {
@@ -324,8 +324,8 @@ impl Explicit {
                 past: &mut pack.past,
                 law,
                 loads,
-                keep: kick.0,
-                kick: kick.1,
+                keep,
+                kick,
                 drift,
                 normalise,
                 block,

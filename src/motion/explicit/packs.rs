@@ -70,8 +70,8 @@ pub fn at_rest(leaf: &DiscreteLeaf, physics: &Physics, state: &State, layout: La
             motion,
             material,
             past: Past {
-                one: past(),
-                two: past(),
+                last: past(),
+                earlier: past(),
             },
             totals: StepTotals::default(),
         }
@@ -147,7 +147,12 @@ impl Pack {
     /// The arrays that determine the motion, without positions.
     pub fn moving_arrays(&mut self) -> impl Iterator<Item = &mut Array> {
         let Motion { q, v, p, .. } = &mut self.motion;
-        let past = self.past.one.iter_mut().chain(&mut self.past.two).flatten();
+        let past = self
+            .past
+            .last
+            .iter_mut()
+            .chain(&mut self.past.earlier)
+            .flatten();
         q.iter_mut().chain(v).chain(p).chain(past)
     }
 

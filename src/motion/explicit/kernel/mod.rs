@@ -42,8 +42,8 @@ pub struct Motion {
 /// Empty without it.
 #[derive(Clone, Debug)]
 pub struct Past {
-    pub one: [[Array; 3]; 2],
-    pub two: [[Array; 3]; 2],
+    pub last: [[Array; 3]; 2],
+    pub earlier: [[Array; 3]; 2],
 }
 
 /// Constitutive law at an instant.

@@ -34,19 +34,22 @@ use std::ops::Deref;
 /// The rate of a strain, from it and the last two.
 #[inline(always)]
 fn rate<S: Simd>(
-    (one, two): (&mut [&mut [f64]; 3], &mut [&mut [f64]; 3]),
-    (now, at): (Vectors<S>, usize),
+    [last, earlier]: &mut [[&mut [f64]; 3]; 2],
+    now: Vectors<S>,
+    at: usize,
     rates: [Lanes<S>; 3],
     remember: bool,
 ) -> Vectors<S> {
     let simd = now.x.simd;
-    let last = Vectors::load(simd, one, at);
-    let before = Vectors::load(simd, two, at);
+    let (one, two) = (
+        Vectors::load(simd, last, at),
+        Vectors::load(simd, earlier, at),
+    );
     if remember {
-        last.store(two, at);
-        now.store(one, at);
+        one.store(earlier, at);
+        now.store(last, at);
     }
-    before.mul_add(rates[2], last.mul_add(rates[1], now.scale(rates[0])))
+    two.mul_add(rates[2], one.mul_add(rates[1], now.scale(rates[0])))
 }
 
 /// The nodes of a block.
@@ -176,14 +179,10 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     let mut force = cut_mut(&mut block.n, (WIDTH, count));
     let mut left = cut_mut(&mut block.left, (WIDTH, count));
     let mut right = cut_mut(&mut block.right, (WIDTH, count));
-    let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
-    let mut past = DAMPED.then(|| {
-        let range = (start, count);
-        (
-            (cut_mut(one_v, range), cut_mut(two_v, range)),
-            (cut_mut(one_psi, range), cut_mut(two_psi, range)),
-        )
-    });
+    let range = (start, count);
+    let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
+    let mut past_v = DAMPED.then(|| [last_v, earlier_v].map(|arrays| cut_mut(arrays, range)));
+    let mut past_psi = DAMPED.then(|| [last_psi, earlier_psi].map(|arrays| cut_mut(arrays, range)));
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
@@ -218,8 +217,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         if CHANGES {
             sums.rest = sums.rest + load(&rest_turn).dot(w.mul_add(stiff, extra));
         }
-        if let Some((_, (one, two))) = &mut past {
-            let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
+        if let Some(past) = &mut past_psi {
+            let rate = rate(past, w.scale(two_sigma), at, rates, law.remember);
             let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
             extra = friction.mul_add(retardation, extra);
@@ -253,8 +252,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
                 Lanes::splat(simd, 0.0),
                 excess_3 * v.z,
             );
-            if let Some(((one, two), _)) = &mut past {
-                let rate = rate((one, two), (v, at), rates, law.remember);
+            if let Some(past) = &mut past_v {
+                let rate = rate(past, v, at, rates, law.remember);
                 let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
                 extra = friction.mul_add(retardation, extra);
