@@ -10,14 +10,16 @@ use crate::scenario::Scenario;
 use crate::study::Base;
 
 use super::progress::ProgressLine;
-use super::request::Request;
 use super::{Refusal, Status, note};
 
 /// One scenario of a request, and where its files go.
-pub struct Job<'r> {
-    pub(super) request: &'r Request,
+pub struct Job {
+    /// Whether its result is printed as JSON.
+    pub(super) json: bool,
+    /// Whether it is the only one of its request.
+    pub(super) single: bool,
     pub scenario: Scenario,
-    /// The same, as a base for varied numbers.
+    /// The scenario as a base for varied numbers.
     pub base: Base,
     pub folder: PathBuf,
     pub selection: Selection,
@@ -41,7 +43,7 @@ pub struct Delivered {
     pub(super) error: Option<String>,
 }
 
-impl Job<'_> {
+impl Job {
     /// Its progress line; hidden if scenarios run in parallel, which share one.
     pub fn progress(&self) -> ProgressLine {
         ProgressLine::new(&self.scenario.name, !self.parallel)
@@ -49,7 +51,7 @@ impl Job<'_> {
 
     /// Prints a remark on the result to standard error if the output is JSON.
     pub fn remark(&self, remark: Option<impl Display>) {
-        if let (true, Some(remark)) = (self.request.json, remark) {
+        if let (true, Some(remark)) = (self.json, remark) {
             note(&format!("{}: {remark}", self.scenario.name));
         }
     }
@@ -80,8 +82,8 @@ impl Job<'_> {
         self.deliver_written(result, success, result, [self.write(result)])
     }
 
-    /// The same for files that are written as they are listed, up to one that cannot be:
-    /// the result is output in either case.
+    /// Returns the output of a result, JSON or a report, with files that are written as they
+    /// are listed, up to one that cannot be: the result is output in either case.
     pub fn deliver_written<R: Written>(
         &self,
         result: &R,
@@ -93,12 +95,12 @@ impl Job<'_> {
         let error = written.try_for_each(|list| list.map(|list| files.extend(list)));
         let error = error.err().map(|error| error.to_string());
         let mut json = Vec::new();
-        if self.request.json || !self.request.single() {
+        if self.json || !self.single {
             let mut document = self.document(result);
             document.refused = error.as_deref().map(|error| Refused::new(error, 2));
             json::write(&document, &mut json)?;
         }
-        let report = match self.request.json {
+        let report = match self.json {
             true => String::new(),
             false => report.report(files),
         };

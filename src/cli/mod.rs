@@ -28,8 +28,9 @@ use crate::scenario::printable;
 
 /// What verbs are made of.
 mod kit {
+    pub(super) use super::job::{Delivered, Job};
     pub(super) use super::progress::{ProgressLine, duration, fraction_between, fraction_of};
-    pub(super) use super::request::{Delivered, Job, Request, VerbTraits, words};
+    pub(super) use super::request::{Request, VerbTraits, words};
     pub(super) use super::{Refusal, Status};
     pub(super) use clap::{Args, ValueHint};
 }
@@ -105,7 +106,7 @@ pub fn main() -> ExitCode {
     main_with(env::args_os().collect()).into()
 }
 
-/// The same with these arguments, the first of which is the program's name.
+/// Runs the program with these arguments, the first of which is its name.
 pub fn main_with(arguments: Vec<OsString>) -> u8 {
     // Found before parsing, which may fail.
     let json = arguments.iter().any(|argument| argument == "--json");

@@ -20,7 +20,7 @@ use crate::scenario::Entries;
 use crate::study::Base;
 use crate::words::{UnknownWord, former};
 
-pub use super::job::{Delivered, Job};
+use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
 use super::{Refusal, Status, name_options, note, refuse, show, show_report};
 
@@ -57,7 +57,7 @@ pub struct Request {
 
     /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
-    pub json: bool,
+    json: bool,
 }
 
 /// Most stations that can be requested.
@@ -264,7 +264,7 @@ impl Request {
         path: &Path,
         traits: VerbTraits,
         selection: &Selection,
-    ) -> Result<Job<'_>, Refusal> {
+    ) -> Result<Job, Refusal> {
         let (file, text) = match path.to_str() {
             Some("-") => ("standard input".into(), standard_input()?),
             _ => (path.display().to_string(), crate::scenario::text(path)?),
@@ -302,7 +302,8 @@ impl Request {
             files::claim_folder(&folder, &owner, self.out.is_none() && unnamed)?;
         }
         Ok(Job {
-            request: self,
+            json: self.json,
+            single: self.single(),
             scenario,
             base,
             folder,
@@ -314,7 +315,7 @@ impl Request {
     }
 
     /// Whether it is about one scenario only.
-    pub fn single(&self) -> bool {
+    fn single(&self) -> bool {
         self.scenarios.len() == 1
     }
 }
