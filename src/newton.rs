@@ -191,7 +191,7 @@ impl Newton<'_> {
         equations: Equations,
     ) -> Result<f64, Stop> {
         let (longest, refused) = equations.limits();
-        let any_sign = longest.is_finite();
+        let any_sign = matches!(equations, Equations::AnySign { .. });
         let mut linear = Linear {
             equations,
             pattern: None,
@@ -252,10 +252,12 @@ impl Newton<'_> {
                 previous_tolerance = tolerance;
             }
         }
-        Err(match any_sign {
-            true => Stop::StepLimit,
-            false => Stop::Stuck,
-        })
+        let stop = if any_sign {
+            Stop::StepLimit
+        } else {
+            Stop::Stuck
+        };
+        Err(stop)
     }
 }
 

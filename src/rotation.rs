@@ -63,7 +63,7 @@ pub fn exp(theta: DVec3) -> DQuat {
     to_quaternion(exp_each(theta.into()))
 }
 
-/// The same of several.
+/// Unit quaternions of several rotation vectors.
 #[inline(always)]
 pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
     let simd = theta.x.simd;
@@ -91,7 +91,7 @@ pub fn multiply_each<S: Simd>((a, aw): Quaternions<S>, (b, bw): Quaternions<S>) 
     (v.scale(scale), w * scale)
 }
 
-/// Those of a quaternion.
+/// The vector and the scalar part of a quaternion.
 #[inline(always)]
 pub fn from_quaternion(q: DQuat) -> Quaternions<Scalar> {
     (DVec3::new(q.x, q.y, q.z).into(), q.w.into())

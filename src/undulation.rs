@@ -39,7 +39,8 @@ use crate::shape::RodShape;
 /// Smallest height of a half-wave that counts, in lengths of the longest rod.
 pub const LEAST_HEIGHT: f64 = 1e-3;
 
-/// The same in error estimates: a height is a difference of three positions.
+/// Smallest height of a half-wave that counts, in error estimates: it is a difference of three
+/// positions.
 const ERRORS: f64 = 4.0;
 
 /// Sine of the angle between a vein and the line between the margins below which the
@@ -188,7 +189,7 @@ impl Undulation {
         Undulation { veins }
     }
 
-    /// The same if the shape is known only at the stations.
+    /// The undulation of a leaf at rest whose shape is known only at the stations.
     pub fn at_stations(
         scenario: &Scenario,
         stations: &[f64],

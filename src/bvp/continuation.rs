@@ -41,8 +41,8 @@ const STRATEGIES: [Strategy; 3] = [Strategy::Near, Strategy::Stiff, Strategy::Fa
 enum Strategy {
     /// Newton's steps are limited to solutions nearby.
     Near,
-    /// The same, with rods that initially have their largest stiffness in all
-    /// directions.
+    /// Steps limited like those of [`Strategy::Near`], with rods that initially have their
+    /// largest stiffness in all directions.
     Stiff,
     /// Newton's steps are not limited.
     Far,

@@ -1,6 +1,7 @@
 //! Requests to the boundary-value solver, and its results.
 
 use std::fmt;
+use std::ops::AddAssign;
 
 use glam::DVec3;
 use serde::Serialize;
@@ -23,9 +24,8 @@ pub struct Work {
     pub slopes: usize,
 }
 
-impl Work {
-    /// Adds the work of another run.
-    pub fn add(&mut self, other: Work) {
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
         self.iterations += other.iterations;
         self.linearizations += other.linearizations;
         self.steps += other.steps;

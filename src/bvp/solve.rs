@@ -48,7 +48,7 @@ pub fn solve(
         let (stations, rods) = (options.stations, &solution.rods[..]);
         let start = Start::Leaf { stations, rods };
         let mut sharper = solve_once(scenario, start, tolerance, options, progress)?;
-        sharper.work.add(solution.work);
+        sharper.work += solution.work;
         solution = sharper;
     }
     Ok(solution)

@@ -75,7 +75,7 @@ pub fn title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
     title_in(page, corner, letter, text, NOTE);
 }
 
-/// The same with the text in another colour.
+/// Draws a panel's title above its frame, with the text in this colour.
 pub fn title_in(page: &mut Drawing, corner: DVec2, letter: &str, text: &str, color: Color) {
     let base = corner - DVec2::new(0.0, 8.0);
     page.label(base, letter, TEXT_SIZE, Anchor::Start, INK);

@@ -123,10 +123,10 @@ words! {
 }
 
 impl Kind {
-    /// Those that need a motion as a film.
+    /// The kinds that need a motion as a film.
     pub const FILMS: [Kind; 4] = [Kind::Html, Kind::Vtk, Kind::Glb, Kind::Gif];
 
-    /// Those that are written by default.
+    /// The kinds that are written by default.
     pub const USUAL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
 
     /// The kind of a file, by the extension of its name.

@@ -77,7 +77,7 @@ pub fn slice(array: &[f64], (first, count): (usize, usize)) -> &[f64] {
     &array[first..first + count]
 }
 
-/// The same, mutably.
+/// The part of an array, mutably.
 #[inline(always)]
 pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64] {
     &mut array[first..first + count]
@@ -94,7 +94,7 @@ pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize
     parts
 }
 
-/// The same for three arrays, mutably.
+/// The same part of three arrays, mutably.
 #[inline(always)]
 pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;

@@ -89,7 +89,7 @@ impl Leaf {
         Leaf::in_units(Arc::new(scenario.clone()), scenario.scale())
     }
 
-    /// The same in given units, so that leaves that differ in length or stiffness are
+    /// A scenario in given units, so that leaves that differ in length or stiffness are
     /// comparable.
     pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
         let profiles = scenario.rods.iter().flat_map(Rod::profiles);

@@ -17,7 +17,7 @@ pub struct RodLoad {
     pub image: DVec3,
 }
 
-/// The same of a group of rods, component by component.
+/// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
 pub type GroupLoads = [[Four; 3]; 5];
 
 /// The loads on the rods of a group.
@@ -51,7 +51,7 @@ pub struct RodLoads<S: Simd> {
 }
 
 impl<S: Simd> RodLoads<S> {
-    /// Those of the lanes from `part` on.
+    /// The loads on the lanes from `part` on.
     #[inline(always)]
     pub fn of(simd: S, group: &GroupLoads, part: usize) -> Self {
         let vectors = |k: usize| {

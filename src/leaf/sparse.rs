@@ -57,7 +57,7 @@ impl SparsePattern {
         SparsePattern::bordered(system, 0)
     }
 
-    /// The same with `rows` dense rows and columns at the end.
+    /// The pattern of a leaf's matrix bordered by `rows` dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
         let unknowns = Unknowns::new(system);
         let border = unknowns.count;
@@ -136,7 +136,8 @@ impl SparsePattern {
         self.factorize_bordered(system, shift, &[])
     }
 
-    /// The same, bordered by as many rows as the pattern has, with a zero corner block.
+    /// Factorises the matrix plus `shift` times the mass matrix, bordered by as many rows as the
+    /// pattern has, with a zero corner block.
     pub fn factorize_bordered(
         &self,
         system: &System,

@@ -121,7 +121,7 @@ impl Stopped {
         }
     }
 
-    /// The same with its time in another unit, of which the present unit is `unit`.
+    /// This reason with its time in another unit, of which the present unit is `unit`.
     pub fn in_unit(mut self, unit: f64) -> Self {
         match &mut self {
             Stopped::Diverged { time, .. }
@@ -149,7 +149,7 @@ pub trait Method {
     /// Passes all numbers that determine the further motion to `each`, which may replace them.
     fn each_number(&mut self, each: &mut dyn FnMut(&mut f64));
 
-    /// Those numbers, to continue the motion with identical bits.
+    /// The numbers that determine the further motion, to continue it with identical bits.
     fn save(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.each_number(&mut |number| numbers.push(*number));

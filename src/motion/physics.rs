@@ -53,7 +53,7 @@ pub struct Physics {
 }
 
 impl Physics {
-    /// Those of a leaf's scenario.
+    /// Inertia, damping and loads of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
         Physics::of(leaf, leaf.scenario().dynamics.clone())
     }

@@ -19,7 +19,7 @@ pub const FIELDS: usize = 14;
 /// along the lab axes, energies.
 pub type GroupFields = [Four; FIELDS];
 
-/// The same of several rods, as vectors.
+/// The fields of several rods at one sigma, as vectors.
 #[derive(Clone, Copy)]
 pub struct Fields<S: Simd> {
     /// Positions.
@@ -53,7 +53,7 @@ pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
 }
 
 impl<S: Simd> Fields<S> {
-    /// Those of the lanes from `part` on.
+    /// The fields of the lanes from `part` on.
     #[inline(always)]
     pub fn of(simd: S, group: &GroupFields, part: usize) -> Self {
         let number = |k: usize| Lanes::of(simd, &group[k], part);

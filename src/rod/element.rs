@@ -194,7 +194,7 @@ impl<S: Simd> Element<S> {
         [a.along(frame), b.along(frame), c.along(frame)]
     }
 
-    /// The same of a diagonal matrix K.
+    /// F K F^T for a diagonal matrix K.
     #[inline(always)]
     fn diagonal_to_lab(&self, k: Vectors<S>) -> Rows<S> {
         let [d1, d2, d3] = self.frame;
@@ -356,7 +356,7 @@ fn transposed<S: Simd>([a, b, c]: Rows<S>) -> Rows<S> {
     ]
 }
 
-/// As derivatives with respect to the unknowns of the two nodes.
+/// First derivatives with respect to the unknowns of the two nodes.
 #[inline(always)]
 pub fn on_nodes<S: Simd>([x, a, b]: First<S>) -> [[Lanes<S>; UNKNOWNS]; 2] {
     [

@@ -46,7 +46,7 @@ pub struct Sections<S: Simd> {
 }
 
 impl<S: Simd> Sections<S> {
-    /// Those of the lanes from `part` on.
+    /// The sections of the lanes from `part` on.
     #[inline(always)]
     pub fn gather(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
         let ds = Four([a.ds, b.ds, c.ds, d.ds]);

@@ -272,7 +272,7 @@ impl Frame {
         }
     }
 
-    /// The same with nodes at the fractions `to` of the length, by cubic interpolation between
+    /// The leaf with nodes at the fractions `to` of the length, by cubic interpolation between
     /// those at the fractions `from`.
     pub fn at(&self, from: &[f64], to: &[f64]) -> Frame {
         let weights: Vec<_> = to.iter().map(|&at| weights(from, at, CUBIC)).collect();

@@ -18,12 +18,12 @@ use pulp::{Arch, Simd};
 /// Increments of a node, or the forces dual to them, of all rods of a group.
 pub type Increments = [Four; 6];
 
-/// Those of the rod in a lane.
+/// The increments of the rod in a lane.
 pub fn of_lane(increments: &Increments, lane: usize) -> Increment {
     increments.map(|four| four.0[lane])
 }
 
-/// Writes those of the rod in a lane.
+/// Writes the increments of the rod in a lane.
 pub fn set_lane(increments: &mut Increments, lane: usize, of_rod: &Increment) {
     for (four, value) in increments.iter_mut().zip(of_rod) {
         four.0[lane] = *value;
@@ -39,7 +39,7 @@ pub const TURNS: usize = 3;
 /// Entries of the upper triangle of a block.
 const TRIANGLE: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
 
-/// Those of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
+/// The entries of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
 type Entries = [Four; ENTRIES];
 const ENTRIES: usize = TRIANGLE + UNKNOWNS * UNKNOWNS;
 

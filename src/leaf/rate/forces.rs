@@ -36,14 +36,14 @@ impl Forces {
         }
     }
 
-    /// Those on the nodes of rod `j`, which has `segments` of them.
+    /// The forces on the nodes of rod `j`, which has `segments` of them.
     pub fn on_nodes(&mut self, j: usize, segments: usize) -> &mut [Increment] {
         let nodes = &mut self.nodes[j];
         nodes.resize(segments, [0.0; 6]);
         nodes
     }
 
-    /// Those on the gaps of rod `j`, which has `segments` of them.
+    /// The effects on the gaps of rod `j`, which has `segments` of them.
     pub fn on_gaps(&mut self, j: usize, segments: usize) -> &mut [DVec3] {
         let gaps = &mut self.gaps[j];
         gaps.resize(segments, DVec3::ZERO);
@@ -65,7 +65,7 @@ impl Forces {
         add_nodes(&mut self.tips, times, &other.tips);
     }
 
-    /// Dense form: on all nodes and all gaps of rods of `segments` segments.
+    /// Forces on all nodes and effects on all gaps of rods of `segments` segments, zeros included.
     pub fn dense(&self, segments: usize) -> (Field, Vec<DVec3>) {
         let mut gaps = vec![DVec3::ZERO; self.gaps.len() * segments];
         for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {

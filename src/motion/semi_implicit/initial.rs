@@ -13,14 +13,14 @@ use glam::{DMat3, DVec3};
 /// strains.
 const INVERSE_STEP_SQUARED: f64 = 1e6;
 
-/// Its iterations, and the size of the last.
+/// Iterations of that step, and the size of the last.
 const ITERATIONS: usize = 30;
 const LAST: f64 = 1e-15;
 
 /// Strain of a rigid segment, as a length, that may be due to rounding.
 const VIOLATION: f64 = 1e-12;
 
-/// The same, above which the positions are not consistent.
+/// Strain of a rigid segment, as a length, above which positions are not consistent.
 const STRAINED: f64 = 1e-8;
 
 /// Squared frequencies of the springs that hold the nodes while their positions are made

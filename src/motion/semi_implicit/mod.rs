@@ -78,8 +78,8 @@ pub enum Steps {
     /// Such that the local error of positions (lengths) and rotations (radians)
     /// stays below this.
     Error(f64),
-    /// The same if only the end of a motion matters: equations are solved with
-    /// lower accuracy, and the part `rho_inf` of unresolved motion remains after a step.
+    /// Bounded like [`Steps::Error`], if only the end of a motion matters: equations are solved
+    /// with lower accuracy, and the part `rho_inf` of unresolved motion remains after a step.
     ToRest {
         /// The local error.
         error: f64,

@@ -105,9 +105,9 @@ pub struct Step<'a> {
     pub layout: Layout,
     /// Which pack.
     pub pack: usize,
-    /// Of the whole leaf.
+    /// Positions of the whole leaf.
     pub positions: &'a [Array; 3],
-    /// Those of the pack after the step, except a shared tip, which is set elsewhere.
+    /// Positions of the pack after the step, except a shared tip, which is set elsewhere.
     pub next: [&'a mut [f64]; 3],
     /// Force per displacement and unit of sigma of the coupling to the rod before each, and
     /// after it, if there is any coupling.

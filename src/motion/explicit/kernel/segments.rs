@@ -181,8 +181,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     let mut right = cut_mut(&mut block.right, (WIDTH, count));
     let range = (start, count);
     let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
-    let mut past_v = DAMPED.then(|| [last_v, earlier_v].map(|arrays| cut_mut(arrays, range)));
-    let mut past_psi = DAMPED.then(|| [last_psi, earlier_psi].map(|arrays| cut_mut(arrays, range)));
+    let mut past_v = DAMPED.then(|| [cut_mut(last_v, range), cut_mut(earlier_v, range)]);
+    let mut past_psi = DAMPED.then(|| [cut_mut(last_psi, range), cut_mut(earlier_psi, range)]);
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
