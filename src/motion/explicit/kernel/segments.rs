@@ -34,9 +34,8 @@ use std::ops::Deref;
 /// The rate of a strain, from it and the last two.
 #[inline(always)]
 fn rate<S: Simd>(
-    [last, earlier]: &mut [[&mut [f64]; 3]; 2],
-    now: Vectors<S>,
-    at: usize,
+    (last, earlier): (&mut [&mut [f64]; 3], &mut [&mut [f64]; 3]),
+    (now, at): (Vectors<S>, usize),
     rates: [Lanes<S>; 3],
     remember: bool,
 ) -> Vectors<S> {
@@ -179,10 +178,14 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     let mut force = cut_mut(&mut block.n, (WIDTH, count));
     let mut left = cut_mut(&mut block.left, (WIDTH, count));
     let mut right = cut_mut(&mut block.right, (WIDTH, count));
-    let range = (start, count);
     let ([last_v, last_psi], [earlier_v, earlier_psi]) = (&mut past.last, &mut past.earlier);
-    let mut past_v = DAMPED.then(|| [cut_mut(last_v, range), cut_mut(earlier_v, range)]);
-    let mut past_psi = DAMPED.then(|| [cut_mut(last_psi, range), cut_mut(earlier_psi, range)]);
+    let mut past = DAMPED.then(|| {
+        let range = (start, count);
+        (
+            (cut_mut(last_v, range), cut_mut(earlier_v, range)),
+            (cut_mut(last_psi, range), cut_mut(earlier_psi, range)),
+        )
+    });
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
@@ -217,8 +220,13 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         if CHANGES {
             sums.rest = sums.rest + load(&rest_turn).dot(w.mul_add(stiff, extra));
         }
-        if let Some(past) = &mut past_psi {
-            let rate = rate(past, w.scale(two_sigma), at, rates, law.remember);
+        if let Some((_, (last, earlier))) = &mut past {
+            let rate = rate(
+                (last, earlier),
+                (w.scale(two_sigma), at),
+                rates,
+                law.remember,
+            );
             let friction = rate * stiffness(bend, excess_1, excess_3);
             sums.friction = sums.friction + rate.dot(friction);
             extra = friction.mul_add(retardation, extra);
@@ -252,8 +260,8 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
                 Lanes::splat(simd, 0.0),
                 excess_3 * v.z,
             );
-            if let Some(past) = &mut past_v {
-                let rate = rate(past, v, at, rates, law.remember);
+            if let Some(((last, earlier), _)) = &mut past {
+                let rate = rate((last, earlier), (v, at), rates, law.remember);
                 let friction = rate * stiffness(shear, excess_1, excess_3);
                 sums.friction = sums.friction + rate.dot(friction);
                 extra = friction.mul_add(retardation, extra);
