@@ -1,19 +1,20 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
-use crate::leaf::{Grid, State};
+use crate::leaf::{Grid, RodFields, State};
 use crate::memory;
 use crate::newton::Stop;
-use crate::relax::fields::fields;
 use crate::relax::level::{Level, positions};
+use crate::relax::nodes::finer_nodes;
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
 use crate::relax::prolong::{prolong, restrict};
+use crate::relax::richardson::distance;
 use crate::relax::run::{BUDGET, Run};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
 
 /// Two grids on which the leaf moved far count as settled at the same equilibrium if no
-/// coordinate of a common node differs by more than this, in lengths.
+/// common nodes are farther apart than this, in lengths.
 const SAME_PLACE: f64 = 0.05;
 
 /// The finest grid for this comparison.
@@ -72,11 +73,20 @@ impl Run<'_, '_> {
         if enough || self.added_for_nodes || self.finer().is_none() {
             return false;
         }
-        let levels: Vec<&Level> = self.levels.iter().collect();
-        let columns = self.table.columns();
-        let fields = fields(&levels, columns, (self.error(), self.tolerance), true, None);
-        self.added_for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
+        self.added_for_nodes = self.finer_nodes(self.levels.len()).0 + 1 < self.levels.len();
         self.added_for_nodes
+    }
+
+    /// The finest of the first `wanted` grids between whose nodes the leaf keeps the tolerance, as
+    /// far as it does at the nodes of the coarsest, with the fields and the additional error there.
+    pub fn finer_nodes(&self, wanted: usize) -> (usize, Vec<Vec<RodFields>>, f64) {
+        let error = self.error().unwrap_or(0.0);
+        let allowed = match error <= self.tolerance {
+            true => self.tolerance - error,
+            false => f64::INFINITY,
+        };
+        let columns = self.table.columns();
+        finer_nodes(&self.levels, columns, wanted, [error, allowed])
     }
 
     /// Continues to a `finer` grid with all unknowns of a leaf at rest.
@@ -218,9 +228,4 @@ fn largest_turn(level: &Level) -> f64 {
     rods.flat_map(|rod| rod.windows(2))
         .map(|ends| ends[0].angle_between(ends[1]))
         .fold(0.0, f64::max)
-}
-
-/// Largest difference between corresponding coordinates.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }

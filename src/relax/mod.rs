@@ -1,11 +1,11 @@
 //! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
+mod between;
 mod correction;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
-mod fields;
 mod follow;
 mod grids;
 mod grip;
@@ -19,7 +19,6 @@ mod nodes;
 mod number;
 mod options;
 mod own_motion;
-mod place;
 mod plausible;
 pub(crate) mod predict;
 pub(crate) mod prolong;

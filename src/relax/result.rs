@@ -5,11 +5,12 @@ use crate::newton::Stop;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
-use crate::relax::fields::{Fields, fields};
 use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
+use crate::relax::nodes::with_sign_of;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
+use crate::relax::shape;
 use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
 use glam::DVec3;
@@ -24,26 +25,19 @@ pub fn equilibrium(
     let finest = run.levels.last().expect("the grid it failed on, at least");
     let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
     let columns = run.table.columns();
-    let series: Vec<&Level> = run.levels.iter().collect();
     let error = run.error();
-    let Fields {
-        stations,
-        rods,
-        between,
-    } = fields(
-        &series,
-        columns,
-        (error, run.tolerance),
-        run.options.every_node,
-        run.integrated(),
-    );
+    let (stations, rods, between) = fields(run, error.unwrap_or(0.0));
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);
     let (grid, lines) = centerlines(run, finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
-    let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
+    let segments: Vec<usize> = run
+        .levels
+        .iter()
+        .map(|level| level.leaf.segments())
+        .collect();
     Equilibrium {
         scenario: scenario.name.clone(),
         method: run.options.method,
@@ -54,7 +48,7 @@ pub fn equilibrium(
         energy: Some(potential(run, columns) * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
-        reaction: reaction(&series, columns),
+        reaction: reaction(&run.levels, columns),
         stability: Stability {
             negative_eigenvalues: run.index,
             modes: None,
@@ -94,11 +88,67 @@ pub fn equilibrium(
     }
 }
 
+/// Segments of the coarsest grid from which on its nodes are enough stations.
+const STATIONS: usize = 8;
+
+/// Stations, the rods there in the scenario's units, and the error of the positions in addition
+/// to `error`, that at the nodes of the coarsest grid. The stations are these nodes or, if they
+/// are few, those of the next grid, and all if every node is requested: of a leaf that was
+/// integrated to the tolerance those of the integration, otherwise those of the finest grid that
+/// keeps the tolerance between the nodes of the coarsest.
+fn fields(run: &Run, error: f64) -> (Vec<f64>, Vec<RodShape>, f64) {
+    let (first, finest) = (&run.levels[0].leaf.grid, &run.levels[run.levels.len() - 1]);
+    let (every_node, few) = (run.options.every_node, first.segments() < STATIONS);
+    let (grid, rods, between) = match run.integrated() {
+        Some((estimate, integrated)) => {
+            let grid = match every_node {
+                true => estimate.grid.clone(),
+                false if few && estimate.grid != *first => first.refined(),
+                false => first.clone(),
+            };
+            let stride = estimate.grid.segments() / grid.segments();
+            let rod = |(j, rod): (usize, &Vec<RodFields>)| {
+                // Quaternions have the signs of the finest grid.
+                let mut q = finest.state.q[finest.state.base(j)];
+                let node = |node: &RodFields| {
+                    q = with_sign_of(node.q, q);
+                    RodFields {
+                        q: q.normalize(),
+                        ..*node
+                    }
+                };
+                rod.iter().step_by(stride).map(node).collect()
+            };
+            let rods = estimate.rods.iter().enumerate().map(rod).collect();
+            (grid, rods, (integrated - error).max(0.0))
+        }
+        None => {
+            let wanted = match every_node {
+                true => run.levels.len(),
+                false => run.levels.len().min(1 + usize::from(few)),
+            };
+            let (reached, rods, between) = run.finer_nodes(wanted);
+            (run.levels[reached].leaf.grid.clone(), rods, between)
+        }
+    };
+    let leaf = run.leaf;
+    let rod = |(j, rod): (usize, &Vec<RodFields>)| {
+        let nodes = rod.iter().zip(grid.sigma());
+        let nodes = nodes.map(|(fields, sigma)| shape::node_of(leaf, (j, *sigma), fields));
+        RodShape {
+            length: leaf.length(j) * leaf.scale.length,
+            nodes: nodes.collect(),
+        }
+    };
+    let rods = rods.iter().enumerate().map(rod).collect();
+    (grid.sigma().to_vec(), rods, between)
+}
+
 /// The reaction at a held tip, after `columns` extrapolations.
-fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
+fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
     let leaf = &levels[0].leaf.leaf;
     let held = leaf.held.as_ref()?;
-    let on = |level: &&Level| {
+    let on = |level: &Level| {
         let (force, moments) = level.leaf.reaction(&level.state);
         let all = [force].into_iter().chain(moments);
         let values = all.flat_map(|it| it.to_array()).collect();

@@ -185,7 +185,7 @@ impl Richardson {
 
 /// Largest distance between points whose components are three consecutive values each:
 /// invariant under rotation of the axes.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     let square =
         |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
     a.chunks(3)

@@ -1,6 +1,6 @@
 //! Strains and stress resultants at the nodes of a state.
 
-use crate::leaf::{DiscreteLeaf, Leaf, State};
+use crate::leaf::{DiscreteLeaf, Leaf, RodFields, State};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -22,6 +22,23 @@ pub fn node(
         u: u / scale.length,
         n: n * scale.force(),
         m: m * scale.moment(),
+    }
+}
+
+/// The same from dimensionless fields along the lab axes.
+pub fn node_of(leaf: &Leaf, at: (usize, f64), fields: &RodFields) -> NodeState {
+    let &RodFields { x, q, n, m } = fields;
+    node(leaf, at, (x, q), [n, m].map(|vector| q.inverse() * vector))
+}
+
+/// The dimensionless fields, along the lab axes, of a state in the units of the scenario.
+pub fn fields(leaf: &Leaf, node: &NodeState) -> RodFields {
+    let (q, scale) = (node.rotation, leaf.scale);
+    RodFields {
+        x: node.position / scale.length,
+        q,
+        n: q * node.n / scale.force(),
+        m: q * node.m / scale.moment(),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::scenario::Scenario;
 use std::time::Instant;
 
 /// Factor on the tolerance of a leaf that does not keep it between the stations of its
-/// solution: interpolation errors decrease with the fourth power of the distance of nodes.
+/// solution, in layers thinner than the distance of these.
 const FOR_STATIONS: f64 = 1e-2;
 
 /// Brings a scenario's leaf to rest.

@@ -1,15 +1,17 @@
-//! Interpolation of a leaf at rest to other stations.
+//! A leaf at rest at other stations.
 
-use crate::leaf::Leaf;
+use crate::leaf::{DiscreteLeaf, Flow, Grid, Leaf};
+use crate::relax::between::{Section, integrated_between, mean};
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
-use crate::relax::nodes::continuous;
-use crate::relax::place::{Differences, Place, Slopes};
-use crate::scenario::{Profile, Rod, Scenario};
-use crate::shape::{NodeState, RodShape, equally_spaced};
-use glam::{DQuat, DVec3};
+use crate::relax::shape;
+use crate::scenario::Scenario;
+use crate::shape::equally_spaced;
 
 /// Smallest number of parts into which the stations of a result divide a vein.
 const PARTS: usize = 16;
+
+/// Stations closer than this are the same.
+const SAME: f64 = 1e-14;
 
 /// Advice if interpolated stations are less accurate than the tolerance.
 const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
@@ -20,11 +22,10 @@ impl Equilibrium {
     /// nodes of the finest grid, with its segments halved until there are at least 17
     /// stations.
     ///
-    /// Between the stations of the solution, positions, rotations and moments are Hermite
-    /// polynomials with the slopes of the equations; never across a knot of a profile. The
-    /// interpolation error is added to the error estimate; if that then exceeds the tolerance,
-    /// the outcome becomes [`Outcome::ToleranceNotReached`], or without `parts` the stations
-    /// stay as they are.
+    /// Between the stations of the solution the equilibrium equations are integrated; a leaf that
+    /// is not at rest is interpolated linearly. The error between stations in addition to that at
+    /// them is added to the error estimate; if that then exceeds the tolerance, the outcome becomes
+    /// [`Outcome::ToleranceNotReached`], or without `parts` the stations stay as they are.
     #[must_use]
     pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
         let to = match parts {
@@ -60,41 +61,59 @@ impl Equilibrium {
         (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
     }
 
+    /// The same at these stations.
     fn interpolated(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
         let at_rest = !matches!(
             self.outcome,
             Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
         );
-        let places: Vec<_> = {
-            let leaf = Leaf::new(scenario);
-            let places = to
-                .iter()
-                .map(|&at| Place::new(&self.shape.stations, leaf.kinks(), at));
-            places.collect()
+        let leaf = Leaf::new(scenario);
+        let discrete = DiscreteLeaf::new(&leaf, Grid::new(1, leaf.kinks()));
+        let mut flow = Flow::new(&discrete);
+        let (stations, known) = (&self.shape.stations, &self.shape.rods);
+        let section = |i: usize| -> Section {
+            let rods = known.iter();
+            rods.map(|rod| shape::fields(&leaf, &rod.nodes[i]))
+                .collect()
         };
         let mut between = 0.0_f64;
-        let rods = self.shape.rods.iter().enumerate().map(|(j, rod)| {
-            let known = NodalFields::new(rod);
-            let mut differences = Differences::default();
-            let nodes = places.iter().map(|place| {
-                if let Some(node) = place.node {
-                    return rod.nodes[node];
+        let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
+        let mut rest = to.as_slice();
+        for (i, &station) in stations.iter().enumerate() {
+            if rest.first().is_some_and(|at| (at - station).abs() < SAME) {
+                for (rod, known) in rods.iter_mut().zip(known) {
+                    rod.push(known.nodes[i]);
                 }
-                if at_rest {
-                    differences.add(place, |weights| {
-                        sum(weights, &known.positions, &known.tangents)
-                    });
-                }
-                known.at(place, at_rest, &scenario.rods[j])
-            });
-            let nodes = nodes.collect();
-            between = between.max(differences.error());
-            RodShape {
-                length: rod.length,
-                nodes,
+                rest = &rest[1..];
             }
-        });
-        self.shape.rods = rods.collect();
+            let next = stations.get(i + 1).copied().unwrap_or(1.0);
+            let (points, others) = rest.split_at(rest.partition_point(|at| *at < next - SAME));
+            rest = others;
+            if points.is_empty() {
+                continue;
+            }
+            let [begin, end] = [i, i + 1].map(section);
+            let ends = [(station, &begin), (next, &end)];
+            let found = match at_rest {
+                true => integrated_between(&mut flow, leaf.kinks(), ends, points),
+                false => None,
+            };
+            let (sections, error) = found.unwrap_or_else(|| {
+                let weight = |at: &f64| (at - station) / (next - station);
+                let mean = |at: &f64| mean([&begin, &end], weight(at));
+                let error = if at_rest { next - station } else { 0.0 };
+                (points.iter().map(mean).collect(), error)
+            });
+            between = between.max(error * leaf.scale.length);
+            for (&at, section) in points.iter().zip(&sections) {
+                for (j, fields) in section.iter().enumerate() {
+                    rods[j].push(shape::node_of(&leaf, (j, at), fields));
+                }
+            }
+        }
+        for (rod, nodes) in self.shape.rods.iter_mut().zip(rods) {
+            rod.nodes = nodes;
+        }
         self.shape.stations = to;
         if let Some(error) = &mut self.accuracy.error_estimate {
             *error += between;
@@ -113,79 +132,6 @@ fn finest(shape: &Shape) -> Vec<f64> {
         stations = stations[..1].iter().copied().chain(middles).collect();
     }
     stations
-}
-
-/// The fields of a vein at its stations along the lab axes, with derivatives with respect to
-/// the fraction of the length.
-struct NodalFields {
-    positions: Vec<DVec3>,
-    tangents: Vec<DVec3>,
-    rotations: Vec<[f64; 4]>,
-    turns: Vec<[f64; 4]>,
-    forces: Vec<DVec3>,
-    moments: Vec<DVec3>,
-    torques: Vec<DVec3>,
-}
-
-impl NodalFields {
-    fn new(rod: &RodShape) -> Self {
-        let each = |of: &dyn Fn(&NodeState) -> DVec3| rod.nodes.iter().map(of).collect::<Vec<_>>();
-        let tangent = |node: &NodeState| node.rotation * node.v * rod.length;
-        let rotations: Vec<DQuat> = rod.nodes.iter().map(|node| node.rotation).collect();
-        let rotations = continuous(&rotations);
-        let turn = |(q, node): (&DQuat, &NodeState)| {
-            let u = node.u * (0.5 * rod.length);
-            (*q * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array()
-        };
-        NodalFields {
-            positions: each(&|node| node.position),
-            tangents: each(&tangent),
-            turns: rotations.iter().zip(&rod.nodes).map(turn).collect(),
-            rotations: rotations.iter().map(|q| q.to_array()).collect(),
-            forces: each(&|node| node.rotation * node.n),
-            moments: each(&|node| node.rotation * node.m),
-            // m' = -r' x n.
-            torques: each(&|node| (node.rotation * node.n).cross(tangent(node))),
-        }
-    }
-
-    /// The state at a point, its strains by the constitutive law of the rod. Away from equilibrium
-    /// the equations do not give the slopes.
-    fn at(&self, place: &Place, at_rest: bool, rod: &Rod) -> NodeState {
-        let lagrange: Slopes = (place.lagrange().into_iter())
-            .map(|(i, weight)| (i, weight, 0.0))
-            .collect();
-        let hermite = match at_rest {
-            true => &place.hermite(),
-            false => &lagrange,
-        };
-        let mut q = [0.0; 4];
-        for &(i, value, slope) in hermite {
-            for (k, q) in q.iter_mut().enumerate() {
-                *q += value * self.rotations[i][k] + slope * self.turns[i][k];
-            }
-        }
-        let rotation = DQuat::from_array(q).normalize();
-        let to_directors = rotation.conjugate();
-        let n = to_directors * sum(&lagrange, &self.forces, &self.forces);
-        let m = to_directors * sum(hermite, &self.moments, &self.torques);
-        let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(place.at)));
-        NodeState {
-            position: sum(hermite, &self.positions, &self.tangents),
-            rotation,
-            v: rod.rest_stretch.at(place.at) * DVec3::X + n / triple(&rod.force_stiffness),
-            u: triple(&rod.rest_curvature) + m / triple(&rod.couple_stiffness),
-            n,
-            m,
-        }
-    }
-}
-
-fn sum(weights: &Slopes, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
-    let terms = weights.iter();
-    terms
-        .map(|&(i, value, slope)| value * values[i] + slope * slopes[i])
-        .sum()
 }
 
 #[cfg(test)]
