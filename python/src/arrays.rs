@@ -4,17 +4,17 @@ use leafdyn::relax::{NodeState, RodShape};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyByteArray, PyTuple};
+use pyo3::types::{PyBytes, PyTuple};
 
 /// A numpy array, or the exception that prevented it.
 pub type Array<'py> = PyResult<Bound<'py, PyAny>>;
 
 static FROM_BUFFER: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
-/// A writable array of this shape that owns these numbers.
+/// An array of this shape that owns these numbers and is read-only, as are the bytes below it.
 pub fn array<'py>(py: Python<'py>, numbers: Vec<f64>, shape: &[usize]) -> Array<'py> {
     const BYTES: usize = size_of::<f64>();
-    let bytes = PyByteArray::new_with(py, BYTES * numbers.len(), |bytes| {
+    let bytes = PyBytes::new_with(py, BYTES * numbers.len(), |bytes| {
         for (bytes, number) in bytes.chunks_exact_mut(BYTES).zip(&numbers) {
             bytes.copy_from_slice(&number.to_ne_bytes());
         }

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use leafdyn::scenario::{Entries, Value};
+use leafdyn::scenario::{Entries, Key, Value, schema};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -11,6 +11,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyT
 use crate::errors::entry_error;
 
 static MAPPING: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static REAL: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// Largest nesting depth of lists and tables; scenarios need less.
 const MAX_DEPTH: usize = 8;
@@ -32,17 +33,25 @@ impl Document {
     pub fn read(scenario: &Bound<PyAny>) -> PyResult<Document> {
         let (mut top, mut tables) = (Table::new(), Vec::new());
         for (key, entry) in entries(scenario)? {
-            let key = name(&key, "")?;
+            let key = name(&key, None)?;
+            let path = Path::Key("", &key);
+            if let Some((table, within)) = key.split_once('.') {
+                let meant = format!("{{\"{table}\": {{\"{within}\": ...}}}}");
+                let problem = format!("unknown key {key}: write {meant}, or replace it by `set`");
+                return Err(entry_error(entry.py(), &key, false, problem));
+            }
             if is_mapping(&entry)? {
                 let mut table = Table::new();
                 for (inner, entry) in entries(&entry)? {
-                    let inner = name(&inner, &key)?;
-                    let value = value(&entry, Path(&key, &inner), 0)?;
+                    let inner = name(&inner, Some(path))?;
+                    let value = value(&entry, Path::Key(&key, &inner), 0)?;
                     table.push((inner, value));
                 }
                 tables.push((key, table));
+            } else if Key::from_path(&key).is_none() && !schema()["properties"][&key].is_null() {
+                return Err(path.refuse(&entry, "must be a dict"));
             } else {
-                let value = value(&entry, Path("", &key), 0)?;
+                let value = value(&entry, path, 0)?;
                 top.push((key, value));
             }
         }
@@ -81,8 +90,12 @@ impl Document {
 pub fn overrides(entries: &Bound<PyAny>) -> PyResult<Vec<String>> {
     let mut texts = Vec::new();
     for (key, new) in self::entries(entries)? {
-        let key = name(&key, "")?;
-        let new = value(&new, Path("", &key), 0)?;
+        let Ok(key) = key.cast::<PyString>() else {
+            let problem = "keys must be text, as \"leaf.rods\"".into();
+            return Err(entry_error(key.py(), &key.repr()?.to_cow()?, true, problem));
+        };
+        let key = key.to_cow()?;
+        let new = value(&new, Path::Set(&key), 0)?;
         texts.push(format!("{key}={}", Toml(&new)));
     }
     Ok(texts)
@@ -115,38 +128,75 @@ fn is_mapping(found: &Bound<PyAny>) -> PyResult<bool> {
     found.is_instance(MAPPING.import(found.py(), "collections.abc", "Mapping")?)
 }
 
-fn name(key: &Bound<PyAny>, table: &str) -> PyResult<String> {
-    match key.cast::<PyString>() {
-        Ok(key) => Ok(key.to_cow()?.into_owned()),
-        Err(_) => Err(entry_error(key, table, "keys are texts")),
+/// The name of a key of a dictionary, which is at the top or within another.
+fn name(key: &Bound<PyAny>, within: Option<Path>) -> PyResult<String> {
+    if let Ok(key) = key.cast::<PyString>() {
+        return Ok(key.to_cow()?.into_owned());
     }
+    let found = key.repr()?;
+    let within_what = within.map_or(String::new(), |path| format!(" of {path}"));
+    let problem = format!("key {found}{within_what}: must be text");
+    let root = within.map(Path::root);
+    let (root, in_set) = root.unwrap_or_default();
+    Err(entry_error(key.py(), &root, in_set, problem))
 }
 
-/// The path of an entry: its table, empty at the top, and its key.
+/// Where a value is.
 #[derive(Clone, Copy)]
-struct Path<'a>(&'a str, &'a str);
+enum Path<'a> {
+    /// A key of a table, which has no name at the top.
+    Key(&'a str, &'a str),
+    /// A replaced entry.
+    Set(&'a str),
+    /// A key of an inner dictionary.
+    Inner(&'a Path<'a>, &'a str),
+    /// An item of a list.
+    Item(&'a Path<'a>, usize),
+}
 
 impl Path<'_> {
+    /// The key of the scenario, and whether it is one of `set`.
+    fn root(self) -> (String, bool) {
+        match self {
+            Path::Key(..) => (self.to_string(), false),
+            Path::Set(key) => (key.into(), true),
+            Path::Inner(outer, _) | Path::Item(outer, _) => outer.root(),
+        }
+    }
+
     fn refuse(self, entry: &Bound<PyAny>, allowed: &str) -> PyErr {
-        entry_error(entry, &self.to_string(), allowed)
+        let kind = entry.get_type().name();
+        let kind = match entry.is_none() {
+            true => "None".into(),
+            false => kind.map_or("an object".into(), |name| name.to_string()),
+        };
+        let (key, in_set) = self.root();
+        let problem = format!("{self} = {kind}: {allowed}");
+        entry_error(entry.py(), &key, in_set, problem)
     }
 
     fn is_stiffness(self) -> bool {
-        self.0 == "stiffness" || self.1.starts_with("stiffness.")
+        match self {
+            Path::Key(table, _) => table == "stiffness",
+            Path::Set(key) => key.starts_with("stiffness."),
+            Path::Inner(outer, _) | Path::Item(outer, _) => outer.is_stiffness(),
+        }
     }
 }
 
 impl fmt::Display for Path<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Path("", key) => f.write_str(key),
-            Path(table, key) => write!(f, "{table}.{key}"),
+            Path::Key("", key) | Path::Set(key) => f.write_str(key),
+            Path::Key(table, key) => write!(f, "{table}.{key}"),
+            Path::Inner(outer, key) => write!(f, "{outer}.{key}"),
+            Path::Item(list, index) => write!(f, "{list}[{index}]"),
         }
     }
 }
 
 /// Converts a value. Numbers keep every digit. Objects with `tolist`, as numpy arrays and
-/// numbers have, are converted by it.
+/// numbers have, are converted by it, and other real numbers to floats.
 fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
     if depth > MAX_DEPTH {
         return Err(path.refuse(entry, "lists stand too deep in each other"));
@@ -164,29 +214,44 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
             words => Value::String(words.into()),
         })
     } else if entry.is_instance_of::<PyList>() || entry.is_instance_of::<PyTuple>() {
-        let items = entry.try_iter()?;
-        let values = items.map(|item| value(&item?, path, depth + 1));
+        let items = entry.try_iter()?.enumerate();
+        let values = items.map(|(at, item)| value(&item?, Path::Item(&path, at), depth + 1));
         Ok(Value::Array(values.collect::<PyResult<_>>()?))
     } else if let Ok(table) = entry.cast::<PyDict>() {
         let values = table.iter().map(|(key, item)| {
-            let key = name(&key, &path.to_string())?;
-            let value = value(&item, path, depth + 1)?;
+            let key = name(&key, Some(path))?;
+            let value = value(&item, Path::Inner(&path, &key), depth + 1)?;
             Ok((key, value))
         });
         Ok(Value::Table(values.collect::<PyResult<_>>()?))
-    } else if entry.hasattr("tolist")? {
-        value(&entry.call_method0("tolist")?, path, depth + 1)
+    } else if let Some(plain) = plain(entry)? {
+        value(&plain, path, depth + 1)
+    } else if entry.is_instance(REAL.import(entry.py(), "numbers", "Real")?)? {
+        float(entry, path)
     } else {
         let allowed = "allowed are numbers, texts, true or false, lists, arrays and dicts";
         Err(path.refuse(entry, allowed))
     }
 }
 
+/// What `tolist` makes of an object, if that is something else: a long double stays one.
+fn plain<'py>(entry: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    if !entry.hasattr("tolist")? {
+        return Ok(None);
+    }
+    let plain = entry.call_method0("tolist")?;
+    Ok(Some(plain).filter(|plain| !plain.get_type().is(entry.get_type())))
+}
+
 /// A whole number, or a float if it is too large for one.
 fn whole(entry: &Bound<PyAny>, path: Path) -> PyResult<Value> {
-    if let Ok(number) = entry.extract::<i64>() {
-        return Ok(Value::Integer(number));
+    match entry.extract::<i64>() {
+        Ok(number) => Ok(Value::Integer(number)),
+        Err(_) => float(entry, path),
     }
+}
+
+fn float(entry: &Bound<PyAny>, path: Path) -> PyResult<Value> {
     match entry.extract::<f64>() {
         Ok(number) => Ok(Value::Float(number)),
         Err(error) if error.is_instance_of::<PyOverflowError>(entry.py()) => {

@@ -24,56 +24,82 @@ pub fn scenario_error(py: Python, error: &ScenarioError) -> PyErr {
         Ok(class) => class,
         Err(error) => return error,
     };
-    let known = error.key.map(|key| key.path());
-    let key = known.or_else(|| unknown_key(&error.problem));
+    let key = key_of(error);
     // As the argument `set`, not the program's option.
     let message = error.to_string();
     let message = message.strip_prefix("--").unwrap_or(&message);
-    let arguments = (message, key, file, line, remedy(&error.problem));
+    let remedy = remedy(error.problem.lines().next().unwrap_or_default());
+    let arguments = (message, key, file, line, remedy);
     match class.call1(arguments) {
         Ok(exception) => PyErr::from_value(exception),
         Err(error) => error,
     }
 }
 
-/// The key of a message about an unknown one.
-fn unknown_key(problem: &str) -> Option<&str> {
-    let rest = problem.lines().next()?.strip_prefix("unknown key ")?;
-    let end = rest.find(" (did you mean ").or_else(|| rest.find(": "));
-    Some(&rest[..end.unwrap_or(rest.len())])
+/// The key of a message, also one that is no key of the format.
+fn key_of(error: &ScenarioError) -> Option<&str> {
+    if let Some(key) = error.key {
+        return Some(key.path());
+    }
+    let sentence = error.problem.lines().next()?;
+    if let Some(rest) = sentence.strip_prefix("unknown key ") {
+        let end = rest.find(" (did you mean ").or_else(|| rest.find(": "));
+        return Some(&rest[..end.unwrap_or(rest.len())]);
+    }
+    match &error.place {
+        Place::Set { given } => given.split(['[', '=']).next(),
+        // A value in place of a table.
+        Place::File { .. } => {
+            let (start, _) = sentence.split_once(" = ")?;
+            (!start.contains(": ")).then_some(start)
+        }
+    }
 }
 
-/// The part of a message that says what to change: what was probably meant, or its end.
-fn remedy(problem: &str) -> Option<&str> {
-    let sentence = problem.lines().next()?;
-    if sentence.starts_with("not valid TOML") {
+/// How clauses begin that say what to change.
+const ADVICE: [&str; 13] = [
+    "add ", "allowed ", "check ", "choose ", "give ", "leave ", "lower ", "must ", "needs ",
+    "raise ", "save ", "use ", "write ",
+];
+
+/// The part of a message that says what to change: what was probably meant, or the first clause that
+/// gives advice and what follows it. If none does, everything after the value that was found.
+fn remedy(sentence: &str) -> Option<&str> {
+    if sentence.starts_with("not valid ") {
         return None;
     }
     if let Some(at) = sentence.find("(did you mean ") {
         let meant = &sentence[at + 1..];
         return meant.find("?)").map(|end| &meant[..=end]);
     }
-    match sentence.rfind(": allowed") {
-        Some(at) => Some(&sentence[at + 2..]),
-        None => sentence.rsplit_once(": ").map(|(_, end)| end),
+    let ends = || {
+        let colons = sentence.match_indices(": ");
+        colons.map(|(at, colon)| &sentence[at + colon.len()..])
+    };
+    let advises = |end: &&str| ADVICE.iter().any(|verb| end.starts_with(verb));
+    if let Some(advice) = ends().find(advises) {
+        return Some(advice);
     }
+    let (start, end) = sentence.split_once(": ").unwrap_or((sentence, sentence));
+    let has_value = start.contains(" = ") || start.starts_with("unknown key ");
+    Some(if has_value { end } else { sentence })
 }
 
-/// The exception for an entry that cannot be converted to TOML.
-pub fn entry_error(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
-    let kind = found.get_type().name();
-    let kind = kind.map_or("an object".into(), |name| name.to_string());
-    let problem = format!("{key} = {kind}: {allowed}");
-    let place = Place::File {
-        file: TEXT.into(),
-        line: None,
+/// The exception for an entry of a dictionary, or of `set`, that cannot be converted to TOML.
+pub fn entry_error(py: Python, key: &str, in_set: bool, problem: String) -> PyErr {
+    let place = match in_set {
+        true => Place::Set { given: key.into() },
+        false => Place::File {
+            file: TEXT.into(),
+            line: None,
+        },
     };
     let error = ScenarioError {
         place,
         key: Key::from_path(key),
         problem,
     };
-    scenario_error(found.py(), &error)
+    scenario_error(py, &error)
 }
 
 /// A `ValueError`, for a request that cannot be met.

@@ -216,19 +216,19 @@ pub fn relax_many(
     let found = run(py, progress, move |monitor| {
         options.limit = monitor.limit();
         let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
-        let one = |scenario: &Arc<scenario::Scenario>| {
+        let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
             let found = relax::relax(scenario, &options, &mut |_| {});
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             monitor.report(done as f64, Some(all as f64), || {
                 format!("{done} of {all} leaves, {}", elapsed(clock))
             });
-            found
+            found.map_err(|error| format!("scenarios[{number}], {}: {error}", scenario.name))
         };
         // One by one: a leaf may take a thousand times as long as the next.
-        let leaves = scenarios.par_iter().with_max_len(1).map(one);
-        leaves.collect::<Result<Vec<Equilibrium>, RelaxError>>()
+        let leaves = scenarios.par_iter().enumerate().with_max_len(1).map(one);
+        leaves.collect::<Result<Vec<Equilibrium>, String>>()
     })?;
-    let leaves = found.map_err(value_error)?.into_iter().zip(inputs);
+    let leaves = found.or_else(refuse)?.into_iter().zip(inputs);
     let leaf = |(found, input)| Leaf::new(found, input, asked.stations);
     Ok(leaves.map(leaf).collect())
 }

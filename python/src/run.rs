@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use std::{mem, process};
 
 use leafdyn::relax::Limit;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -62,12 +62,16 @@ fn pool(wanted: Option<usize>) -> PyResult<Arc<ThreadPool>> {
 
 /// Compute on so many threads from now on.
 #[pyfunction]
-pub fn set_threads(count: usize) -> PyResult<()> {
-    if !(1..=MOST_THREADS).contains(&count) {
-        let message = format!("threads = {count}: allowed are 1 to {MOST_THREADS}");
-        return Err(PyValueError::new_err(message));
+pub fn set_threads(count: &Bound<PyAny>) -> PyResult<()> {
+    let refused =
+        || format!("count = {count:?}: allowed are whole numbers from 1 to {MOST_THREADS}");
+    match count.extract::<usize>() {
+        Ok(count) if (1..=MOST_THREADS).contains(&count) => pool(Some(count)).map(drop),
+        Err(error) if error.is_instance_of::<PyTypeError>(count.py()) => {
+            Err(PyTypeError::new_err(refused()))
+        }
+        _ => Err(PyValueError::new_err(refused())),
     }
-    pool(Some(count)).map(drop)
 }
 
 /// The number of threads that compute.

@@ -91,6 +91,8 @@ def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
     assert leaf.save(tmp_path / "c", write="none") == []
     with pytest.raises(ValueError, match="write = gif: must be of csv"):
         leaf.save(tmp_path / "d", write="json,gif")
+    with pytest.raises(ValueError, match="name = 'filmstrip': must be one of figure.svg"):
+        leaf.figure("filmstrip")
 
 
 def files_in(folder: Path) -> dict[str, bytes]:

@@ -116,6 +116,13 @@ def test_what_the_data_do_not_say() -> None:
         ({"tip_x": [0.95]}, [], "no number is free"),
         ({"tip_x": [0.95]}, "stiffness.nonsense", "stiffness.nonsense"),
         ({"tip_x": [0.95]}, {AXIAL: (10, 20)}, "which is not between the bounds"),
+        ({"tip_x": [0.95]}, {AXIAL: (5, 1)}, "free: stiffness.axial = \\(5, 1\\): the first bound must be less"),
+        ({"tip_x": [0.95]}, f"{AXIAL}=5..1", "free: stiffness.axial=5..1: the first bound must be less"),
+        ({"tip_x": [0.95]}, f"{AXIAL}=", "free: stiffness.axial=: bounds are two numbers"),
+        ({"tip_x": [0.95]}, {AXIAL: 5}, "free: stiffness.axial = 5: bounds are two numbers"),
+        ({"tip_x": [0.95]}, {AXIAL: (1, 2, 3)}, "bounds are two numbers"),
+        ({"tip_x": [0.95]}, {AXIAL: (1, None)}, "bounds are two numbers"),
+        ({"tip_x": ["1,5"]}, AXIAL, "data: tip_x = '1,5': write numbers with a decimal point"),
         ("no/such/file.csv", AXIAL, "no/such/file.csv: cannot be read"),
     ],
 )

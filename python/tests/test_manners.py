@@ -242,8 +242,12 @@ def test_the_number_of_threads() -> None:
             assert np.array_equal(leafdyn.relax(fan(60)).positions, wanted)
     finally:
         leafdyn.set_threads(before)
-    with pytest.raises(ValueError, match="threads = 0: allowed are 1 to"):
+    with pytest.raises(ValueError, match="count = 0: allowed are whole numbers from 1 to"):
         leafdyn.set_threads(0)
+    wrong: list[tuple[Any, type[Exception]]] = [(-1, ValueError), (10**30, ValueError), ("a", TypeError)]
+    for found, kind in wrong:
+        with pytest.raises(kind, match="count = .*: allowed are whole numbers from 1 to"):
+            leafdyn.set_threads(found)
     said = subprocess.run(
         [sys.executable, "-c", "import leafdyn; print(leafdyn.threads())"],
         env={**os.environ, "RAYON_NUM_THREADS": "5"},

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from leaves import column, fan
 
 import leafdyn
@@ -45,6 +46,19 @@ def test_a_leaf_with_its_figure() -> None:
     assert np.array_equal(travelled(modes).frequencies, modes.frequencies)
 
 
+def test_arrays_are_read_only() -> None:
+    for leaf in (once := leafdyn.modes(fan(2), 2), travelled(once)):
+        arrays: list[Any] = [leaf.positions, leaf.tip, leaf.eigenvalues, leaf.mode_displacements]
+        for array in arrays:
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] *= 10
+        assert leaf.figure() == once.figure()
+    leaf.positions.copy()[...] *= 10
+    motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
+    assert not motion.energies["kinetic"].flags.writeable
+    assert not travelled(motion).energies["kinetic"].flags.writeable
+
+
 def test_every_other_result(tmp_path: Path) -> None:
     check = leafdyn.check(fan(2))
     shapes = leafdyn.all_shapes(fan(2), tolerance=1e-4)
@@ -62,5 +76,8 @@ def test_every_other_result(tmp_path: Path) -> None:
         assert {file.suffix for file in written} >= {".json", ".svg", ".png"}
     same(shapes[0], travelled(shapes)[0])
     assert np.array_equal(travelled(motion).positions, motion.positions)
+    for kind in ("csv", "gif"):
+        with pytest.raises(ValueError, match=f"write = {kind}: a pickled motion can only write json, png, svg, or none"):
+            travelled(motion).save(tmp_path / "no", write=kind)
     assert np.array_equal(travelled(boundary).curves[0].values, boundary.curves[0].values)
     assert np.array_equal(travelled(trace).branches[0].tips, trace.branches[0].tips)

@@ -109,6 +109,14 @@ def test_numbers_of_a_dict_keep_every_digit() -> None:
         assert leafdyn.Scenario(leaf).lengths[1] == number
     for number in [1e-7, 1e-12, np.nextafter(1e-3, 1.0)]:
         assert leafdyn.Scenario({**fan(3), "solve": {"tolerance": number}}).tolerance == number
+    lengths = np.linspace(1.0, 2.0, 3, dtype=np.longdouble)
+    assert leafdyn.Scenario(fan(3), set={"leaf.length": lengths}).lengths.tolist() == [1.0, 1.5, 2.0]
+    assert leafdyn.Scenario(fan(3), set={"leaf.length": np.longdouble(1.5)}).lengths[0] == 1.5
+
+
+def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
+    leaf = leafdyn.relax(fan(2), segments=np.int64(4), stations=np.int32(3))
+    assert (leaf.segments, len(leaf.stations)) == ([4], 4)
 
 
 def test_replaced_entries_hold_and_add_up() -> None:

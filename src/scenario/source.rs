@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::Deserialize;
+use serde_json::Value as Json;
 use toml::de::{DeTable, DeValue, Error};
 use toml::{Spanned, Table, Value};
 
@@ -31,6 +33,8 @@ pub(super) struct Spans {
 impl Source {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
     pub fn parse(text: &str, file: &str) -> Result<(Source, Table)> {
+        // A mark that some editors write.
+        let text = text.trim_start_matches('\u{feff}');
         let mut source = Source {
             file: file.into(),
             text: text.into(),
@@ -160,25 +164,53 @@ pub(super) fn value_of(parsed: &Spanned<DeValue>) -> Value {
     }
 }
 
+/// A result, of which only the scenario is read.
+#[derive(Deserialize)]
+struct Outcome {
+    input: Value,
+}
+
 /// A scenario in JSON, or the `input` of a result.
 fn from_json(text: &str, file: &str) -> Result<Table> {
-    let parsed = serde_json::from_str::<serde_json::Value>(text);
-    let mut document = parsed.map_err(|error| {
-        let line = Some(error.line());
-        ScenarioError::in_file(file, line, format!("not valid JSON: {error}"))
-    })?;
-    let form = match document.get_mut("input") {
-        Some(input) => input.take(),
-        None => document,
+    let refuse = |line: Option<usize>, problem| ScenarioError::in_file(file, line, problem);
+    let at = |error: serde_json::Error, what: &str| {
+        refuse(Some(error.line()), format!("{what}: {error}"))
     };
-    let mut form = Table::try_from(form)
-        .map_err(|error| ScenarioError::in_file(file, None, format!("is no scenario: {error}")))?;
+    let document: Json = serde_json::from_str(text).map_err(|error| at(error, "not valid JSON"))?;
+    let input = document.get("input");
+    if let Some(path) = null_in(input.unwrap_or(&document), "") {
+        let key = path.split('[').next().and_then(Key::from_path);
+        let problem =
+            format!("is no scenario: {path} = null: give a value, or leave the entry out");
+        let error = refuse(None, problem);
+        return Err(ScenarioError { key, ..error });
+    }
+    // Unlike the document, these refuse a key that is there twice.
+    let form = match input {
+        Some(_) => serde_json::from_str(text).map(|Outcome { input }| input),
+        None => serde_json::from_str(text),
+    };
+    let form = form.map_err(|error| at(error, "is no scenario"))?;
+    let mut form =
+        Table::try_from(form).map_err(|error| refuse(None, format!("is no scenario: {error}")))?;
     for key in Key::all().filter(|key| key.form().range() == Allowed::PositiveOrInfinite) {
         let (table, name) = key.parts();
         let value = form.get_mut(table).and_then(|table| table.get_mut(name));
         value.into_iter().for_each(restore_infinity);
     }
     Ok(form)
+}
+
+/// The path of an entry that is null, within `path`.
+fn null_in(value: &Json, path: &str) -> Option<String> {
+    let inside = |(name, value): (&String, &Json)| null_in(value, &format!("{path}.{name}"));
+    let at = |(index, value): (usize, &Json)| null_in(value, &format!("{path}[{index}]"));
+    match value {
+        Json::Null if !path.is_empty() => Some(path.trim_start_matches('.').into()),
+        Json::Object(table) => table.iter().find_map(inside),
+        Json::Array(list) => list.iter().enumerate().find_map(at),
+        _ => None,
+    }
 }
 
 /// Turns `"inf"`, for which JSON has no number, into the number.

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from . import _leafdyn
+from ._arguments import numbers, switches, texts
 from ._leaf import Array
 from ._measured import Measured, measurements
 from ._progress import Progress, reporter
 from ._relax import warn
-from ._result import Contents, Table
+from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 
 
@@ -94,7 +95,7 @@ class Fit(Table):
         self.success = self.outcome == "converged"
         self.parameters = {entry["key"]: Parameter(**entry) for entry in said["parameters"]}
         count = len(self.parameters)
-        self.correlations = np.array(said["correlations"], dtype=np.float64).reshape(count, count)
+        self.correlations = read_only(np.array(said["correlations"], dtype=np.float64).reshape(count, count))
         for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
             setattr(self, name, said[name])
         self.standard_deviation = said.get("standard_deviation")
@@ -205,8 +206,10 @@ def fit(
     >>> leafdyn.relax(found.scenario).stable
     True
     """
+    switches(robust=robust)
+    numbers(tolerance=tolerance)
+    keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
     leaf = checked(scenario, set)
-    keys = [free] if isinstance(free, str) else [_free(key, free) for key in free]
     tables = measurements(data, "data")
     others = None if candidates is None else measurements(candidates, "candidates")[0]
     with reporter(progress) as heard:
@@ -219,9 +222,20 @@ def fit(
     return found
 
 
-def _free(key: str, free: Iterable[str] | Mapping[str, tuple[float, float] | None]) -> str:
-    bounds = free[key] if isinstance(free, Mapping) else None
+def _free(number: str, free: str | Iterable[str] | Mapping[str, tuple[float, float] | None]) -> str:
+    """A free number as the program reads it: its key, and its bounds if it has any."""
+    if isinstance(free, Mapping):
+        bounds: Any = free[number]
+        given = f"free: {number} = {bounds!r}"
+    else:
+        bounds = number.partition("=")[2].split("..") if "=" in number else None
+        given = f"free: {number}"
     if bounds is None:
-        return key
-    low, high = bounds
-    return f"{key}={float(low)!r}..{float(high)!r}"
+        return number
+    try:
+        low, high = map(float, bounds)
+    except (TypeError, ValueError):
+        raise ValueError(f"{given}: bounds are two numbers, as in (1, 1e4) or stiffness.axial=1..1e4") from None
+    if low >= high:
+        raise ValueError(f"{given}: the first bound must be less than the second")
+    return f"{number}={low!r}..{high!r}" if isinstance(free, Mapping) else number

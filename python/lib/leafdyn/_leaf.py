@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 class Equilibrium(Viewed):
     """A leaf at rest, or as far as it came, with N rods at K + 1 stations, in the units of its scenario.
 
-    Arrays are made when they are first asked for, of float64, and equal the numbers of the files to the last bit.
+    Arrays are made when they are first asked for, of float64, and equal the numbers of the files to the last bit. They
+    are read-only: change a copy of them.
 
     >>> import leafdyn
     >>> leaf = leafdyn.relax("scenarios/paper/fig04.toml")
@@ -237,10 +238,12 @@ class Equilibrium(Viewed):
         solid = hasattr(ax, "get_zlim")
         for curve in self.curves:
             ax.plot(*(curve.T if solid else curve.T[[0, 2]]), **style)
+        unit = self.to_dict()["input"].get("units", {}).get("length")
+        x, y, z = (axis if unit is None else f"{axis} / {unit}" for axis in "xyz")
         if solid:
-            ax.set(xlabel="x", ylabel="y", zlabel="z")
+            ax.set(xlabel=x, ylabel=y, zlabel=z)
         else:
-            ax.set(xlabel="x", ylabel="z")
+            ax.set(xlabel=x, ylabel=z)
         ax.set_aspect("equal")
         return ax
 

@@ -1,7 +1,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias, final
+from typing import Any, SupportsIndex, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ __all__ = [
 
 __version__: str
 
-def set_threads(count: int) -> None:
+def set_threads(count: SupportsIndex) -> None:
     """Compute on so many threads from now on."""
 
 def threads() -> int:
@@ -105,7 +105,7 @@ class Motion:
         cls,
         scenario: Scenario,
         method: str | None,
-        segments: int | None,
+        segments: SupportsIndex | None,
         step: float | None,
         tolerance: float | None,
     ) -> Motion: ...
@@ -125,10 +125,10 @@ class Motion:
 def relax(scenario: Scenario, asked: Mapping[str, Any], progress: _Heard) -> Leaf: ...
 def relax_many(scenarios: Sequence[Scenario], asked: Mapping[str, Any], progress: _Heard) -> list[Leaf]: ...
 def check(
-    scenario: Scenario, tolerance: float | None, keep_unstable: bool, intervals: int | None, progress: _Heard
+    scenario: Scenario, tolerance: float | None, keep_unstable: bool, intervals: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, Leaf, tuple[_Array, _Array] | None]: ...
 def all_shapes(
-    scenario: Scenario, tolerance: float | None, full_model: bool, stations: int | None, progress: _Heard
+    scenario: Scenario, tolerance: float | None, full_model: bool, stations: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, list[tuple[Leaf, int, bool]]]: ...
 def trace(
     scenario: Scenario, vary: str, asked: Mapping[str, Any], progress: _Heard

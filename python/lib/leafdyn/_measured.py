@@ -23,7 +23,7 @@ Measured: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Columns]
 def measurements(data: Measured | Iterable[Measured], name: str) -> list[tuple[str, str] | str]:
     """Tables as the program reads them: paths, and texts with what messages call them."""
     one: Any = data
-    if isinstance(one, (str, os.PathLike)) or hasattr(one, "items"):
+    if isinstance(one, (str, os.PathLike)) or hasattr(one, "items") or not isinstance(one, Iterable):
         return [_table(one, name)]
     return [_table(table, f"{name}[{number}]") for number, table in enumerate(one)]
 
@@ -63,6 +63,8 @@ def _column(column: Any, place: str) -> list[str]:
 def _cell(value: Any, place: str) -> str:
     """What was not measured is empty."""
     if isinstance(value, str):
+        if _is_number(value.replace(",", ".")) and "," in value:
+            raise ValueError(f"{place} = {value!r}: write numbers with a decimal point")
         if set(value) & set(',"\n\r'):
             raise ValueError(f"{place} = {value!r}: a name has no commas, quotes and line breaks")
         return value
@@ -76,3 +78,11 @@ def _cell(value: Any, place: str) -> str:
     # A name of an experiment that is a number may have become one with a fraction.
     whole = isinstance(value, Integral) or (place.endswith(": experiment") and number.is_integer())
     return str(int(number)) if whole else repr(number)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

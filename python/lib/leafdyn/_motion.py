@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from . import _leafdyn
 from ._leaf import Array
-from ._result import chosen
+from ._result import KINDS, chosen, kind
 from ._view import Viewed
 
 ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
@@ -36,7 +38,7 @@ class Motion(Viewed):
     """A leaf followed in time: T outputs of N rods with M + 1 nodes, in the units of its scenario.
 
     What has been pickled has its arrays, summary and pictures, but no longer writes ``motion.csv``,
-    ``energy.csv`` and what shows it as a film.
+    ``energy.csv`` and what shows it as a film: `save` writes ``json``, ``svg`` and ``png`` only.
     """
 
     outcome: str
@@ -78,22 +80,27 @@ class Motion(Viewed):
 
     def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
         """As `Result.save`; among the files are ``motion.csv`` (or ``.npy``) and ``energy.csv``."""
-        kinds = chosen(write, self._files.names())
+        kinds = [kind(name) for name in self._files.names()]
         if self._core is None:
-            return super().save(folder, write)
-        return self._core.save(Path(folder), sorted(kinds))
+            return super().save(folder, chosen(write, kinds, "a pickled motion can only write"))
+        return self._core.save(Path(folder), sorted(chosen(write, [*KINDS, *kinds])))
 
     def _page(self) -> str:
         return super()._page() if self._core is None else self._core.page()
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
-        """Draw the height of the tip in time with matplotlib."""
+        """Draw the coordinate of the tip that varies most in time with matplotlib; of a held tip, that of the middle of
+        the veins."""
         if ax is None:
             from matplotlib import pyplot
 
             ax = pyplot.figure().add_subplot()
-        ax.plot(self.times, self.tips[..., 2], **style)
-        ax.set(xlabel="time", ylabel="tip z")
+        held = "tip" in self.to_dict()["input"]
+        points = self.positions[:, :, self.positions.shape[2] // 2] if held else self.tips
+        changes = np.ptp(points, axis=0).max(axis=0)
+        most = max((2, 1, 0), key=lambda axis: float(changes[axis]))
+        ax.plot(self.times, points[..., most], **style)
+        ax.set(xlabel="time", ylabel=f"{'middle' if held else 'tip'} {'xyz'[most]}")
         return ax
 
     def __repr__(self) -> str:

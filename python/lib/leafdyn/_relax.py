@@ -5,30 +5,34 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, SupportsIndex
 
 from . import _leafdyn
+from ._arguments import numbers, switches, text, texts, whole
 from ._errors import LeafWarning
 from ._leaf import Equilibrium
 from ._progress import Progress, reporter
-from ._scenario import Scenario, Source, checked, whole
+from ._scenario import Scenario, Source, checked
 
 
 def _asked(
     method: str = "semi-implicit",
     tolerance: float | None = None,
-    segments: int | None = None,
-    intervals: int | None = None,
+    segments: SupportsIndex | None = None,
+    intervals: SupportsIndex | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
-    modes: int = 0,
+    modes: SupportsIndex = 0,
     mode_shapes: bool = False,
-    stations: int | None = None,
+    stations: SupportsIndex | None = None,
     sensitivity: Iterable[str] = (),
     margin: bool = False,
 ) -> dict[str, Any]:
     asked = {**locals(), "sensitivity": list(sensitivity)}
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
+    numbers(tolerance=tolerance)
+    switches(keep_unstable=keep_unstable, full_model=full_model, mode_shapes=mode_shapes, margin=margin)
+    text("method", method, "semi-implicit")
     return asked
 
 
@@ -43,13 +47,13 @@ def relax(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     method: str = "semi-implicit",
-    segments: int | None = None,
-    intervals: int | None = None,
+    segments: SupportsIndex | None = None,
+    intervals: SupportsIndex | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
-    modes: int = 0,
+    modes: SupportsIndex = 0,
     margin: bool = False,
-    stations: int | None = None,
+    stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest.
@@ -57,7 +61,7 @@ def relax(
     Parameters
     ----------
     scenario
-        A path, a text in TOML, a dict of the same form, or a `Scenario`.
+        A path, a text in TOML or JSON, a dict of the same form, or a `Scenario`.
     set
         Entries that are replaced: ``{"leaf.rods": 5}``.
     tolerance
@@ -123,17 +127,18 @@ def relax_many(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     method: str = "semi-implicit",
-    segments: int | None = None,
-    intervals: int | None = None,
+    segments: SupportsIndex | None = None,
+    intervals: SupportsIndex | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
-    modes: int = 0,
-    stations: int | None = None,
+    modes: SupportsIndex = 0,
+    stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium]:
     """Find how many leaves come to rest, side by side on all threads.
 
-    Parameters are those of `relax`, and hold for all. All scenarios are checked before the first is solved.
+    Parameters are those of `relax`, and hold for all. All scenarios are checked before the first is solved. Messages
+    and warnings begin with the index of the scenario: ``scenarios[2]``.
 
     Returns
     -------
@@ -152,25 +157,31 @@ def relax_many(
     if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
         raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
     asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
-    leaves = [checked(scenario, set) for scenario in scenarios]
+    leaves = []
+    for number, scenario in enumerate(scenarios):
+        try:
+            leaves.append(checked(scenario, set))
+        except (ValueError, TypeError) as refused:
+            refused.args = (f"scenarios[{number}]: {refused}",)
+            raise
     with reporter(progress) as heard:
         cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
     found = [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
-    for leaf in found:
-        warn(leaf.name, leaf.remark, *leaf.doubts)
+    for number, leaf in enumerate(found):
+        warn(f"scenarios[{number}], {leaf.name}", leaf.remark, *leaf.doubts)
     return found
 
 
 def modes(
     scenario: Source,
-    count: int = 3,
+    count: SupportsIndex = 3,
     *,
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
-    stations: int | None = None,
+    stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and its lowest modes of vibration there, with their shapes.
@@ -205,11 +216,11 @@ def sensitivities(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     method: str = "semi-implicit",
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
-    modes: int = 3,
-    stations: int | None = None,
+    modes: SupportsIndex = 3,
+    stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and how that changes with numbers of its scenario: derivatives, with errors.
@@ -240,7 +251,7 @@ def sensitivities(
     >>> by_weight.tip_error < 1e-5
     True
     """
-    words = [keys] if isinstance(keys, str) else list(keys)
+    words = texts("keys", keys, "stiffness.axial")
     asked = _asked(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:

@@ -8,7 +8,7 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,7 @@ class Result:
             The files. Each is complete, whatever happens meanwhile.
         """
         names = self._files.names()
-        kinds = chosen(write, names)
+        kinds = chosen(write, [*KINDS, *map(kind, names)])
         place = Path(folder)
         if not isinstance(self._files, Kept):
             files = cast(Saving, self._files)
@@ -100,8 +100,10 @@ class Result:
         return written
 
     def figure(self, name: str | None = None) -> str:
-        """A figure of the program as SVG; left out, the first it draws."""
+        """A figure of the program as SVG, by its name; left out, the first it draws."""
         names = [file for file in self._files.names() if file.endswith(".svg")]
+        if name is not None and name not in names:
+            raise ValueError(f"name = {name!r}: must be one of {', '.join(names)}")
         return self._files.contents(name or names[0]).decode()
 
     def _repr_svg_(self) -> str:
@@ -109,6 +111,9 @@ class Result:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_files": keep(self._files)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(read_only(state))
 
 
 class Table(Result):
@@ -119,7 +124,7 @@ class Table(Result):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The columns of its table by their names, as arrays; an empty cell is not a number."""
+        """The columns of its table by their names, as arrays; an empty cell of numbers is not a number."""
         table = next(name for name in self._files.names() if name.endswith(".csv"))
         return columns(self._files.contents(table))
 
@@ -130,26 +135,47 @@ class Table(Result):
         return pandas.DataFrame(self.columns)
 
 
-def chosen(write: str | Iterable[str] | None, names: Iterable[str]) -> set[str]:
-    """The kinds of files that are to be written, of those that there are."""
+def chosen(write: str | Iterable[str] | None, known: Iterable[str], must: str = "must be of") -> set[str]:
+    """The kinds of files that are to be written, of those that are known."""
     if write is None:
         return set(KINDS)
     words = write.split(",") if isinstance(write, str) else list(write)
     kinds = {word.strip() for word in words} - {"none", ""}
-    known = sorted({*KINDS, *(kind(name) for name in names)})
+    known = sorted(set(known))
     for unknown in sorted(kinds.difference(known)):
-        raise ValueError(f"write = {unknown}: must be of {', '.join(known)}, or none")
+        raise ValueError(f"write = {unknown}: {must} {', '.join(known)}, or none")
     return kinds
+
+
+Found = TypeVar("Found")
+
+
+def read_only(found: Found) -> Found:
+    """Something whose arrays are read-only from now on."""
+    if isinstance(found, np.ndarray):
+        found.flags.writeable = False
+    elif isinstance(found, dict):
+        read_only(list(found.values()))
+    elif isinstance(found, (list, tuple)):
+        for part in found:
+            read_only(part)
+    return found
 
 
 def columns(table: bytes) -> dict[str, NDArray[Any]]:
     """The columns of a table in CSV."""
     rows = list(csv.reader(io.StringIO(table.decode())))
     cells = zip(*rows[1:]) if len(rows) > 1 else [()] * len(rows[0])
-    return {name: _column(column) for name, column in zip(rows[0], cells)}
+    return read_only({name: _column(column, name) for name, column in zip(rows[0], cells)})
 
 
-def _column(cells: tuple[str, ...]) -> NDArray[Any]:
+TEXTS = ("detail",)
+"""Columns of text, also where all cells are empty."""
+
+
+def _column(cells: tuple[str, ...], name: str) -> NDArray[Any]:
+    if name in TEXTS:
+        return np.array(cells, dtype=str)
     if cells and all(cell in ("true", "false") for cell in cells):
         return np.array([cell == "true" for cell in cells])
     for number in (int, float):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from numbers import Integral
 from typing import Any, TypeAlias, Union
 
 import numpy as np
@@ -20,8 +19,9 @@ class Scenario:
     Parameters
     ----------
     source
-        A path; a text in TOML (what has a line break, or an equals sign and does not end in ``.toml``); a dict of the
-        same form, in which lists may be arrays; or another scenario.
+        A path; a text in TOML or JSON; a dict of the same form, in which lists may be arrays; or another scenario. A
+        string with a line break is a text, and so is one that contains an equals sign or begins with a brace, unless it
+        ends in ``.toml`` or ``.json``.
     set
         Entries that are replaced: ``{"leaf.rods": 5, "load.gravity": [0, 0, -0.5]}``.
 
@@ -58,8 +58,13 @@ class Scenario:
             raise ScenarioError(f"scenario: is empty: {remedy}", file="scenario", remedy=remedy)
         elif isinstance(source, str) and _is_text(source):
             self._core = _leafdyn.Scenario(source, entries)
-        else:
+        elif isinstance(source, (str, os.PathLike)):
             self._core = _leafdyn.Scenario.read(os.fspath(source), entries)
+        else:
+            found = type(source).__name__
+            meant = "; give its .scenario" if hasattr(source, "scenario") else ""
+            allowed = "a path, a text in TOML or JSON, a dict and a leafdyn.Scenario"
+            raise TypeError(f"scenario = {found}: allowed are {allowed}{meant}")
 
     @property
     def name(self) -> str:
@@ -123,24 +128,16 @@ Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]
 
 
 def _is_text(source: str) -> bool:
-    return "\n" in source or source.startswith("{") or ("=" in source and not source.endswith(".toml"))
+    if "\n" in source:
+        return True
+    has_sign = "=" in source or source.lstrip("\ufeff \t").startswith("{")
+    return has_sign and not source.endswith((".toml", ".json"))
 
 
 def _restore(text: str, overrides: list[str], file: str) -> Scenario:
     scenario = Scenario.__new__(Scenario)
     scenario._core = _leafdyn.Scenario(text, overrides, file)
     return scenario
-
-
-def whole(**counts: int | None) -> None:
-    """Refuse what are no whole numbers, or negative ones."""
-    for name, count in counts.items():
-        least = 0 if name in ("modes", "count") else 1
-        allowed = f"allowed are whole numbers from {least}"
-        if count is not None and not isinstance(count, Integral):
-            raise TypeError(f"{name} = {count!r}: {allowed}")
-        if count is not None and count < 0:
-            raise ValueError(f"{name} = {count}: {allowed}")
 
 
 def checked(source: Source, set: Mapping[str, Any] | None) -> Scenario:

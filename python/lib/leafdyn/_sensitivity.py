@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._result import read_only
+
 Array = NDArray[np.float64]
 
 
@@ -56,6 +58,7 @@ class Sensitivity:
         self.tip_reaction = _vectors(entry.get("tip_reaction"))
         self.tip_reaction_moments = _vectors(entry.get("tip_reaction_moments"))
         self.stations, self.positions, self.positions_error = stations, positions, positions_error
+        read_only(self.__dict__)
 
     @property
     def tip(self) -> Array | None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._leaf import Array, Equilibrium
-from ._result import Contents, Result, Table
+from ._result import Contents, Result, Table, read_only
 from ._view import Viewed
 
 
@@ -147,9 +147,19 @@ class Branch:
         return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
 
 
+TIP = {axis: f"tip_{axis}" for axis in "xyz"}
+REACTION = {name: name for name in ("reaction_x", "reaction_y", "reaction_z")}
+SHOWN = {**TIP, **REACTION, "energy": "energy", "twist": "twist"}
+"""What the plot of a trace can show, and the columns of that."""
+
+
 class Trace(Table, Viewed):
     """An equilibrium followed through a number of its scenario."""
 
+    name: str
+    """The name of the scenario."""
+    vary: str
+    """The number that varies."""
     complete: bool
     """Whether all branches are known as far as was asked."""
     remark: str | None
@@ -166,21 +176,44 @@ class Trace(Table, Viewed):
         self.branches = []
         for number, (branch, lines) in enumerate(zip(said["branches"], curves), start=1):
             here = table["branch"] == number
-            rows = {name: column[here] for name, column in table.items()}
+            rows = read_only({name: column[here] for name, column in table.items()})
             self.branches.append(Branch(branch["end"], rows, lines, branch.get("remark")))
         if remark is None:
             remarks = (f"branch {k}: {branch.remark}" for k, branch in enumerate(self.branches, 1) if branch.remark)
             self.remark = next(remarks, None)
 
-    def plot(self, ax: Any = None, **style: Any) -> Any:
-        """Draw the height of the tip with matplotlib: solid where the leaf is stable, dashed where not, dots where
-        branches fold or cross."""
+    def plot(self, ax: Any = None, *, show: str | None = None, **style: Any) -> Any:
+        """Draw it with matplotlib: solid where the leaf is stable, dashed where not, dots where branches fold or cross.
+
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in a new figure.
+        show
+            ``"x"``, ``"y"`` or ``"z"`` of the tip, ``"reaction_x"``, ``"reaction_y"`` or ``"reaction_z"`` of a held one,
+            ``"energy"`` or ``"twist"``; left out: the coordinate of the tip that varies most, of the reaction if it is
+            held.
+        style
+            What ``Axes.plot`` takes.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        table = self.columns
+        shown = {name: column for name, column in SHOWN.items() if column in table}
+        if show is None:
+            varying = REACTION if "reaction_x" in shown else TIP
+            show = max(reversed(varying), key=lambda name: float(np.ptp(table[shown[name]])))
+        if show not in shown:
+            raise ValueError(f"show = {show!r}: must be one of {', '.join(shown)}")
+        column = shown[show]
         if ax is None:
             from matplotlib import pyplot
 
             ax = pyplot.figure().add_subplot()
         for branch in self.branches:
-            values, height = branch.values, branch.tips[:, 2]
+            values, height = branch.values, branch.columns[column]
             (line,) = ax.plot(values, np.where(branch.stable, height, np.nan), **style)
             unstable = ~branch.stable
             # A dashed line begins where the solid one ends.
@@ -188,7 +221,7 @@ class Trace(Table, Viewed):
             unstable[1:] |= ~branch.stable[:-1]
             ax.plot(values, np.where(unstable, height, np.nan), "--", **{"color": line.get_color(), **style})
             ax.plot(values[branch.critical], height[branch.critical], "o", color=line.get_color())
-        ax.set(xlabel=self.vary, ylabel="tip z")
+        ax.set(xlabel=self.vary, ylabel=column.replace("_", " "))
         return ax
 
     def __repr__(self) -> str:
@@ -266,7 +299,7 @@ class Boundary(Table):
         self.curves = []
         for number, (curve, places) in enumerate(zip(said["curves"], lines), start=1):
             here = table["curve"] == number
-            rows = {name: column[here] for name, column in table.items()}
+            rows = read_only({name: column[here] for name, column in table.items()})
             ends = (curve["ends"][0], curve["ends"][1])
             self.curves.append(Curve(curve["kind"], curve["multiplicity"], ends, rows, places, self.vary))
         if remark is None and not complete:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, overload
+from typing import Any, SupportsIndex, overload
 
 from . import _leafdyn
+from ._arguments import numbers, switches, text, texts, whole
 from ._leaf import Equilibrium
 from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
 from ._relax import warn
-from ._scenario import Scenario, Source, checked, whole
+from ._scenario import Scenario, Source, checked
 from ._study import Boundary, Chart, Check, Map, Shapes, Trace
 
 
@@ -20,7 +21,7 @@ def check(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     keep_unstable: bool = False,
-    intervals: int | None = None,
+    intervals: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Check:
     """Have a leaf confirmed by an independent method: its boundary-value problem is solved by shooting, and compared.
@@ -52,6 +53,8 @@ def check(
     ('agree', True)
     """
     whole(intervals=intervals)
+    numbers(tolerance=tolerance)
+    switches(keep_unstable=keep_unstable)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         files, relaxed, solution = _leafdyn.check(leaf._core, tolerance, keep_unstable, intervals, heard)
@@ -66,7 +69,7 @@ def all_shapes(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     full_model: bool = False,
-    stations: int | None = None,
+    stations: SupportsIndex | None = None,
     progress: Progress = None,
 ) -> Shapes:
     """Look for all equilibria of a leaf, from many starts. Which there are no number of starts can prove.
@@ -93,6 +96,8 @@ def all_shapes(
     (1, True)
     """
     whole(stations=stations)
+    numbers(tolerance=tolerance)
+    switches(full_model=full_model)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         files, found = _leafdyn.all_shapes(leaf._core, tolerance, full_model, stations, heard)
@@ -108,9 +113,9 @@ def trace(
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
     keep_unstable: bool = False,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     tolerance: float | None = None,
-    points: int | None = None,
+    points: SupportsIndex | None = None,
     cross_section: float | None = None,
     progress: Progress = None,
 ) -> Trace: ...
@@ -124,9 +129,9 @@ def trace(
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
     keep_unstable: bool = False,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     tolerance: float | None = None,
-    points: int | None = None,
+    points: SupportsIndex | None = None,
     cross_section: float | None = None,
     progress: Progress = None,
 ) -> Boundary: ...
@@ -139,9 +144,9 @@ def trace(
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
     keep_unstable: bool = False,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     tolerance: float | None = None,
-    points: int | None = None,
+    points: SupportsIndex | None = None,
     cross_section: float | None = None,
     progress: Progress = None,
 ) -> Trace | Boundary:
@@ -201,6 +206,11 @@ def trace(
     True
     """
     whole(segments=segments, points=points)
+    numbers(tolerance=tolerance, cross_section=cross_section)
+    switches(switch=switch, keep_unstable=keep_unstable)
+    keys = texts("vary", vary, "load.gravity[2]=-1..-2")
+    if not isinstance(vary, str) and len(keys) != 2:
+        raise ValueError(f"vary has {len(keys)} numbers: give one as a text, or a list of two")
     leaf = checked(scenario, set)
     asked = {
         "switch": switch,
@@ -215,9 +225,7 @@ def trace(
         if isinstance(vary, str):
             found = Trace(*_leafdyn.trace(leaf._core, vary, asked, heard))
         else:
-            if len(vary) != 2:
-                raise ValueError(f"vary has {len(vary)} numbers: give one as a text, or a list of two")
-            found = Boundary(*_leafdyn.boundary(leaf._core, vary[0], vary[1], asked, heard))
+            found = Boundary(*_leafdyn.boundary(leaf._core, keys[0], keys[1], asked, heard))
     warn(found.name, found.remark)
     return found
 
@@ -227,7 +235,7 @@ def map(
     vary: str | Iterable[str],
     *,
     set: Mapping[str, Any] | None = None,
-    methods: Iterable[str] | None = None,
+    methods: str | Iterable[str] | None = None,
     tolerance: float | None = None,
     cell_seconds: float | None = None,
     show: str = "outcomes",
@@ -240,7 +248,7 @@ def map(
     vary
         One or two of ``"KEY=FROM..TO[:COUNT][log]"``.
     methods
-        Left out: all.
+        One or more; left out: all.
     cell_seconds
         Time allowed for each method in each cell.
     show
@@ -270,9 +278,11 @@ def map(
     >>> list(found.columns["outcome"])
     [np.str_('right'), np.str_('right'), np.str_('right')]
     """
+    numbers(tolerance=tolerance, cell_seconds=cell_seconds)
+    text("show", show, "outcomes")
+    axes = texts("vary", vary, "load.gravity[2]=-1..-2")
+    words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
-    axes = [vary] if isinstance(vary, str) else list(vary)
-    words = None if methods is None else list(methods)
     with reporter(progress) as heard:
         return Map(_leafdyn.map(leaf._core, axes, words, tolerance, cell_seconds, show, heard))
 
@@ -282,8 +292,8 @@ def chart(
     *,
     set: Mapping[str, Any] | None = None,
     seconds: float | None = None,
-    methods: Iterable[str] | None = None,
-    rods: Iterable[int] = (),
+    methods: str | Iterable[str] | None = None,
+    rods: Iterable[SupportsIndex] = (),
     progress: Progress = None,
 ) -> Chart:
     """Measure every method over its own accuracy: time against true error.
@@ -293,7 +303,7 @@ def chart(
     seconds
         About how long to measure.
     methods
-        Left out: all.
+        One or more; left out: all.
     rods
         Also measure time against the number of rods, at the tolerance: ``[5, 15, 35]``.
 
@@ -326,8 +336,9 @@ def chart(
     >>> found.confirmed, bool((found.columns["seconds"] > 0).any())
     (True, True)
     """
+    numbers(seconds=seconds)
+    words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
-    words = None if methods is None else list(methods)
     leaves = [Scenario(leaf, {"leaf.rods": count})._core for count in rods]
     with reporter(progress) as heard:
         found = Chart(*_leafdyn.chart(leaf._core, seconds, words, leaves, heard))
@@ -341,7 +352,7 @@ def simulate(
     *,
     set: Mapping[str, Any] | None = None,
     method: str | None = None,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     step: float | None = None,
     tolerance: float | None = None,
     progress: Progress = None,
@@ -385,9 +396,7 @@ def simulate(
     >>> motion.outcome, motion.positions.shape[0] == len(motion.times)
     ('completed', True)
     """
-    whole(segments=segments)
-    leaf = checked(scenario, set)
-    core = _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
+    leaf, core = _motion(scenario, set, method, segments, step, tolerance)
     with reporter(progress) as heard:
         core.follow(heard)
     found = Motion(core, leaf.name, leaf.joined)
@@ -395,12 +404,29 @@ def simulate(
     return found
 
 
+def _motion(
+    scenario: Source,
+    set: Mapping[str, Any] | None,
+    method: str | None,
+    segments: SupportsIndex | None,
+    step: float | None,
+    tolerance: float | None,
+) -> tuple[Scenario, _leafdyn.Motion]:
+    """A leaf that is about to move."""
+    whole(segments=segments)
+    numbers(step=step, tolerance=tolerance)
+    if method is not None:
+        text("method", method, "explicit")
+    leaf = checked(scenario, set)
+    return leaf, _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
+
+
 def frames(
     scenario: Source,
     *,
     set: Mapping[str, Any] | None = None,
     method: str | None = None,
-    segments: int | None = None,
+    segments: SupportsIndex | None = None,
     step: float | None = None,
     tolerance: float | None = None,
 ) -> Iterator[Frame]:
@@ -432,9 +458,7 @@ def frames(
     >>> frame.positions.shape == frame.velocities.shape
     True
     """
-    whole(segments=segments)
-    leaf: Scenario = checked(scenario, set)
-    core = _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
+    leaf, core = _motion(scenario, set, method, segments, step, tolerance)
     outputs: dict[str, Any] | None = core.frame()
     while outputs is not None:
         yield frame(outputs)

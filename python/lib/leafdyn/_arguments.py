@@ -1,0 +1,65 @@
+"""Arguments that are refused before anything is computed: the message names the argument and what is allowed."""
+
+from __future__ import annotations
+
+import operator
+import sys
+from collections.abc import Iterable
+from typing import SupportsIndex
+
+import numpy as np
+
+
+def whole(**counts: SupportsIndex | None) -> None:
+    """Refuse what are no whole numbers, negative ones, and those that no computer counts to."""
+    for name, found in counts.items():
+        least = 0 if name in ("modes", "count") else 1
+        if found is None and least > 0:
+            continue
+        allowed = f"allowed are whole numbers from {least}"
+        try:
+            count = operator.index(found)  # type: ignore[arg-type]
+        except TypeError:
+            raise TypeError(f"{name} = {found!r}: {allowed}") from None
+        if count < 0:
+            raise ValueError(f"{name} = {count}: {allowed}")
+        if count > sys.maxsize:
+            raise ValueError(f"{name} = {count}: {allowed} to {sys.maxsize}")
+
+
+def numbers(**given: float | None) -> None:
+    """Refuse what are no numbers."""
+    for name, found in given.items():
+        try:
+            if isinstance(found, (str, bytes)):
+                raise TypeError
+            if found is not None:
+                float(found)
+        except TypeError:
+            raise TypeError(f"{name} = {found!r}: must be a number") from None
+        except OverflowError:
+            raise ValueError(f"{name} = {found!r}: must be a number up to {sys.float_info.max:.1e}") from None
+
+
+def switches(**given: bool) -> None:
+    """Refuse what is neither true nor false."""
+    for name, found in given.items():
+        if not isinstance(found, (bool, np.bool_)):
+            raise TypeError(f"{name} = {found!r}: must be True or False")
+
+
+def text(name: str, found: str, example: str) -> None:
+    """Refuse what is no text."""
+    if not isinstance(found, str):
+        raise TypeError(f'{name} = {found!r}: must be text, such as "{example}"')
+
+
+def texts(name: str, found: str | Iterable[str], example: str) -> list[str]:
+    """A list of texts, also of one."""
+    words = [found] if isinstance(found, str) else found
+    if not isinstance(words, Iterable):
+        raise TypeError(f'{name} = {found!r}: must be text, such as "{example}", or a list of texts')
+    listed = list(words)
+    for word in listed:
+        text(name, word, example)
+    return listed
