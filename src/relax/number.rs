@@ -32,7 +32,7 @@ const ONE_SIDED: [(f64, f64); 5] = [
 /// A numerical parameter of a scenario.
 pub(crate) struct Number<'a> {
     /// The scenario with another value of the parameter, if that is admissible.
-    pub make: &'a (dyn Fn(f64) -> Option<Scenario> + Sync),
+    pub make: Box<dyn Fn(f64) -> Option<Scenario> + Send + Sync + 'a>,
     /// Its value.
     pub value: f64,
     /// Size used for the step where the value is zero.

@@ -4,7 +4,6 @@ use super::{Base, Keys, VaryError};
 use crate::relax::{
     Equilibrium, Number, Options, Progress, RelaxError, relax_on_grids, sensitivities,
 };
-use crate::scenario::Scenario;
 
 /// Why there are no derivatives.
 #[derive(Debug, thiserror::Error)]
@@ -33,26 +32,11 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    let values = keys.iter().map(|keys| base.value(keys));
-    let values = values.collect::<Result<Vec<f64>, _>>()?;
-    let made: Vec<_> = (keys.iter().zip(&values))
-        .map(|(keys, &own)| {
-            move |value: f64| -> Option<Scenario> {
-                match value == own {
-                    true => Some(scenario.clone()),
-                    false => Some(base.at(&[(keys, value)]).ok()?.scenario),
-                }
-            }
-        })
-        .collect();
-    let numbers: Vec<(String, Number)> = (keys.iter().zip(&values).zip(&made))
-        .map(|((keys, &value), make)| {
-            let number = Number {
-                make,
-                value,
-                unit: keys.unit(scenario),
-                linear: keys.is_linear(),
-            };
+    let values = keys.iter().map(|keys| Ok((keys, base.value(keys)?)));
+    let values = values.collect::<Result<Vec<(&Keys, f64)>, VaryError>>()?;
+    let numbers: Vec<(String, Number)> = (values.chunks(1).zip(keys))
+        .map(|(own, keys)| {
+            let number = base.parameter(own, 0, keys.unit(scenario));
             (keys.to_string(), number)
         })
         .collect();

@@ -10,7 +10,6 @@ use super::quantity::Quantity;
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
-use crate::scenario::Scenario;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
@@ -37,25 +36,10 @@ impl Model<'_> {
             return Ok(());
         }
         let of = &self.cases[case];
-        let fixed = self.values(of, theta);
-        let first = fixed.len() - theta.len();
-        let made: Vec<_> = (0..theta.len())
-            .map(|k| {
-                let fixed = &fixed;
-                move |value: f64| -> Option<Scenario> {
-                    let mut values = fixed.clone();
-                    values[first + k].1 = value;
-                    Some(self.base.at(&values).ok()?.scenario)
-                }
-            })
-            .collect();
-        let numbers: Vec<Number> = (self.coordinates.iter().zip(theta).zip(&made))
-            .map(|((free, theta), make)| Number {
-                make,
-                value: free.value(*theta),
-                unit: free.unit,
-                linear: free.keys.is_linear(),
-            })
+        let values = self.values(of, theta);
+        let first = values.len() - theta.len();
+        let numbers: Vec<Number> = (self.coordinates.iter().enumerate())
+            .map(|(k, free)| self.base.parameter(&values, first + k, free.unit))
             .collect();
         let changes = || -> Option<Vec<Change>> { numbers.iter().map(Number::rate).collect() };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());

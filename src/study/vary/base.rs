@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
+use crate::relax::Number;
 use crate::scenario::{self, Entries, Form, Key, Scenario};
 
 /// A scenario with some entries replaced, into which numbers are substituted.
@@ -184,6 +185,27 @@ impl Base {
             }
         }
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
+    }
+
+    /// The `k`th of these values as a parameter of the scenario that has them all. `unit` is the
+    /// size of its steps where it is zero.
+    pub(crate) fn parameter<'v>(
+        &'v self,
+        values: &'v [(&'v Keys, f64)],
+        k: usize,
+        unit: f64,
+    ) -> Number<'v> {
+        let (keys, value) = values[k];
+        Number {
+            make: Box::new(move |value| {
+                let mut values = values.to_vec();
+                values[k].1 = value;
+                Some(self.at(&values).ok()?.scenario)
+            }),
+            value,
+            unit,
+            linear: keys.is_linear(),
+        }
     }
 
     /// The same keys, or one for each entry if they are a list or a profile.
