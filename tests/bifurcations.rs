@@ -252,3 +252,39 @@ fn a_less_curved_rod_stays_in_its_plane() {
         }
     }
 }
+
+/// A buckled column that is unloaded becomes straight at Euler's load, where its branch turns back
+/// into the mirror image. No eigenvalue changes its sign along it, but the straight column is
+/// reported as crossing there, and is followed to both sides if requested.
+#[test]
+fn a_buckled_branch_reports_the_straight_one_that_crosses_it() {
+    let euler = -(std::f64::consts::FRAC_PI_2).powi(2);
+    for segments in [None, Some(64)] {
+        let column = base(
+            &text("classic/elastica_buckled"),
+            "load.tip_force=[-3, 0, 0]",
+        );
+        let mut request = branch::request(column, "load.tip_force[0]=-3..-1", 1e-8, 2000);
+        request.keep_unstable = false;
+        request.switch = true;
+        request.segments = segments;
+        let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
+        let [buckled, straight @ ..] = trace.branches.as_slice() else {
+            panic!("no branch")
+        };
+        let critical: Vec<_> = buckled.critical().collect();
+        let [(_, vertex)] = critical[..] else {
+            panic!("{} critical points", critical.len())
+        };
+        let (off, told) = ((vertex.value - euler).abs(), vertex.value_error.unwrap());
+        assert!(off <= told && told < 1e-6, "{off:.1e} of {told:.1e}");
+        assert_eq!(vertex.index, 0);
+        let ends = straight.iter().filter_map(|it| it.points.last());
+        let ends: Vec<_> = ends.map(|end| (end.value, end.index)).collect();
+        assert_eq!(ends.len(), 2);
+        assert!(
+            ends.contains(&(-1.0, 0)) && ends.contains(&(-3.0, 1)),
+            "{ends:?}"
+        );
+    }
+}

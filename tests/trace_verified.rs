@@ -226,3 +226,27 @@ fn points_of_veins_with_soft_ends_are_within_what_is_told() {
         }
     }
 }
+
+/// Where axial stiffness times the length squared is a million times the bending stiffness, Newton's
+/// method with the matrix of a softer leaf converges linearly, in more than ten iterations.
+#[test]
+fn a_nearly_rigid_leaf_is_followed_to_the_end_of_its_range() {
+    const SEDGE: &str = r#"
+        name = "sedge"
+        units = { length = "cm", force = "N" }
+        leaf = { rods = 5, length = 18.0, fan = [-0.25, -0.125, 0.0, 0.125, 0.25] }
+        coupling = { y = 1e-3, z = 1e-3 }
+        rest = { bend_2 = { at = [0.0, 1.0], value = [0.0, 0.02] } }
+        load = { gravity = [0.0, 0.0, 3e-6] }
+        [section]
+        shape = "ellipse"
+        width = { at = [0.0, 0.5, 1.0], value = [0.12, 0.1, 0.03] }
+        thickness = 0.04
+        young = 30000.0
+    "#;
+    let vary = "load.gravity[2]=3e-6..1e-6";
+    let mut request = branch::request(base(SEDGE, ""), vary, TOLERANCE, 2000);
+    request.keep_unstable = false;
+    let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
+    assert_eq!(trace.branches[0].end, leafdyn::study::TraceEnd::Reached);
+}

@@ -4,6 +4,7 @@ use super::deflation::Sample;
 use super::equations::{Equations, Stuck};
 use super::field::{combined, dot, plus, times};
 use super::states::eigenvalue_rounding;
+use super::step::Found;
 use super::{Direction, Point};
 use crate::leaf::{Field, State};
 
@@ -29,6 +30,17 @@ const SAME: f64 = 1e-6;
 /// are on the same branch.
 const ARRIVES: f64 = 0.05;
 
+/// Distances (parts of the range) behind the vertex of a pitchfork at which the branch that
+/// crosses there is sought.
+const BEYOND: [f64; 3] = [0.01, 0.003, 0.001];
+
+/// The crossing is that of the vertex if it is within so many steps of where a parabola through
+/// the points on either side has it.
+const NEAR: f64 = 10.0;
+
+/// Two vertices nearer to each other than this are the same.
+const REPEATED: f64 = 1e-4;
+
 /// Kind of a critical point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -46,7 +58,7 @@ pub struct Critical {
     pub fraction: f64,
     pub tangent: Direction,
     pub kind: Kind,
-    /// Morse index before and after.
+    /// Morse index before and after; the same at the vertex of a pitchfork.
     pub indices: [usize; 2],
     /// The neutral modes, of mass one.
     pub modes: Vec<Field>,
@@ -109,6 +121,39 @@ pub fn locate(
         }
     }
     Ok(found.into_iter().map(|(_, critical)| critical).collect())
+}
+
+/// The point at which a branch turns back because it crosses another one there, the vertex of a
+/// pitchfork: no eigenvalue changes its sign along this branch, but one does along the other, which
+/// goes on beyond the vertex. The points are on either side of the vertex, `step` apart; the
+/// tangent of the result is that of the other branch. None if that is not found.
+pub fn crossing_at_vertex(
+    equations: &mut Equations,
+    a: &Point,
+    b: &Point,
+    step: f64,
+) -> Option<Critical> {
+    let rates = [a, b].map(|point| point.tangent.params[0]);
+    let to_vertex = step * rates[0] / (rates[0] - rates[1]);
+    let fraction = a.fraction + 0.5 * rates[0] * to_vertex;
+    let vertex = equations.moved(&a.solution(), &a.tangent, to_vertex).ok()?;
+    BEYOND.into_iter().find_map(|beyond| {
+        let behind = fraction + beyond.copysign(rates[0]);
+        let mut behind = equations.correct(&vertex.state, behind, None).ok()?;
+        if rates[0] > 0.0 {
+            behind.tangent = behind.tangent.reversed();
+        }
+        let length = 2.0 * beyond / behind.tangent.params[0].abs();
+        let before = Found::by_step(equations, &behind, length).ok()?;
+        let [mut critical] = locate(equations, &behind, &before.point, length)
+            .ok()?
+            .try_into()
+            .ok()?;
+        let shift = vertex.state.shift_to(&critical.state);
+        let same = shift < NEAR * step && (critical.fraction - fraction).abs() < NEAR * step;
+        critical.indices = [a.index, b.index];
+        (same && critical.kind == Kind::Branching).then_some(critical)
+    })
 }
 
 /// Evaluates points along the tangent of one, and the eigenvalues of H there.
@@ -217,6 +262,17 @@ impl Search<'_, '_> {
 }
 
 impl Critical {
+    /// Whether the index does not change along the branch: see [`crossing_at_vertex`].
+    pub fn is_vertex(&self) -> bool {
+        self.indices[0] == self.indices[1]
+    }
+
+    /// Whether this is the same point, found again after a step that the walk gave up.
+    pub fn is_at(&self, other: &Critical) -> bool {
+        let apart = self.state.shift_to(&other.state);
+        apart.max((self.fraction - other.fraction).abs()) < REPEATED
+    }
+
     /// The same critical point on another grid or of a softened matrix, by a secant method from
     /// the known state.
     pub fn relocated(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
@@ -295,8 +351,12 @@ impl Critical {
     }
 
     /// A direction along which another branch may leave: the first neutral mode
-    /// orthogonalised against this branch.
+    /// orthogonalised against this branch; at the vertex of a pitchfork the tangent, that of the
+    /// other branch.
     pub fn across(&self, equations: &Equations) -> Direction {
+        if self.is_vertex() {
+            return self.tangent.clone();
+        }
         let mode = &self.modes[0];
         let part = equations.product(&self.tangent.increments, mode);
         equations.normalised(Direction {

@@ -166,7 +166,9 @@ impl Followed {
                 }
             })
             .collect();
-        let mut critical = found.split_off(points.len()).into_iter();
+        let mut singular = found.split_off(points.len());
+        self.forget_vertices(&mut singular);
+        let mut critical = singular.into_iter();
         let mut dropped = 0;
         for point in found {
             let number = self.points.len();
@@ -195,6 +197,18 @@ impl Followed {
             }
         }
         None
+    }
+
+    /// Drops vertices of pitchforks that are not verified, from the last critical points and from
+    /// what is `found` of these: without them the branch is complete.
+    fn forget_vertices(&mut self, found: &mut Vec<Result<Refined, Doubt>>) {
+        let known = self.critical.len();
+        for k in (0..found.len()).rev() {
+            if found[k].is_err() && self.branch.critical[known + k].1.is_vertex() {
+                self.branch.critical.remove(known + k);
+                drop(found.remove(k));
+            }
+        }
     }
 
     /// Number of critical points between this point and the next.

@@ -1,6 +1,6 @@
 //! Following a branch on one grid.
 
-use super::critical::{Critical, Kind, locate};
+use super::critical::{Critical, Kind, crossing_at_vertex, locate};
 use super::equations::{Equations, Stuck};
 use super::field::{add, between, plus};
 use super::refine::on_finer;
@@ -265,7 +265,7 @@ impl Branch {
             let vertex = turned
                 && next.point.index == now.index
                 && found.as_ref().is_ok_and(|found| found.is_empty());
-            let found = found.unwrap_or_default();
+            let mut found = found.unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
             let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
             let explained = changes == next.point.index.abs_diff(now.index)
@@ -277,7 +277,12 @@ impl Branch {
                     self.step = 0.5 * next.step;
                     return Ok(());
                 }
-                if !vertex {
+                if vertex {
+                    let vertex = crossing_at_vertex(equations, now, &next.point, distance);
+                    let known = self.critical.last().map(|(_, last)| last);
+                    let again = |vertex: &Critical| known.is_some_and(|known| known.is_at(vertex));
+                    found.extend(vertex.filter(|vertex| !again(vertex)));
+                } else {
                     self.missed.push(after);
                 }
             }

@@ -49,6 +49,11 @@ impl Contraction {
         }
     }
 
+    /// Whether an increment has followed another one.
+    pub fn is_measured(&self) -> bool {
+        self.0 > 0.0
+    }
+
     /// The error after a first increment with which the largest change of a force (A/L^2) is
     /// `force`; the force is ignored before any convergence has been measured.
     pub fn error_after_first(&self, size: f64, force: f64) -> f64 {

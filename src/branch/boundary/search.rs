@@ -92,7 +92,7 @@ impl Search {
         let along = manifold.momentum(&self.along.increments);
         let mut solution = manifold.with_segment_forces(&self.solution)?;
         let mut previous = f64::INFINITY;
-        for _ in 0..ITERATIONS {
+        for iteration in 0..ITERATIONS {
             let rates = manifold.rates(&solution, false)?;
             let mut sample = manifold.sample(solution, &border, rates, false)?;
             let eigen = eigen(&sample, self.neutral);
@@ -112,11 +112,22 @@ impl Search {
             ];
             let (next, size) = manifold.newton_step(&sample, &functions)?;
             solution = next;
-            contraction.update(size, previous);
-            let first = contraction.error_after_first(size, 0.0);
+            if previous > ROUNDED {
+                contraction.update(size, previous);
+            }
+            // State and parameters have different scales: the constant may be large.
+            let first = match contraction.is_measured() || size < ROUNDED {
+                true => contraction.error_after_first(size, 0.0),
+                false => f64::INFINITY,
+            };
             let accuracy = (self.accuracy, ROUNDED);
-            // With less accurate derivatives, increments cannot shrink faster than these are known.
-            let slopes = SLOPES.max(size / previous);
+            // With less accurate derivatives, increments cannot shrink faster than these are known;
+            // and as the forces in segments follow their strains one iteration later, what the
+            // first increment left may be subtracted twice by the second.
+            let slopes = match iteration {
+                1 => 1.0,
+                _ => SLOPES.max(size / previous),
+            };
             if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
                 let moved = manifold.difference(&self.solution, &solution);
                 let distance = manifold.inner(&moved, &self.across);
