@@ -150,3 +150,42 @@ fn strong_coupling() {
     let failure = shoot_near(&glued, &relaxed).expect_err("tens of thousands of intervals");
     assert!(matches!(failure.reason, Reason::Unbounded { .. }));
 }
+
+/// Stations that are asked for are integrated to, and not interpolated: beside knots that are
+/// close to each other interpolation was worse than stated, at every tolerance.
+#[test]
+fn stations_asked_for_are_within_their_estimate() {
+    let mut leaf = fig04(3);
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        let soft = 0.25 + 0.1 * j as f64;
+        let knots = [0.0, 0.263, 0.298, 1.0];
+        rod.couple_stiffness[1] = linear(&knots, &[0.7, 1.5, soft, 1.9]);
+        rod.rest_curvature[1] = linear(&[0.0, 1.0], &[1.8, -2.0]);
+    }
+    let asked = |parts: usize, options: Options| {
+        let options = Options {
+            stations: Some(parts),
+            ..options
+        };
+        settled(&leaf, &options).at_stations(&leaf, Some(parts))
+    };
+    let arcs = Method::Shooting { intervals: None };
+    let rest = Method::ShootingFromRest { intervals: None };
+    for parts in [3, 16, 33, 64] {
+        let exact = asked(parts, to(TIGHT));
+        for (method, tolerance) in [(rest, 1e-4), (arcs, 1e-6), (rest, 1e-8)] {
+            let shot = asked(
+                parts,
+                Options {
+                    method,
+                    ..to(tolerance)
+                },
+            );
+            assert_eq!(shot.shape.stations, exact.shape.stations);
+            let off = apart(&leaf, &shot.shape.rods, &exact.shape.rods).position;
+            let estimate = (estimate(&shot) + estimate(&exact)) / leaf.rods[0].length;
+            let what = format!("{parts} parts, {tolerance:e}: {off:.1e}, {estimate:.1e}");
+            assert!(off <= estimate, "{what}");
+        }
+    }
+}

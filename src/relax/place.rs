@@ -17,12 +17,12 @@ const LEAST_GAIN: f64 = 4.0;
 const LAGRANGE: usize = 6;
 
 /// A point along the veins, and the stations around it.
-pub struct Place {
+pub struct Place<'s> {
     /// The station at this point, if there is one.
     pub node: Option<usize>,
     pub at: f64,
     /// Stations between the same knots.
-    near: Vec<f64>,
+    near: &'s [f64],
     /// Index of the first of them.
     pub first: usize,
 }
@@ -33,18 +33,20 @@ pub type Values = Vec<(usize, f64)>;
 /// Stations with the weights of the value and of the slope there.
 pub type Slopes = Vec<(usize, f64, f64)>;
 
-impl Place {
+/// Stations closer than this are one.
+const SAME: f64 = 1e-14;
+
+impl<'s> Place<'s> {
     /// The point `at` among the stations `known`, with kinks of profiles at `kinks`.
-    pub fn new(known: &[f64], kinks: &[f64], at: f64) -> Self {
-        let node = known
-            .iter()
-            .position(|station| (station - at).abs() < 1e-14);
+    pub fn new(known: &'s [f64], kinks: &[f64], at: f64) -> Self {
+        let node = known.partition_point(|station| at - station >= SAME);
+        let node = (node < known.len() && known[node] - at < SAME).then_some(node);
         let right = kinks.partition_point(|kink| *kink <= at);
         let left = right.checked_sub(1).map_or(0.0, |left| kinks[left]);
         let right = kinks.get(right).copied().unwrap_or(1.0);
-        let first = known.partition_point(|station| *station < left - 1e-14);
-        let last = known.partition_point(|station| *station <= right + 1e-14);
-        let near = known[first..last].to_vec();
+        let first = known.partition_point(|station| *station < left - SAME);
+        let last = known.partition_point(|station| *station <= right + SAME);
+        let near = &known[first..last];
         Place {
             node,
             at,
@@ -67,7 +69,7 @@ impl Place {
     /// The monic polynomial that vanishes at these stations together with its slope.
     fn node_polynomial(&self, fewer: usize) -> f64 {
         let count = self.count(fewer);
-        let (first, _) = weights(&self.near, self.at, count);
+        let (first, _) = weights(self.near, self.at, count);
         let near = &self.near[first..first + count];
         near.iter().map(|node| (self.at - node).powi(2)).product()
     }
@@ -75,7 +77,7 @@ impl Place {
     /// The Hermite polynomial through `fewer` stations less.
     fn reduced_hermite(&self, fewer: usize) -> Slopes {
         let count = self.count(fewer);
-        let (first, lagrange) = weights(&self.near, self.at, count);
+        let (first, lagrange) = weights(self.near, self.at, count);
         let near = &self.near[first..first + count];
         let each = lagrange.iter().enumerate().map(|(i, weight)| {
             let others = (0..count).filter(|&j| j != i);
@@ -89,14 +91,14 @@ impl Place {
 
     /// The Lagrange polynomial through the nearest stations.
     pub fn lagrange(&self) -> Values {
-        let (first, weights) = weights(&self.near, self.at, LAGRANGE);
+        let (first, weights) = weights(self.near, self.at, LAGRANGE);
         (self.first + first..).zip(weights).collect()
     }
 
     /// The Lagrange polynomial through the nearest stations other than this one, and that of
     /// two fewer.
     pub fn leave_one_out(&self) -> [Values; 2] {
-        let mut near = self.near.clone();
+        let mut near = self.near.to_vec();
         let own = near.iter().position(|at| *at == self.at);
         own.map(|own| near.remove(own));
         [LAGRANGE, LAGRANGE - 2].map(|count| {
