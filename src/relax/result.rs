@@ -258,8 +258,12 @@ fn advice(run: &Run) -> String {
         }
         _ => String::new(),
     };
+    let otherwise = match moment > 0.0 && run.leaf.held.is_none() {
+        true => ", or try the method shooting",
+        false => "",
+    };
     format!(
-        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}",
+        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}{otherwise}",
         vein + 1
     )
 }
