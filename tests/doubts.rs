@@ -62,3 +62,38 @@ fn nothing_is_said_about_other_leaves() {
         assert!(doubts.is_empty(), "{}: {doubts:?}", file.display());
     }
 }
+
+/// A tip held out of reach, by a slip of units; a vein that has grown reaches farther.
+#[test]
+fn a_tip_held_out_of_reach_is_named() {
+    let held = |place: f64, entries: &str| {
+        let text = held("pinned").replace("[1.0, 0.0, 0.0]", &format!("[{place:?}, 0.0, 0.0]"));
+        let leaf = Scenario::from_toml_with(&text, "rod", &common::entries(entries)).unwrap();
+        relaxed(&leaf, &to(1e-6))
+    };
+    let far = held(1.3, "");
+    assert!(far.outcome.is_success());
+    let wanted =
+        "tip.position is 1.3 from the base, and vein 1 is 1 long: it would stretch by 30 %";
+    assert!(far.doubts.concat().starts_with(wanted), "{:?}", far.doubts);
+    assert_eq!(far.doubts.len(), 1);
+    assert!(held(1.15, "").doubts.is_empty());
+    assert!(held(1.5, "rest.stretch=1.4").doubts.is_empty());
+    // A leaf in centimetres, the tip in millimetres.
+    let blades = Scenario::from_toml(
+        r#"
+        name = "blades"
+        leaf = { rods = 5, length = 18.0, fan = [-0.25, -0.125, 0.0, 0.125, 0.25] }
+        section = { shape = "ellipse", width = { at = [0.0, 0.5, 1.0], value = [0.12, 0.1, 0.03] }, thickness = 0.04, young = 30000.0, mass_density = 1e-8 }
+        coupling = { y = 1e-3, z = 1e-3 }
+        rest = { bend_2 = { at = [0.0, 1.0], value = [0.0, 0.02] } }
+        load = { gravity = [0.0, 0.0, -4e-5] }
+        tip = { held = "pinned", position = [40.0, 0.0, 0.0] }
+        "#,
+    );
+    let lost = relaxed(&blades.unwrap(), &to(1e-6));
+    assert_eq!(lost.outcome, Outcome::Diverged);
+    let said = [lost.remark.unwrap_or_default(), lost.doubts.concat()].concat();
+    assert!(said.contains("tip.position is 40 from"), "{said}");
+    assert!(!said.contains("lower"), "{said}");
+}

@@ -150,3 +150,66 @@ fn strong_coupling() {
     let failure = shoot_near(&glued, &relaxed).expect_err("tens of thousands of intervals");
     assert!(matches!(failure.reason, Reason::Unbounded { .. }));
 }
+
+/// Stations that are asked for are integrated to, and not interpolated: beside knots that are
+/// close to each other interpolation was worse than stated, at every tolerance.
+#[test]
+fn stations_asked_for_are_within_their_estimate() {
+    let mut leaf = fig04(3);
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        let soft = 0.25 + 0.1 * j as f64;
+        let knots = [0.0, 0.263, 0.298, 1.0];
+        rod.couple_stiffness[1] = linear(&knots, &[0.7, 1.5, soft, 1.9]);
+        rod.rest_curvature[1] = linear(&[0.0, 1.0], &[1.8, -2.0]);
+    }
+    let asked = |parts: usize, options: Options| {
+        let options = Options {
+            stations: Some(parts),
+            ..options
+        };
+        settled(&leaf, &options).at_stations(&leaf, Some(parts))
+    };
+    let arcs = Method::Shooting { intervals: None };
+    let rest = Method::ShootingFromRest { intervals: None };
+    for parts in [3, 16, 33, 64] {
+        let exact = asked(parts, to(TIGHT));
+        for (method, tolerance) in [(rest, 1e-4), (arcs, 1e-6), (rest, 1e-8)] {
+            let shot = asked(
+                parts,
+                Options {
+                    method,
+                    ..to(tolerance)
+                },
+            );
+            assert_eq!(shot.shape.stations, exact.shape.stations);
+            let off = apart(&leaf, &shot.shape.rods, &exact.shape.rods).position;
+            let estimate = (estimate(&shot) + estimate(&exact)) / leaf.rods[0].length;
+            let what = format!("{parts} parts, {tolerance:e}: {off:.1e}, {estimate:.1e}");
+            assert!(off <= estimate, "{what}");
+        }
+    }
+}
+
+/// Under moments and forces of about the same size: Newton's method ran away, so that steps of
+/// the load must be shorter; and a path of loading that ends at a fold is left for another.
+#[test]
+fn loads_beyond_folds_of_their_path() {
+    for entries in [
+        "leaf.fan=[-0.951]; stiffness.torsion={at=[0.0, 1.0], value=[0.644, 2.741]}; \
+         stiffness.bending_2={at=[0.0, 0.423, 0.938, 0.941, 1.0], value=[0.3356, 0.8345, 0.428, 0.7094, 1.859]}; \
+         stiffness.bending_3=0.2325; stiffness.axial=86.92; stiffness.shear_2=75.78; stiffness.shear_3=148.7; \
+         rest.twist={at=[0.0, 0.059, 0.57, 0.731, 1.0], value=[2.473, -1.698, -2.337, -1.171, 2.934]}; \
+         rest.bend_2=0.118; rest.bend_3=-2.656; rest.stretch=0.81; load.gravity=[-0.1203, 0.1083, 0.018]; \
+         load.tip_force=[1.559, -0.2177, 1.8605]; load.tip_moment=[3.221, 0.488, 0.973]",
+        "leaf.fan=[0.522]; stiffness.torsion=0.4895; \
+         stiffness.bending_2={at=[0.0, 0.701, 1.0], value=[2.617, 0.6908, 1.789]}; stiffness.bending_3=0.2124; \
+         stiffness.axial={at=[0.0, 0.441, 0.513, 1.0], value=[68.85, 67.17, 92.21, 70.5]}; \
+         stiffness.shear_2=124.7; stiffness.shear_3=113.4; rest.stretch=1.386; \
+         load.gravity=[0.025, -0.0392, -0.0408]; load.tip_force=[0.3783, -2.7083, 1.2672]; \
+         load.tip_moment=[0.81, -1.959, 0.856]",
+    ] {
+        let leaf = rod(entries);
+        let relaxed = settle(&leaf, TIGHT);
+        agree(entries, &leaf, &relaxed, &shot_near(&leaf, &relaxed), 1e-9);
+    }
+}

@@ -248,5 +248,5 @@ fn a_nearly_rigid_leaf_is_followed_to_the_end_of_its_range() {
     let mut request = branch::request(base(SEDGE, ""), vary, TOLERANCE, 2000);
     request.keep_unstable = false;
     let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
-    assert_eq!(trace.branches[0].end, leafdyn::study::TraceEnd::Reached);
+    assert_eq!(trace.branches[0].end, End::Reached);
 }

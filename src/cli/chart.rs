@@ -38,6 +38,7 @@ impl Chart {
     pub fn run(self) -> Result<Status, Refusal> {
         let traits = VerbTraits {
             reads: &self.peers,
+            puts: Some("--rods"),
             ..VerbTraits::default()
         };
         self.request.each::<Charted>(traits, |job| self.one(job))

@@ -83,6 +83,7 @@ impl Map {
     pub fn run(self) -> Result<Status, Refusal> {
         let traits = VerbTraits {
             varies: true,
+            puts: Some("--vary"),
             ..VerbTraits::default()
         };
         self.request.each::<Cells>(traits, |job| self.one(job))

@@ -80,6 +80,7 @@ impl Relax {
             stations: true,
             parallel: true,
             reads: &[],
+            puts: None,
         };
         match self.all {
             true => self.request.each::<All>(traits, |job| self.all(job)),

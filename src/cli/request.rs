@@ -105,6 +105,8 @@ pub struct VerbTraits<'f> {
     pub parallel: bool,
     /// Files that it reads besides its scenarios.
     pub reads: &'f [PathBuf],
+    /// The option besides --set that puts values into its scenarios.
+    pub puts: Option<&'f str>,
 }
 
 impl Request {
@@ -119,7 +121,7 @@ impl Request {
         self.check_scenarios::<R>(traits, &selection)?;
         let job = |file: &Path| self.open::<R>(file, traits, &selection);
         if let [file] = self.scenarios.as_slice() {
-            let done = run(&job(file)?)?;
+            let done = run(&job(file)?).map_err(|refusal| self.as_typed(traits, refusal))?;
             match self.json {
                 true => show(&done.json)?,
                 false => show_report(&done.report)?,
@@ -141,7 +143,8 @@ impl Request {
         let line = Mutex::new(ProgressLine::new("scenarios", true));
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
-            let done = job.and_then(|job| run(&job));
+            let done =
+                job.and_then(|job| run(&job).map_err(|refusal| self.as_typed(traits, refusal)));
             let done = done.map_err(|refusal| name_options(refusal).to_string());
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
@@ -155,6 +158,18 @@ impl Request {
             false => jobs.into_iter().map(solve).collect(),
         };
         self.finish::<R>(&selection, done)
+    }
+
+    /// Names the option that put a refused value into a scenario, if it was not --set.
+    fn as_typed(&self, traits: VerbTraits, refusal: Refusal) -> Refusal {
+        let text = refusal.to_string();
+        let said = (text.strip_prefix("--set ")).and_then(|rest| rest.split_once(": "));
+        match (traits.puts, said) {
+            (Some(option), Some((given, why))) if !self.overrides.iter().any(|it| it == given) => {
+                format!("{option}: with {given}: {why}").into()
+            }
+            _ => refusal,
+        }
     }
 
     /// Checks what the scenarios share: standard input, and the table of several.

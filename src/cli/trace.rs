@@ -54,6 +54,7 @@ impl Trace {
     pub fn run(self) -> Result<Status, Refusal> {
         let traits = VerbTraits {
             varies: true,
+            puts: Some("--vary"),
             ..VerbTraits::default()
         };
         match self.vary.as_slice() {

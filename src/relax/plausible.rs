@@ -29,11 +29,35 @@ pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
     let rods = &leaf.shape.rods;
     let mut all: Vec<String> = in_degrees(scenario).into_iter().collect();
     all.extend(too_long(scenario));
-    all.extend(inverted(rods, &leaf.shape.stations).or_else(|| {
-        let all = strains(scenario, rods, &leaf.shape.stations);
-        stretched(all)
-    }));
+    let stations = &leaf.shape.stations;
+    all.extend(
+        out_of_reach(scenario)
+            .or_else(|| inverted(rods, stations))
+            .or_else(|| stretched(strains(scenario, rods, stations))),
+    );
     all
+}
+
+/// A tip that is held farther from the base than a vein plausibly stretches.
+pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
+    let away = DVec3::from_array(scenario.held_tip.as_ref()?.position).length();
+    let long = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
+    let all = scenario.rods.iter().map(long).enumerate();
+    let (j, length) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let stretch = away / length - 1.0;
+    (stretch > STRETCHED).then(|| {
+        format!(
+            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
+            four_digits(away),
+            j + 1,
+            four_digits(length),
+            100.0 * stretch
+        )
+    })
+}
+
+fn four_digits(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
 }
 
 /// Base angles of more than a whole turn.

@@ -8,6 +8,7 @@ use crate::relax::equilibrium::{
 use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
 use crate::relax::nodes::with_sign_of;
+use crate::relax::plausible;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
 use crate::relax::shape;
@@ -260,6 +261,9 @@ const COUNTS: f64 = 0.1;
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
 fn advice(run: &Run) -> String {
+    if let Some(far) = plausible::out_of_reach(run.leaf.scenario()) {
+        return format!(": {far}");
+    }
     let Some(level) = run.levels.last() else {
         return String::new();
     };
@@ -304,8 +308,12 @@ fn advice(run: &Run) -> String {
         }
         _ => String::new(),
     };
+    let otherwise = match moment > 0.0 && run.leaf.held.is_none() {
+        true => ", or try the method shooting",
+        false => "",
+    };
     format!(
-        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}",
+        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}{otherwise}",
         vein + 1
     )
 }

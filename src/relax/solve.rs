@@ -102,6 +102,7 @@ fn relax_once(
         method: Method::default(),
         tolerance: Some(shooting::START),
         modes: 0,
+        stations: None,
         ..options.clone()
     };
     let rest = relax(scenario, &rest, progress)?;

@@ -9,6 +9,8 @@
 //! Where that would take too many steps, the other loads grow from the shape under the moment
 //! alone. The moment is the same along the whole rod, so that this shape can be computed
 //! segment by segment from the clamp.
+//!
+//! Where the path ends at a fold, the moment is applied before the other loads, or after them.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::{Equations, Newton, Stop};
@@ -29,6 +31,10 @@ const STEP_ACCURACY: f64 = 1e-3;
 /// Smallest load step, as a part of the load.
 const SMALLEST_STEP: f64 = 1e-6;
 
+/// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
+/// grid.
+const COARSE: f64 = 0.5 * RESOLVED_TURN;
+
 /// Rotation (radians) beyond which the moment is not applied in steps, and the largest number
 /// of steps of the other loads in that case.
 const LARGEST_BY_STEPS: f64 = 250.0;
@@ -43,68 +49,108 @@ const DIFFERENCE: f64 = 1e-7;
 /// Squared half rotation below which series replace quotients that tend to 0/0.
 const SMALL: f64 = 1e-5;
 
+/// The parts of the moment and of the other loads that are applied after a part of the loading.
+type Order = fn(f64) -> [f64; 2];
+
+/// Orders of loading: the path may end at a fold in one of them, and pass it in another.
+const ORDERS: [Order; 3] = [
+    |part| [part, part],
+    |part| [2.0 * part, 2.0 * part - 1.0],
+    |part| [2.0 * part - 1.0, 2.0 * part],
+];
+
 /// Loads the rod from its rest shape, or corrects a state near rest.
 pub fn settle(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
     rod: &mut Relaxation,
 ) -> Result<f64, Stop> {
-    let mut newton = |leaf: &DiscreteLeaf, rod: &mut Relaxation, accuracy| {
-        let newton = Newton {
-            accuracy,
-            iterations: MAX_ITERATIONS,
-            work: rod.work,
-            progress: rod.progress,
-        };
-        newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
-    };
     if rod.near_rest {
-        return newton(leaf, rod, rod.accuracy);
+        return newton(leaf, system, rod, rod.accuracy);
     }
-    let moment_first = largest_turn(&leaf.leaf) > LARGEST_BY_STEPS;
+    if largest_turn(&leaf.leaf) > LARGEST_BY_STEPS {
+        shape_by_moment(leaf, &mut rod.state)?;
+        return load(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
+    }
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
     let turn = leaf.leaf.loads.tip_moment.length() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
-    let mut steps = usize::MAX;
-    let loads = leaf.loads;
-    if moment_first {
-        shape_by_moment(leaf, &mut rod.state)?;
-        (step, steps) = (1.0, MAX_STEPS);
+    let unloaded = rod.state.clone();
+    let mut end = Err(Stop::StepLimit);
+    for order in ORDERS {
+        rod.state.clone_from(&unloaded);
+        end = load(leaf, system, rod, order, (step, usize::MAX));
+        if end.is_ok() || end == Err(Stop::Unresolved) || rod.limit.reached() {
+            break;
+        }
+        // In the others the moment is applied in half of the loading.
+        step = 0.5 / (turn / TURN_PER_STEP).ceil().max(1.0);
     }
+    end
+}
+
+fn newton(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    accuracy: f64,
+) -> Result<f64, Stop> {
+    let newton = Newton {
+        accuracy,
+        iterations: MAX_ITERATIONS,
+        work: rod.work,
+        progress: rod.progress,
+    };
+    newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
+}
+
+/// Applies the loads in a given order and at most so many steps of the given size, which is
+/// halved where Newton's method fails. [`Stop::Unresolved`]: the grid is too coarse.
+fn load(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    order: Order,
+    (mut step, mut steps): (f64, usize),
+) -> Result<f64, Stop> {
+    let loads = leaf.loads;
     let (mut reached, mut before) = (0.0, rod.state.clone());
-    while reached < 1.0 {
+    let end = loop {
         if steps == 0 || rod.limit.reached() {
-            return Err(Stop::StepLimit);
+            break Err(Stop::StepLimit);
         }
         steps -= 1;
         let part: f64 = (reached + step).min(1.0);
-        if moment_first {
-            leaf.loads.gravity = part * loads.gravity;
-            leaf.loads.tip_force = part * loads.tip_force;
-        } else {
-            leaf.load_factor = part;
-        }
+        let [moment, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        leaf.loads.tip_moment = moment * loads.tip_moment;
+        leaf.loads.gravity = others * loads.gravity;
+        leaf.loads.tip_force = others * loads.tip_force;
         let wanted = match part < 1.0 {
             true => STEP_ACCURACY,
             false => rod.accuracy,
         };
-        match newton(leaf, rod, wanted) {
-            Ok(remaining) if part == 1.0 => return Ok(remaining),
+        match newton(leaf, system, rod, wanted) {
+            Ok(remaining) if part == 1.0 => break Ok(remaining),
             Ok(_) => {
                 reached = part;
                 before.clone_from(&rod.state);
             }
-            Err(stop) if stop == Stop::Unresolved && !moment_first || step < SMALLEST_STEP => {
-                return Err(stop);
-            }
-            Err(_) => {
-                step /= 2.0;
+            Err(stop) => {
                 rod.state.clone_from(&before);
+                step /= 2.0;
+                let mut coarse = || leaf.assemble(&before, system).turn > COARSE;
+                if step < SMALLEST_STEP || stop == Stop::Unresolved && coarse() {
+                    break Err(match coarse() {
+                        true => Stop::Unresolved,
+                        false => Stop::Stuck,
+                    });
+                }
             }
         }
-    }
-    Err(Stop::StepLimit)
+    };
+    leaf.loads = loads;
+    end
 }
 
 /// Upper bound on the rotation of the tip (radians) by the moment: as if only the softest
