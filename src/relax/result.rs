@@ -38,6 +38,7 @@ pub fn equilibrium(
         run.integrated(),
     );
     let joined = run.leaf.joined();
+    debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);
