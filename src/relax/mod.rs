@@ -2,6 +2,7 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod correction;
+mod decision;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
@@ -30,6 +31,7 @@ mod run;
 mod saddle;
 mod segments;
 mod sensitivity;
+mod series;
 mod settle;
 mod shape;
 mod solve;
