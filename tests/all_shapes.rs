@@ -58,6 +58,28 @@ fn mirror_images() {
     assert!(paired >= 2 && 4 * paired >= 3 * all, "{paired} of {all}");
 }
 
+/// Whatever the disturbance of the start, and however long each rod.
+#[test]
+fn tips_of_unequal_rods_stay_joined() {
+    for lengths in ["[1.0, 1.1]", "[1.0, 0.8, 1.3]"] {
+        let rods = lengths.split(',').count();
+        let leaf = format!(
+            "name = 'unequal'\nleaf = {{ rods = {rods}, length = {lengths}, fan = 'symmetric' }}\n\
+             stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1e3, \
+             shear_2 = 1e3, shear_3 = 1e3 }}\nload = {{ gravity = [0.0, 0.0, -1.0] }}"
+        );
+        let (how, limit) = (SemiImplicit::default(), Limit::default());
+        let leaf = parse(&leaf);
+        let all = all(&leaf, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap();
+        for one in &all.found {
+            let rods = &one.equilibrium.shape.rods;
+            let tip = |j: usize| tip_node(rods, j).position;
+            let apart = largest((1..rods.len()).map(|j| tip(j).distance(tip(0))));
+            assert!(apart < 1e-12, "{lengths}: {apart}");
+        }
+    }
+}
+
 #[test]
 fn a_stiff_leaf_has_one_whatever_the_threads() {
     let place = Workplace::new();

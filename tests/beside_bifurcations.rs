@@ -131,6 +131,73 @@ fn short_waves_are_not_taken_for_stable_columns() {
     assert_leaves_its_plane_beyond("strip", strip);
 }
 
+/// To a low tolerance four and eight segments suffice for a straight column, and call it stable
+/// 5 % and more beyond its load.
+#[test]
+fn a_low_tolerance_does_not_hide_that_a_column_buckles() {
+    let pinned = |tip: f64| {
+        rod(&format!(
+            "stiffness.torsion=1; stiffness.bending_2=0.2; stiffness.bending_3=0.5; {}; \
+             tip.held=\"pinned\"; tip.position=[{tip:?}, 0, 0]",
+            set_stiffness(5e3, f64::INFINITY)
+        ))
+    };
+    for tip in [0.999_151_304_5, 0.998_9] {
+        for tolerance in [1e-1, 1e-2, 3e-3, 1e-4] {
+            for modes in [0, 3] {
+                let leaf = settled(&pinned(tip), &with_modes(modes, to(tolerance)));
+                assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+                let aside = largest(nodes(&leaf.shape.rods).map(|it| it.position.z.abs()));
+                assert!(aside > 1e-3, "{tip} {tolerance}: {aside}");
+            }
+        }
+    }
+}
+
+/// Shooting ends at the straight column, and has the index that the relaxation has there.
+#[test]
+fn shooting_tells_the_index_beside_every_load() {
+    for (k, of_euler) in [(1, 1.0), (2, 9.0), (3, 25.0)] {
+        for (beyond, index) in [(-1e-3, 2 * (k - 1)), (1e-4, 2 * k), (1e-3, 2 * k)] {
+            let column = column(EULER * of_euler * (1.0 + beyond), f64::INFINITY, 1.0);
+            let shot = relaxed(&column, &by(Method::Shooting { intervals: None }, to(1e-6)));
+            let found = shot.stability.negative_eigenvalues;
+            assert_eq!(found, Some(index), "load {k}, {beyond}");
+        }
+    }
+}
+
+/// Whether a saddle is one is told by counts; eigenvalues are computed only for what is close
+/// to zero.
+#[test]
+fn the_index_of_a_saddle_takes_few_factorizations() {
+    let leaf = parse(
+        r#"
+        name = "pushed-back"
+        [leaf]
+        rods = 3
+        length = 1.0
+        fan = "symmetric"
+        [stiffness]
+        torsion = 0.5379
+        bending_2 = 0.0340
+        bending_3 = 0.5699
+        axial = 30000.0
+        shear_2 = 30000.0
+        shear_3 = 30000.0
+        [coupling]
+        y = 0.0
+        z = 17.45
+        [load]
+        gravity = [-5.61, 0.0, 0.0]
+        "#,
+    );
+    let found = relaxed(&leaf, &keeping(to(1e-3)));
+    assert_eq!(found.stability.negative_eigenvalues, Some(29));
+    assert!(found.stability.modes.is_none());
+    assert!(found.work.factorizations < 100, "{:?}", found.work);
+}
+
 /// A leaf far from any bifurcation is proved stable by one factorisation; another one tells
 /// its error.
 #[test]

@@ -121,12 +121,26 @@ fn stated_errors_of_eigenvalues_are_bounds() {
         };
         let listed = |leaf: &Equilibrium| leaf.stability.modes.clone().unwrap_or_default();
         let best = relaxed(1e-10, true);
-        for (tolerance, shapes) in [(1e-3, false), (1e-3, true), (1e-5, false), (1e-6, true)] {
+        for (tolerance, shapes) in [
+            (1e-1, false),
+            (1e-2, false),
+            (1e-3, false),
+            (1e-3, true),
+            (1e-5, false),
+            (1e-6, true),
+        ] {
             let found = relaxed(tolerance, shapes);
             if (found.tips[0] - best.tips[0]).length() > 10.0 * tolerance {
                 continue;
             }
-            for (mode, best) in listed(&found).iter().zip(listed(&best)) {
+            let found = listed(&found);
+            assert!(found.is_sorted_by_key(|mode| mode.eigenvalue));
+            assert_eq!(
+                found.len(),
+                listed(&best).len(),
+                "leaf {k} to {tolerance:e}"
+            );
+            for (mode, best) in found.iter().zip(listed(&best)) {
                 let (error, left) = (mode.error.unwrap(), best.error.unwrap());
                 let what = format!("leaf {k} to {tolerance:e}, shapes {shapes}");
                 close(&what, mode.eigenvalue, best.eigenvalue, error + left);
@@ -135,6 +149,46 @@ fn stated_errors_of_eigenvalues_are_bounds() {
         }
     }
     assert!(compared > 10 * count, "{compared}");
+}
+
+/// Coarse grids and a low tolerance leave no mode out.
+#[test]
+fn modes_are_known_to_every_tolerance() {
+    for name in ["paper/fig10", "paper/fig07b", "classic/lens_midrib"] {
+        let leaf = scenario(name, "");
+        let best = settled(&leaf, &with_modes(3, to(1e-7)));
+        for tolerance in [3e-2, 1e-2, 3e-3, 1e-3] {
+            let found = settled(&leaf, &with_modes(3, to(tolerance)));
+            let pairs = modes_of(&found).iter().zip(modes_of(&best));
+            assert_eq!(modes_of(&found).len(), 3);
+            for (mode, best) in pairs {
+                let (error, left) = (mode.error.unwrap(), best.error.unwrap());
+                let what = format!("{name} to {tolerance:e}");
+                close(&what, mode.eigenvalue, best.eigenvalue, error + left);
+            }
+        }
+    }
+}
+
+/// Close eigenvalues that change places from grid to grid.
+#[test]
+fn eigenvalues_ascend_with_their_modes() {
+    let stiffness = "stiffness.torsion=1; stiffness.bending_2=0.5; stiffness.bending_3=2";
+    let held = "tip.held=\"clamped\"; tip.position=[0.9957195005240812, 0, 0]";
+    let leaf = rod(&format!(
+        "{stiffness}; {}; {held}",
+        set_stiffness(5e3, f64::INFINITY)
+    ));
+    let best = settled(&leaf, &with_modes(3, to(1e-8)));
+    for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-6] {
+        let found = settled(&leaf, &with_modes(3, to(tolerance)));
+        let modes = modes_of(&found);
+        assert!(modes.is_sorted_by_key(|mode| mode.eigenvalue));
+        for (mode, best) in modes.iter().zip(modes_of(&best)) {
+            let error = mode.error.unwrap() + best.error.unwrap();
+            close("eigenvalue", mode.eigenvalue, best.eigenvalue, error);
+        }
+    }
 }
 
 /// All eigenvalues, ascending, by a dense method.

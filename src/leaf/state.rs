@@ -16,6 +16,9 @@ pub struct State {
     segments: usize,
 }
 
+/// Distance of tips, in lengths, that is rounding.
+const MEETING: f64 = 1e-9;
+
 /// Increments of one node in the order of elimination: spatial rotation, then
 /// displacement.
 pub type Increment = [f64; 6];
@@ -71,6 +74,23 @@ impl State {
     #[inline]
     pub fn base(&self, j: usize) -> usize {
         j * (self.segments + 1)
+    }
+
+    /// Whether the tips of all rods are one point, but for rounding.
+    pub fn tips_meet(&self) -> bool {
+        let apart = |j: usize| self.tip(j).distance(self.tip(0));
+        (1..self.rods()).all(|j| apart(j) <= MEETING)
+    }
+
+    /// Moves the tips of all rods to their mean.
+    pub fn join_tips(&mut self) {
+        let (rods, first) = (self.rods(), self.tip(0));
+        let apart: DVec3 = (0..rods).map(|j| self.tip(j) - first).sum();
+        let mean = first + apart / rods as f64;
+        for j in 0..rods {
+            let tip = self.base(j) + self.segments;
+            self.x[tip] = mean;
+        }
     }
 
     /// Position of the tip of rod `j`.

@@ -23,6 +23,7 @@ pub fn loaded(leaf: &DiscreteLeaf, state: &State, count: usize) -> Option<Vec<Ei
     let of = |soft: &DiscreteLeaf, near: &[Vec<Increment>]| {
         let wanted = Wanted {
             count,
+            above: None,
             accuracy: DERIVED,
             near,
             time: &time,

@@ -42,8 +42,13 @@ const FIRST_SHIFT: f64 = 1e-3;
 const NEXT_SHIFT: f64 = 8.0;
 
 /// Eigenvalues are counted below the last one minus this part of its distance from
-/// the lower shift; the first of these at which the matrix is not singular.
+/// the lower shift, or minus so many times the error of an eigenvalue; the first of these at
+/// which the matrix is not singular.
 const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
+const ERRORS_BELOW: f64 = 40.0;
+
+/// Factor to the next shift below those eigenvalues that are wanted, if they are not the lowest.
+const NEXT_BELOW: f64 = 4.0;
 
 /// Shifts closer to clustered eigenvalues: the distance from them as a part of that to
 /// the last shift, and its factor for the next attempt.
@@ -73,6 +78,9 @@ pub struct Eigenpair {
 pub struct Wanted<'a> {
     /// Number of the lowest modes.
     pub count: usize,
+    /// Those next above so many others, which are not computed, and a negative shift to begin
+    /// with at which these are below it and the wanted ones above.
+    pub above: Option<(usize, f64)>,
     /// Accuracy of eigenvectors; the error of an eigenvalue is its square.
     pub accuracy: f64,
     /// Shapes of approximate modes, from the same grid in a shape nearby or interpolated from
@@ -158,15 +166,18 @@ impl Vibration<'_> {
         self.pattern.factorize(system, 0.0).ok()
     }
 
-    /// A shift below all eigenvalues, as close to them as necessary.
+    /// A shift below all eigenvalues that are wanted, as close to them as necessary.
     fn below_all(&self, system: &mut System) -> Option<(f64, SparseFactor<'_>)> {
-        let mut shift = -self.leaf.neutral_shift();
+        let (others, mut shift, next) = match self.wanted.above {
+            Some((others, shift)) => (others, shift, NEXT_BELOW),
+            None => (0, -self.leaf.neutral_shift(), NEXT_SHIFT),
+        };
         loop {
             let factor = self.factorize(system, shift)?;
-            if factor.negative() == 0 {
+            if factor.negative() <= others {
                 return Some((shift, factor));
             }
-            shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
+            shift = (next * shift).min(-FIRST_SHIFT);
             if !shift.is_finite() {
                 return None;
             }
@@ -175,12 +186,15 @@ impl Vibration<'_> {
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
     fn lowest(&self, system: &mut System) -> Option<Vec<Vec<f64>>> {
-        let count = self.wanted.count.min(self.pattern.size());
-        if count == 0 {
+        if self.wanted.count == 0 {
             return Some(Vec::new());
         }
         let mut found: Vec<Mode> = Vec::new();
         let (lowest, mut factor) = self.below_all(system)?;
+        let below = factor.negative();
+        // Some of the others may be above the shift.
+        let others = self.wanted.above.map_or(0, |(others, _)| others - below);
+        let count = (others + self.wanted.count).min(self.pattern.size() - below);
         let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count);
         for search in 0..SEARCHES + count {
             if self.wanted.time.reached() {
@@ -190,18 +204,18 @@ impl Vibration<'_> {
             if found.len() < count {
                 sought = count - found.len();
                 if let Some(bound) = bound
-                    && let Some(closer) = self.closer(system, shift, bound, &found)?
+                    && let Some(closer) = self.closer(system, shift, bound, below + found.len())?
                 {
                     (shift, factor) = closer;
                 }
                 continue;
             }
-            let (missing, below) = self.missing(system, &found, count, lowest)?;
+            let (missing, under) = self.missing(system, &found, count, (lowest, below))?;
             if missing == 0 {
-                found.truncate(count);
-                return Some(found.into_iter().map(|found| found.vector).collect());
+                let wanted = found.into_iter().take(count).skip(others);
+                return Some(wanted.map(|found| found.vector).collect());
             }
-            (sought, limit) = (missing.min(count), below);
+            (sought, limit) = (missing.min(count), under);
             if shift != lowest {
                 (shift, factor) = (lowest, self.factorize(system, lowest)?);
             }
@@ -210,22 +224,25 @@ impl Vibration<'_> {
     }
 
     /// Number of missing eigenvalues, and the value below which they are: just below the
-    /// `count`-th of those found, which may have further equal ones.
+    /// `count`-th of those found, which may have further equal ones. So many others are below
+    /// the lowest shift.
     fn missing(
         &self,
         system: &mut System,
         found: &[Mode],
         count: usize,
-        lowest: f64,
+        (lowest, others): (f64, usize),
     ) -> Option<(usize, f64)> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.rounding();
+        let least = ERRORS_BELOW * self.wanted.accuracy.powi(2);
         for part in BELOW {
+            let part = part.max(least * part / BELOW[0]);
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
             let there = self.factorize(system, below)?.negative();
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
             // Too many: one is equal to the limit up to rounding.
-            if let Some(count) = there.checked_sub(here) {
+            if let Some(count) = there.checked_sub(others + here) {
                 return Some((count, below));
             }
         }
@@ -239,13 +256,13 @@ impl Vibration<'_> {
         system: &mut System,
         shift: f64,
         bound: f64,
-        found: &[Mode],
+        found: usize,
     ) -> Option<Option<(f64, SparseFactor<'_>)>> {
         let mut part = FIRST_PART;
         while part < 1.0 {
             let closer = bound - part * (bound - shift);
             let factor = self.factorize(system, closer)?;
-            if factor.negative() <= found.len() {
+            if factor.negative() <= found {
                 return Some(Some((closer, factor)));
             }
             part *= NEXT_PART;

@@ -3,6 +3,7 @@
 
 mod between;
 mod correction;
+mod decision;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;
@@ -29,6 +30,7 @@ mod run;
 mod saddle;
 mod segments;
 mod sensitivity;
+mod series;
 mod settle;
 mod shape;
 mod solve;

@@ -9,9 +9,9 @@ use crate::relax::equilibrium::Mode;
 use crate::relax::level::Level;
 use crate::relax::predict::predict;
 use crate::relax::prolong::prolong;
-use crate::relax::richardson::{Best, Richardson};
 use crate::relax::run::Run;
 use crate::relax::saddle::ANY_SIGN;
+use crate::relax::series::{Extrapolated, GRIDS, Series};
 use crate::relax::stencil::Stencil;
 use glam::DVec3;
 
@@ -26,37 +26,24 @@ const QUICK_UNKNOWNS: usize = 4_000;
 /// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
 const MANY_MORE_UNKNOWNS: usize = 200_000;
 
-/// Largest number of grids that are extrapolated, and of grids finer than those of the
-/// relaxation.
-const GRIDS: usize = 4;
+/// Largest number of grids finer than those of the relaxation.
 const MORE_GRIDS: usize = 6;
-
-/// Eigenvalues below this part of the largest have errors relative to that part.
-const SMALL: f64 = 1e-3;
-
-/// Safety factor on the errors of eigenvalues, and lower bound of the last change of an
-/// eigenvalue as a part of the change before: that of a single number may be small by chance,
-/// and is also combined with those of the other eigenvalues. Of 12,600 eigenvalues of 600
-/// random leaves none had a larger error.
-const SAFETY: f64 = 2.0;
-const LEAST_CHANGE: f64 = 0.1;
 
 /// Growth of the rounding error of an eigenvalue from grid to grid.
 const FINER_NOISE: f64 = 4.0;
-
-/// An error of up to this many times that of rounding does not decrease on finer grids.
-const NOISE: f64 = 4.0;
-
-/// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
-const UNFINISHED: f64 = 2e-3;
 
 /// The tolerance if only the signs of the eigenvalues are needed.
 const SIGN_TOLERANCE: f64 = 1e-2;
 
 /// Accuracy of eigenvectors over the root of the tolerance (that of eigenvalues is its
-/// square), and its lower limit.
+/// square), and its limits: with less of it close eigenvalues are not told apart.
 const ACCURACY: f64 = 5e-3;
-const LEAST_ACCURACY: f64 = 1e-7;
+const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
+
+/// To a tolerance of this or more the grids are so coarse that two of them do not tell how
+/// eigenvalues converge: so many are compared.
+const LOW_TOLERANCE: f64 = 1e-3;
+const COMPARED: usize = 3;
 
 /// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
 /// farther away is another equilibrium.
@@ -74,22 +61,45 @@ pub struct Lowest {
     /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
     /// free motion.
     pub undecided: Option<f64>,
-    /// How many of the eigenvalues are negative, if all are larger than their errors.
+    /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
 }
 
-/// The lowest modes. `None` if they cannot be computed: the leaf is too large, unless they are
-/// `required`, or more modes are requested than a coarse grid has.
-/// Of more modes than the run's options request only the signs of the eigenvalues are needed.
-pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
+/// A list of eigenvalues.
+#[derive(Clone, Copy)]
+pub struct List {
+    pub count: usize,
+    /// So many lower ones are left out, and the shift by which they are found to be lower: see
+    /// [`Wanted::above`].
+    pub above: Option<(usize, f64)>,
+    /// Whether the stability of the leaf depends on them: then its size does not matter.
+    pub decides: bool,
+}
+
+impl List {
+    /// The modes that are requested.
+    pub fn requested(run: &Run) -> Self {
+        List {
+            count: run.options.modes,
+            above: None,
+            decides: false,
+        }
+    }
+}
+
+/// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
+/// large, or there are several equal ones that cannot be told apart.
+/// Of those that are not requested only the signs of the eigenvalues are needed.
+pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
+    let List { count, above, .. } = list;
     let options = run.options;
     let finest = run.levels.last()?;
-    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !required;
+    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides;
     if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
         return None;
     }
     let physics = Physics::new(run.leaf);
-    let requested = count <= options.modes;
+    let requested = count <= options.modes && above.is_none();
     let tolerance = if requested {
         run.tolerance
     } else {
@@ -98,14 +108,17 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     let on = |level: &Level, near: &[Vec<Increment>]| {
         let wanted = Wanted {
             count,
-            accuracy: (ACCURACY * tolerance.sqrt()).max(LEAST_ACCURACY),
+            above,
+            accuracy: (ACCURACY * tolerance.sqrt()).clamp(ACCURACIES.0, ACCURACIES.1),
             near,
             time: &options.limit,
         };
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
+    let left_out = above.map_or(0, |(others, _)| others);
     let mut series = Series {
-        index: run.index.unwrap_or(0),
+        index: run.index.unwrap_or(0).saturating_sub(left_out),
+        single: run.clearly_stable || run.segments().is_some(),
         grids: Vec::new(),
         tolerance,
         rounding: 0.0,
@@ -118,7 +131,7 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
         .enumerate()
         .skip(sufficient_grids.saturating_sub(GRIDS))
     {
-        if k >= sufficient_grids && series.undecided().is_none() {
+        if k >= sufficient_grids && !series.grids.is_empty() && series.undecided().is_none() {
             break;
         }
         let near = |(coarse, pairs): (&Level, Vec<Eigenpair>)| {
@@ -136,21 +149,28 @@ pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     }
     let (finest, pairs) = before?;
     let shapes = shapes(finest, &pairs);
-    if requested && options.method.segments().is_none() && options.mode_shapes {
-        refine(run, &mut series, pairs, on);
+    if options.method.segments().is_none() {
+        let sharp = requested && options.mode_shapes;
+        let low = run.tolerance >= LOW_TOLERANCE && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+        let enough = |series: &Series| {
+            (!sharp || series.accurate()) && (!low || series.grids.len() >= COMPARED)
+        };
+        refine(run, &mut series, pairs, (on, enough));
     }
     let unit = physics.time.powi(-2);
-    let mode =
-        |((eigenvalue, error), (displacement, rotation)): ((f64, Option<f64>), Shape)| Mode {
-            eigenvalue: eigenvalue * unit,
-            error: error.map(|error| error * unit),
+    let mode = |it: Extrapolated| {
+        let (displacement, rotation) = shapes[it.number].clone();
+        Mode {
+            eigenvalue: it.value * unit,
+            error: it.error.map(|error| error * unit),
             displacement,
             rotation,
-        };
+        }
+    };
     Some(Lowest {
-        modes: series.values().into_iter().zip(shapes).map(mode).collect(),
+        modes: series.values().into_iter().map(mode).collect(),
         undecided: series.undecided(),
-        negative: series.negative(),
+        negative: series.negative().map(|negative| left_out + negative),
     })
 }
 
@@ -169,29 +189,36 @@ fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
     6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
 }
 
-/// The next grid, if it may decide the signs of the lowest eigenvalues that are still
-/// undecided, that is if its rounding error is small enough.
-pub fn deciding_grid(run: &Run, lowest: Option<&Lowest>) -> Option<Grid> {
-    let size = lowest?.undecided?;
+/// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
+/// small enough for an undecided one of this `size`.
+pub fn deciding_grid(run: &Run, size: f64) -> Option<Grid> {
     let noise = run.levels.last()?.leaf.neutral_shift();
     let finer = run.finer().filter(|grid| is_affordable(run.leaf, grid))?;
     (size > FINER_NOISE * noise && !run.out_of_time()).then_some(finer)
+}
+
+/// The next grid, if it has few unknowns.
+pub fn small_grid(run: &Run) -> Option<Grid> {
+    let few = |grid: &Grid| 6 * run.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
+    run.finer().filter(|grid| few(grid) && !run.out_of_time())
 }
 
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
-/// Adds finer grids until the eigenvalues are as accurate as the shape, or the limits are
-/// reached.
+/// Adds finer grids until the eigenvalues are accurate enough, or the limits are reached.
 fn refine(
     run: &Run,
     series: &mut Series,
     mut pairs: Vec<Eigenpair>,
-    on: impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    (on, enough): (
+        impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+        impl Fn(&Series) -> bool,
+    ),
 ) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
-    while finer.len() < MORE_GRIDS && !series.accurate() && !run.out_of_time() {
+    while finer.len() < MORE_GRIDS && !enough(series) && !run.out_of_time() {
         let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
         let last = levels.last()?;
         if !is_affordable(run.leaf, &last.leaf.grid.refined()) {
@@ -247,100 +274,6 @@ fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
     };
     (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
     (guess.shift_to(&state) < SAME_PLACE).then_some(Level { leaf, state })
-}
-
-/// Eigenvalues on nested grids, each extrapolated on its own.
-struct Series {
-    /// Number of negative eigenvalues on the finest grid.
-    index: usize,
-    grids: Vec<Vec<f64>>,
-    tolerance: f64,
-    /// Rounding error of an eigenvalue on the finest grid.
-    rounding: f64,
-}
-
-impl Series {
-    fn push(&mut self, pairs: &[Eigenpair]) {
-        let values = pairs.iter().map(|pair| pair.eigenvalue);
-        self.grids.push(values.collect());
-    }
-
-    /// The unit of an eigenvalue's error.
-    fn unit(&self, k: usize) -> f64 {
-        let finest = &self.grids[self.grids.len() - 1];
-        let largest = finest.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
-        let unit = finest[k].abs().max(SMALL * largest);
-        if unit > 0.0 { unit } else { 1.0 }
-    }
-
-    /// Extrapolated values, and their errors if there are at least two grids.
-    fn values(&self) -> Vec<(f64, Option<f64>)> {
-        let judge = |k: usize| {
-            // A coarse grid may have fewer modes.
-            let values = self.grids.iter().filter_map(|grid| grid.get(k));
-            let last = values.clone().count().saturating_sub(GRIDS);
-            let values = values.skip(last).enumerate();
-            let table: Richardson = values
-                .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
-                .collect();
-            let error = |best: Best| {
-                best.error
-                    .max(LEAST_CHANGE * table.change_before(best.columns))
-            };
-            (table.extrapolated()[0], table.best().map(error))
-        };
-        let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
-            .map(judge)
-            .collect();
-        let largest = found.iter().filter_map(|(_, error)| *error);
-        let largest = largest.fold(0.0, f64::max);
-        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * self.tolerance;
-        let in_units = |(k, (value, error)): (usize, &(f64, Option<f64>))| {
-            let unit = self.unit(k);
-            (
-                value * unit,
-                error.map(|error| bound(error) * unit + self.rounding),
-            )
-        };
-        found.iter().enumerate().map(in_units).collect()
-    }
-
-    /// Whether the relative error of all frequencies is within the tolerance.
-    fn accurate(&self) -> bool {
-        let known = |(k, (_, error)): (usize, (f64, Option<f64>))| {
-            let wanted = 2.0 * self.tolerance * self.unit(k);
-            error.is_some_and(|error| error <= wanted + self.rounding)
-        };
-        self.values().into_iter().enumerate().all(known)
-    }
-
-    /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
-    /// grid.
-    fn negative(&self) -> Option<usize> {
-        let values = self.values();
-        let alone = |k: usize| NOISE * self.rounding + UNFINISHED * self.tolerance * self.unit(k);
-        let certain = |(k, (value, error)): (usize, &(f64, Option<f64>))| {
-            value.abs() > error.unwrap_or_else(|| alone(k))
-        };
-        let all = values.iter().enumerate().all(certain);
-        all.then(|| values.iter().filter(|(value, _)| *value < 0.0).count())
-    }
-
-    /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
-    /// finest grid. One that is zero to the tolerance may have either sign.
-    fn undecided(&self) -> Option<f64> {
-        let unknown = |(k, (value, error)): (usize, (f64, Option<f64>))| {
-            let (size, error) = (value.abs(), error?);
-            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + NOISE * self.rounding;
-            let decided = match size > error {
-                true => (value < 0.0) == (k < self.index),
-                false => error <= zero,
-            };
-            (!decided).then_some(size.max(error))
-        };
-        let unknown = self.values().into_iter().enumerate().filter_map(unknown);
-        unknown.reduce(f64::min)
-    }
 }
 
 /// Displacements and rotations of all nodes, rod by rod.

@@ -29,6 +29,7 @@ pub fn equilibrium(
     let error = run.error();
     let (stations, rods, between) = fields(run, error.unwrap_or(0.0));
     let joined = run.leaf.joined();
+    debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);

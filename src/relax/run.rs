@@ -102,6 +102,19 @@ pub struct Run<'a, 'o> {
     pub load_part: f64,
 }
 
+/// What a run found on its grids: see its fields of the same names.
+pub struct Found {
+    levels: Vec<Level>,
+    estimate: Option<Estimate>,
+    index: Option<usize>,
+    clearly_stable: bool,
+    saddle: Option<Saddle>,
+    effects: [Option<f64>; 2],
+    solved: usize,
+    remaining: f64,
+    moved_softened: bool,
+}
+
 impl<'a, 'o> Run<'a, 'o> {
     /// A run that has not begun.
     pub fn new(
@@ -160,6 +173,32 @@ impl<'a, 'o> Run<'a, 'o> {
         self.remaining = 0.0;
         self.contraction = Contraction::default();
         self.pushes = 0;
+    }
+
+    /// What was found so far, taken out of the run but for its grids.
+    pub fn found(&mut self) -> Found {
+        Found {
+            levels: self.levels.clone(),
+            estimate: self.estimate.take(),
+            index: self.index,
+            clearly_stable: self.clearly_stable,
+            saddle: self.saddle,
+            effects: self.effects,
+            solved: self.solved,
+            remaining: self.remaining,
+            moved_softened: self.moved_softened,
+        }
+    }
+
+    /// Returns to what was found before.
+    pub fn return_to(&mut self, before: Found) {
+        self.levels = before.levels;
+        self.tabulate();
+        self.estimate = before.estimate;
+        (self.index, self.clearly_stable) = (before.index, before.clearly_stable);
+        (self.saddle, self.effects) = (before.saddle, before.effects);
+        (self.solved, self.remaining) = (before.solved, before.remaining);
+        self.moved_softened = before.moved_softened;
     }
 
     /// The run of a reduced leaf converted to one of the whole leaf.

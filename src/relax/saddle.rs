@@ -61,15 +61,7 @@ fn count(
     (excess, shift): (f64, f64),
     work: &mut Work,
 ) -> Option<usize> {
-    let mut assemble = |system: &mut System| {
-        leaf.assemble(state, system);
-        if excess > 0.0 {
-            leaf.subtract_excess_stiffness(state, system, excess);
-        }
-        work.force_evaluations += 1;
-        work.factorizations += 1;
-    };
-    assemble(system);
+    assemble(leaf, state, system, excess, work);
     // For most stable leaves one linear-time factorisation is enough.
     if system.stable_without_coupling(shift) {
         return Some(0);
@@ -77,9 +69,61 @@ fn count(
     if excess > 0.0 && !system.coupled() {
         return None;
     }
-    assemble(system);
+    count_coupled(leaf, state, system, (excess, shift), work)
+}
+
+/// The matrix, minus `excess` times the excess stiffness of the elements.
+fn assemble(leaf: &DiscreteLeaf, state: &State, system: &mut System, excess: f64, work: &mut Work) {
+    leaf.assemble(state, system);
+    if excess > 0.0 {
+        leaf.subtract_excess_stiffness(state, system, excess);
+    }
+    work.force_evaluations += 1;
+    work.factorizations += 1;
+}
+
+/// [`count`] by the factorisation of the whole matrix.
+fn count_coupled(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    (excess, shift): (f64, f64),
+    work: &mut Work,
+) -> Option<usize> {
+    assemble(leaf, state, system, excess, work);
     let pattern = SparsePattern::new(system).ok()?;
     Some(pattern.factorize(system, shift).ok()?.negative())
+}
+
+/// How many eigenvalues of an equilibrium are negative beyond doubt, how many may be on this
+/// grid, being close to zero, and how many on finer ones: those of the Hessian less what
+/// [`clearly_stable`] subtracts. Also how close to zero is close.
+pub struct Bounds {
+    pub least: usize,
+    pub here: usize,
+    pub finer: usize,
+    pub close: f64,
+}
+
+/// The bounds of the Morse index of a state at rest. `None` if the factorisation does not fit
+/// into memory.
+pub fn bounds(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut Work,
+) -> Option<Bounds> {
+    let close = CLEARLY_POSITIVE.max(leaf.neutral_shift());
+    let mut of = |excess, shift| count_coupled(leaf, state, system, (excess, shift), work);
+    let least = of(0.0, close)?;
+    let here = of(0.0, -close)?;
+    let finer = of(EXCESS_SAFETY, -close)?;
+    Some(Bounds {
+        least,
+        here,
+        finer: finer.max(here),
+        close,
+    })
 }
 
 /// The least and the largest [`index`] on a grid so fine that rounding may change the sign of

@@ -4,11 +4,12 @@ use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::{Stop, Work};
+use crate::relax::decision::{Decision, Verdict, decide};
 use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
 use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
-use crate::relax::modes::{self, Lowest};
+use crate::relax::modes::{self, List};
 use crate::relax::options::{
     MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
 };
@@ -187,86 +188,51 @@ fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
 }
 
 /// The result of a run, with the modes of a leaf at rest: requested modes are not counted in
-/// the time of the solution.
+/// the time of the solution, unless stability depends on them.
 fn finished(
     mut run: Run,
     mut end: Result<bool, Stop>,
     clock: Instant,
 ) -> (Equilibrium, Vec<Level>) {
     let requested = run.options.modes;
-    let count = match run.index {
-        // A single grid allows no comparison.
-        _ if run.segments().is_some() => requested,
-        Some(0) if !run.clearly_stable => requested.max(1),
-        // Of a saddle one more than those that are negative on its grids.
-        Some(index @ 1..) => requested.max((index + 1).min(MOST_MODES)),
-        _ => requested,
+    let before = clock.elapsed().as_secs_f64();
+    let Decision {
+        verdict,
+        modes,
+        needed,
+    } = decide(&mut run, &mut end, &mut rest_from);
+    let wall = match needed || requested == 0 {
+        true => clock.elapsed().as_secs_f64(),
+        false => before,
     };
-    let result = |run: &Run, end: Result<bool, Stop>| {
-        let (outcome, remark) = result::outcome(run, end);
-        result::equilibrium(run, outcome, remark, clock.elapsed().as_secs_f64())
-    };
-    let mut found = result(&run, end);
-    let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
-    // Near a bifurcation the Morse index on a grid may differ from that of the leaf.
-    while let Some(finer) = modes::deciding_grid(&run, lowest.as_ref()) {
-        let coarser = run.levels.clone();
-        // A saddle of the finer grid may be none of the coarser, and what it leads to not
-        // near them.
-        let further = run.continue_on(finer.clone()).or_else(|_| {
-            run.restart();
-            rest_from(&mut run, finer)
-        });
-        // The grids before found rest; without this one the sign remains undecided.
-        if further.is_err() {
-            run.levels = coarser;
-            break;
-        }
-        end = further;
-        found = result(&run, end);
-        lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
-    }
-    if requested == 0 {
-        found.wall_seconds = clock.elapsed().as_secs_f64();
-    }
+    let (outcome, remark) = result::outcome(&run, end);
+    let mut found = result::equilibrium(&run, outcome, remark, wall);
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    let undecided = lowest.as_ref().is_some_and(|it| it.undecided.is_some());
-    let negative = lowest.as_ref().and_then(|it| it.negative);
-    // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
-    // coarser ones tell.
-    if undecided || negative > found.stability.negative_eigenvalues {
-        found.decide(index_by_eigenvalues(&run, lowest.as_ref(), count));
-    }
-    let modes = match count > requested {
-        true => end.ok().and_then(|_| modes::lowest(&run, requested, false)),
-        false => lowest,
-    };
+    found.decide(verdict);
+    let modes = modes.or_else(|| {
+        let list = List::requested(&run);
+        end.ok().and_then(|_| modes::lowest(&run, list))
+    });
     found.stability.modes = modes.map(|it| it.modes);
     (found, run.levels)
-}
-
-/// The Morse index by the signs of the extrapolated eigenvalues, if they are certain: those of
-/// the lowest `count`, or of more if all of these are negative.
-fn index_by_eigenvalues(run: &Run, lowest: Option<&Lowest>, count: usize) -> Option<usize> {
-    let mut negative = lowest?.negative?;
-    let mut count = count;
-    while negative == count && count < MOST_MODES {
-        count = (2 * count).min(MOST_MODES);
-        let more = modes::lowest(run, count, true).and_then(|more| more.negative);
-        // There are at least so many.
-        let Some(more) = more else { break };
-        negative = more;
-    }
-    Some(negative)
 }
 
 impl Equilibrium {
     /// Takes the Morse index by extrapolated eigenvalues, if it is known, where those of single
     /// grids may have other signs.
-    fn decide(&mut self, index: Option<usize>) {
-        let Some(index) = index else {
-            self.doubts.push(UNDECIDED.to_owned());
-            return;
+    fn decide(&mut self, verdict: Verdict) {
+        let index = match verdict {
+            Verdict::AsCounted => return,
+            Verdict::Undecided => {
+                self.doubts.push(UNDECIDED.to_owned());
+                return;
+            }
+            Verdict::Unknown => {
+                self.doubts.push(UNDECIDED.to_owned());
+                self.stability.negative_eigenvalues = None;
+                return;
+            }
+            Verdict::Index(index) => index,
         };
         let unknown = (self.stability.negative_eigenvalues.replace(index)).is_none();
         if !self.outcome.is_success() {

@@ -94,7 +94,14 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     let size = sign * STEEPEST * (1 + pattern % SIZES) as f64 / SIZES as f64;
     let rods = leaf.rods();
     let joined = leaf.leaf.joined() && rods > 1;
+    let longest = (0..rods).map(|j| leaf.leaf.length(j)).fold(0.0, f64::max);
     for j in 0..rods {
+        // All tips that are one are lifted alike.
+        let length = leaf.leaf.length(j);
+        let (unit, steeper) = match joined {
+            true => (longest, longest / length),
+            false => (length, 1.0),
+        };
         let across = match rods {
             1 => 0.0,
             _ => j as f64 / (rods - 1) as f64,
@@ -115,10 +122,9 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
                     slope += part * (wave.sin() * end - bump * fall);
                 }
             }
-            let length = leaf.leaf.length(j);
-            state.x[base + i].z += size * lift * length;
+            state.x[base + i].z += size * lift * unit;
             let sideways = state.q[base + i] * DVec3::Y;
-            let turn = rotation::exp(-(size * slope).atan() * sideways);
+            let turn = rotation::exp(-(size * slope * steeper).atan() * sideways);
             state.q[base + i] = (turn * state.q[base + i]).normalize();
         }
     }

@@ -101,6 +101,7 @@ pub fn modes(leaf: &Leaf, state: &State, count: usize, near: &[Vec<[f64; 6]>]) -
     grid.strain_forces(&mut state);
     let wanted = Wanted {
         count,
+        above: None,
         accuracy: 1e-7,
         near,
         time: &Limit::default(),

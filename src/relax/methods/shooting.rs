@@ -180,7 +180,7 @@ fn outcome_of_solution(
         Some(0) => (Outcome::Converged, None),
         None => (
             Outcome::Converged,
-            Some("the number of negative eigenvalues is not known: a dead moment has no energy, or the leaf is too fine to count them".into()),
+            Some("the number of negative eigenvalues is not known: a dead moment has no energy, the leaf is too fine to count them, or one may have either sign".into()),
         ),
     };
     let neutral = solution.neutral.as_ref().map(|neutral| neutral.to_string());
