@@ -230,6 +230,10 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
         .flat_map(|case| &case.observed)
         .collect();
     observed.sort_by_key(|it| it.number);
+    let of = |number: usize| {
+        let found = observed.binary_search_by_key(&number, |it| it.number);
+        found.map_or_else(|_| String::new(), |at| observed[at].experiment.name.clone())
+    };
     all.into_iter()
         .map(|(component, band)| {
             let sd = stats.sd(component);
@@ -238,7 +242,8 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
                 Compared::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
             };
             FitResidual {
-                experiment: observed[component.experiment].experiment.name.clone(),
+                experiment: of(component.experiment),
+                number: component.experiment + 1,
                 what: component.what.column(),
                 rod,
                 sigma,
