@@ -72,7 +72,8 @@ fn what_weight_and_stiffness_share_is_named_in_their_units() {
 
 const RIGIDLY: &str = "axial = inf, shear_2 = inf, shear_3 = inf";
 
-/// Data in millimetres of a leaf in metres, and frequencies of a leaf without mass.
+/// Data in millimetres of a leaf in metres, forces a thousand times too small, and frequencies
+/// of a leaf without mass.
 #[test]
 fn data_in_other_units_are_doubted() {
     let free = ["stiffness.bending_2"];
@@ -84,6 +85,11 @@ fn data_in_other_units_are_doubted() {
     let far = "rod,x,z\n1,500,-10\n1,900,-40\n1,980,-50\n";
     assert!(!doubted(VEIN, near, "unit of length"));
     assert!(doubted(VEIN, far, "unit of length"));
+    // Within the leaf's length, but not under these forces.
+    let weak = "load.tip_force[2],tip_z\n1e-5,0.6\n2e-5,0.62\n-1e-5,0.58\n";
+    assert!(!doubted(VEIN, weak, "of any leaf") && !doubted(VEIN, weak, "any leaf of"));
+    assert!(doubted(VEIN, weak, "lengths and forces"));
+    assert!(!doubted(VEIN, near, "lengths and forces"));
     let massless = VEIN.replace("dynamics = { density = 1.0, rotary_inertia = 1e-4 }", "");
     let beats = "frequency_1\n0.5\n0.51\n0.49\n";
     assert!(!doubted(VEIN, beats, "density"));

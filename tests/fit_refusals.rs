@@ -22,7 +22,7 @@ const DATA: &str = "
     # made up|tip_z,tip_x|1 => data.csv:3: has 1 cells, and the header 2
     tip_z,sd_tip_z|1,0 => is greater than 0
     load.tip_force[2],tip_z|,1 => is empty: every experiment needs its value
-    rod,x,y|6,1,1 => from 1 to 5
+    rod,x,y|6,1,1 => rod = 6: must be a whole number from 1 to 5
     rod,x,y,w|1,1,1,1 => unknown column w
     rod,sigma,x|1,1.5,1 => from 0 to 1
     rod,x|1,1 => at least two of x, y, z

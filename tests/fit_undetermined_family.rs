@@ -6,7 +6,7 @@ mod common;
 use common::fit::{self, VEIN, fitted, request};
 use common::random::Draw;
 use common::*;
-use leafdyn::study::FitOutcome;
+use leafdyn::study::{Fit, FitOutcome};
 
 /// Drawn leaves of each kind; `LEAFDYN_LEAVES` in the environment asks for more.
 const DRAWN: usize = 6;
@@ -165,4 +165,44 @@ fn a_ratio_that_alone_is_felt_is_named() {
     assert!(parts.all(|part| (part - 1.0).abs() < 1e-3), "{open:?}");
     let mut says = found.says.iter();
     assert!(says.any(|said| said.contains("only as their ratio")));
+}
+
+/// Three joined veins, and the lowest frequencies of a made-up one with bending stiffness 1.281
+/// across the leaf under five pulls, with noise.
+const RINGING: &str = r#"
+    name = "ringing"
+    leaf = { rods = 3, length = 1.0, fan = "symmetric" }
+    stiffness = { torsion = 1.885, bending_2 = 1.507, bending_3 = 0.445, axial = 165.4, shear_2 = 100.0, shear_3 = 100.0 }
+    coupling = { y = 4.238, z = 0.661 }
+    load = { gravity = [0.0, -0.03, -0.89] }
+    dynamics = { density = 0.7 }
+"#;
+const FREQUENCIES: &str = "load.tip_force[0],frequency_1,frequency_2,frequency_3
+0.0,0.4913542932914,0.7237230048205472,1.50904748889789
+1.0,0.5460825914918956,0.7576869867734115,1.568396611715732
+2.0,0.5869013294112391,0.7832734382514106,1.6230542811572153
+4.0,0.6525754052635092,0.8366233333740479,1.7165995344818712
+6.0,0.7108733535713316,0.8901916261439116,1.8137669025548808
+";
+
+/// The torsional stiffness runs away. An end of the other number's interval is where the least
+/// sum of squares is that of an end, even if the torsional stiffness has to come back for it.
+#[test]
+fn a_number_that_ran_away_narrows_no_interval() {
+    let numbers = ["stiffness.torsion", "stiffness.bending_2"];
+    let found = fitted(&request(base(RINGING, ""), &[FREQUENCIES], &numbers));
+    let [torsion, bending] = [0, 1].map(|k| &found.parameters[k]);
+    assert!(!torsion.determined && torsion.value > 1e3, "{torsion:?}");
+    let sum = |fit: &Fit| fit.degrees_of_freedom as f64 * fit.standard_deviation.unwrap().powi(2);
+    // Student's quantile for 13 degrees of freedom.
+    assert_eq!(found.degrees_of_freedom, 13);
+    let limit = sum(&found) * (1.0 + 2.160_f64.powi(2) / 13.0);
+    let high = bending.high.unwrap();
+    assert!(bending.low.unwrap() < 1.23 && high > 1.281, "{bending:?}");
+    for (part, inside) in [(0.5, true), (0.96, true), (1.04, false)] {
+        let held = bending.value + part * (high - bending.value);
+        let begin = base(RINGING, &format!("stiffness.bending_2={held:?}"));
+        let least = sum(&fitted(&request(begin, &[FREQUENCIES], &numbers[..1])));
+        assert_eq!(least < limit, inside, "{least:e}, {limit:e} at {held}");
+    }
 }

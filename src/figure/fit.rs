@@ -2,7 +2,8 @@
 //! over the veins, and the residuals of all data.
 
 use super::kit::*;
-use crate::report::numbers::{brief, power_of_ten};
+use crate::report::numbers::{brief, counted};
+use crate::scenario::{Scenario, Units};
 use crate::study::{Fit, FitLeaf, FitResidual};
 
 const RESULT: f64 = 190.0;
@@ -16,16 +17,21 @@ const MOST_RESULTS: usize = 6;
 const MOST_LEAVES: usize = 3;
 /// Between the two views of a leaf.
 const GAP: f64 = 70.0;
+/// Views, and their axes.
+const VIEWS: [(&str, [usize; 2]); 3] = [
+    ("from above", [0, 1]),
+    ("from the side", [0, 2]),
+    ("along x", [1, 2]),
+];
 
-pub fn draw(fit: &Fit) -> Drawing {
+pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
+    let units = &scenario.units;
     let name = format!("{}: fit", fit.scenario);
-    let (count, free) = (fit.residuals.len(), fit.parameters.len());
-    let mut notes = vec![
-        format!("{count} data, {free} free numbers"),
-        fit.outcome.word().into(),
-    ];
+    let count = fit.residuals.len();
+    let free = counted(fit.parameters.len(), "free number", "free numbers");
+    let mut notes = vec![format!("{count} data, {free}"), fit.outcome.word().into()];
     if let Some(sd) = fit.standard_deviation {
-        notes.push(format!("residuals of {}", power_of_ten(sd)));
+        notes.push(format!("residuals of {}", brief(sd)));
     }
     let mut page = new_page(LEFT, &name, &notes, None);
     let mut top = HEADER;
@@ -41,13 +47,17 @@ pub fn draw(fit: &Fit) -> Drawing {
     for kind in kinds.into_iter().take(MOST_RESULTS) {
         let of: Vec<&FitResidual> = results().filter(|it| it.what == kind).collect();
         let letter = letter();
-        page.group("result", |page| draw_result(page, top, &letter, kind, &of));
+        page.group("result", |page| {
+            draw_result(page, top, &letter, (kind, units), &of)
+        });
         top += PANEL_TITLE + RESULT + PANEL_AXIS;
     }
     let traced = fit.leaves.iter().filter(|(_, it)| !it.traced.is_empty());
     for (name, leaf) in traced.take(MOST_LEAVES) {
         let letter = letter();
-        page.group("veins", |page| draw_veins(page, top, &letter, name, leaf));
+        page.group("veins", |page| {
+            draw_veins(page, top, &letter, (name, units), leaf)
+        });
         top += PANEL_TITLE + VEINS + PANEL_AXIS;
     }
     let letter = letter();
@@ -56,30 +66,44 @@ pub fn draw(fit: &Fit) -> Drawing {
     page
 }
 
-fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
+fn draw_result(
+    page: &mut Drawing,
+    top: f64,
+    letter: &str,
+    (kind, units): (&str, &Units),
+    of: &[&FitResidual],
+) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
     let what = format!("{kind} of the experiments");
     let values = of.iter().flat_map(|r| {
         let (band, sd) = (r.band, 2.0 * r.sd);
         [r.data - sd, r.data + sd, r.model - band, r.model + band]
     });
-    let mut up = Axis::holding(kind, values);
+    let unit = match kind.split_once('_') {
+        Some(("tip", _)) => units.length.as_deref(),
+        Some(("reaction", _)) => units.force.as_deref(),
+        _ => None,
+    };
+    let mut up = Axis::holding(&with_unit(kind, unit), values);
     up.emphasizes_zero = false;
+    let number = |r: &FitResidual| r.number as f64;
+    let mut numbers: Vec<f64> = of.iter().map(|r| number(r)).collect();
+    numbers.dedup();
+    let ends = [numbers.first(), numbers.last()].map(|end| end.copied().unwrap_or(1.0));
     let across = Axis {
-        ticks: Ticks::At((1..=of.len()).map(|k| k as f64).collect()),
-        ..Axis::linear("experiment", 0.5, of.len() as f64 + 0.5)
+        ticks: Ticks::At(numbers),
+        ..Axis::linear("experiment", ends[0] - 0.5, ends[1] + 0.5)
     };
     let axes = Axes::titled(page, cell, [letter, &what], across, up);
     let line = |value: &dyn Fn(&FitResidual) -> f64| -> Vec<(f64, f64)> {
-        let points = of.iter().enumerate();
-        points.map(|(k, r)| (k as f64 + 1.0, value(r))).collect()
+        of.iter().map(|r| (number(r), value(r))).collect()
     };
     let dashed = Stroke::new(BLUE, 1.0).dashed(true);
     axes.curve(page, &line(&|r| r.model - r.band), dashed);
     axes.curve(page, &line(&|r| r.model + r.band), dashed);
     axes.curve(page, &line(&|r| r.model), Stroke::new(BLUE, 1.6));
-    for (k, r) in of.iter().enumerate() {
-        let x = k as f64 + 1.0;
+    for r in of {
+        let x = number(r);
         let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
         axes.curve(page, &bar, Stroke::new(DOT, 1.0));
     }
@@ -91,13 +115,25 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
     key.line(page, "95 % band", "what the data leave open", dashed);
 }
 
-/// Draws a leaf from above and from the side, with the measured points.
-fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf: &FitLeaf) {
+/// Draws a leaf in the one or two views in which points were measured, with these.
+fn draw_veins(
+    page: &mut Drawing,
+    top: f64,
+    letter: &str,
+    (experiment, units): (&str, &Units),
+    leaf: &FitLeaf,
+) {
     let width = 0.5 * (WIDTH - LEFT - RIGHT - GAP);
-    for (k, (view, axes)) in [("from above", [0, 1]), ("from the side", [0, 2])]
-        .into_iter()
-        .enumerate()
-    {
+    let measured = |(_, [a, b]): &(&str, [usize; 2])| {
+        let mut points = leaf.traced.iter();
+        points.any(|(_, at)| at[*a].is_some() && at[*b].is_some())
+    };
+    let mut views: Vec<_> = VIEWS.into_iter().filter(measured).collect();
+    if views.is_empty() {
+        // Of marked points a single coordinate.
+        views = VIEWS.into();
+    }
+    for (k, (view, axes)) in views.into_iter().take(2).enumerate() {
         let corner = DVec2::new(LEFT + k as f64 * (width + GAP), top + PANEL_TITLE);
         let cell = Cell::new(corner, DVec2::new(width, VEINS));
         let letter = if k == 0 { letter } else { "" };
@@ -108,8 +144,9 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
         let points: Vec<(f64, f64)> = traced.filter_map(|(_, it)| seen(*it)).collect();
         let all: Vec<(f64, f64)> = leaf.curves.iter().flatten().map(flat).collect();
         let all = all.iter().chain(&points);
-        let across = Axis::holding(["x", "y", "z"][axes[0]], all.clone().map(|p| p.0));
-        let up = Axis::holding(["x", "y", "z"][axes[1]], all.map(|p| p.1));
+        let [name, above] = axes.map(|k| with_unit(["x", "y", "z"][k], units.length.as_deref()));
+        let across = Axis::holding(&name, all.clone().map(|p| p.0));
+        let up = Axis::holding(&above, all.map(|p| p.1));
         let (across, up) = equal_scales(across, up, cell.size);
         let panel = Axes::titled(page, cell, [letter, &what], across, up);
         for curve in &leaf.curves {
@@ -139,7 +176,10 @@ fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
     let points: Vec<(f64, f64)> = points.map(|(k, r)| (k as f64 + 1.0, r.residual)).collect();
     let count = points.len() as f64;
     let values = points.iter().map(|point| point.1);
-    let across = Axis::linear("datum", 0.0, count + 1.0);
+    let across = Axis {
+        ticks: Ticks::At((1..=points.len()).map(|k| k as f64).collect()),
+        ..Axis::linear("datum", 0.0, count + 1.0)
+    };
     let up = Axis::holding("residual", values.chain([-2.5, 2.5]));
     let axes = Axes::titled(page, cell, [letter, what], across, up);
     for bound in [-2.0, 2.0] {

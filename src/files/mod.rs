@@ -71,7 +71,7 @@ impl Written for Fit {
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("fitted.toml", report::fitted),
         Format::Table("fit.csv", report::fit_table),
-        Format::Figure(["fit.svg", "fit.png"], |it, _| figure::fit(it)),
+        Format::Figure(["fit.svg", "fit.png"], figure::fit),
     ];
 }
 

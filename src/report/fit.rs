@@ -10,9 +10,9 @@ const CANDIDATES: usize = 5;
 
 impl Reported for Fit {
     fn heading(&self) -> String {
-        let (name, numbers) = (&self.scenario, self.parameters.len());
-        let count = self.residuals.len();
-        format!("{name}: fit of {numbers} numbers to {count} data")
+        let (name, count) = (&self.scenario, self.residuals.len());
+        let numbers = counted(self.parameters.len(), "number", "numbers");
+        format!("{name}: fit of {numbers} to {count} data")
     }
 
     fn lines(&self) -> Lines {

@@ -204,7 +204,10 @@ impl Data {
             };
             let rod = number("rod")?.filter(|rod| rod.fract() == 0.0);
             let Some(rod) = rod.filter(|rod| (1.0..=veins as f64).contains(rod)) else {
-                let why = format!("rod: must be a whole number from 1 to {veins} (leaf.rods)");
+                let cell = column("rod").map_or("", |column| table.rows[row].1[column]);
+                let found = if cell.is_empty() { "nothing" } else { cell };
+                let why =
+                    format!("rod = {found}: must be a whole number from 1 to {veins} (leaf.rods)");
                 return Err(refuse(table.file, line, why));
             };
             let sigma = number("sigma")?;

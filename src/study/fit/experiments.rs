@@ -9,7 +9,7 @@ use crate::study::Keys;
 
 /// An experiment with the points traced on its veins.
 pub(super) struct Observed {
-    /// Its position among all.
+    /// Its position in the data.
     pub number: usize,
     pub experiment: Experiment,
     pub traced: Vec<Traced>,
@@ -122,9 +122,9 @@ fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
         };
         all[place].traced.push(traced);
     }
-    all.retain(|it| !it.experiment.measured.is_empty() || !it.traced.is_empty());
     for (number, observed) in all.iter_mut().enumerate() {
         observed.number = number;
     }
+    all.retain(|it| !it.experiment.measured.is_empty() || !it.traced.is_empty());
     Ok(all)
 }

@@ -19,8 +19,8 @@ use crate::study::Keys;
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
 
-/// Data this far from the fitted leaf, or from the base, in lengths of the longest rod, are
-/// hardly those of a leaf of this length.
+/// Coordinates this far from the fitted leaf, in lengths of the longest rod, are hardly those of
+/// this leaf under these loads; and this far from the base, not of any leaf of this length.
 const MISSED: f64 = 0.5;
 const BEYOND: f64 = 3.0;
 
@@ -133,22 +133,34 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
 fn other_units(stats: &Statistics) -> Vec<String> {
     let base = stats.model.base;
     let longest = longest(&base.scenario().rods);
-    let (mut places, mut frequencies) = (0, false);
+    let (mut beyond, mut missed, mut frequencies) = (0, 0, false);
     for component in stats.point.components() {
         match component.what {
             Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => {
                 let apart = (component.observed - component.model).abs() > MISSED * longest;
-                places += usize::from(apart || component.observed.abs() > BEYOND * longest);
+                match component.observed.abs() > BEYOND * longest {
+                    true => beyond += 1,
+                    false => missed += usize::from(apart),
+                }
             }
             Compared::Result(Quantity::Frequency(_)) => frequencies = true,
             Compared::Result(Quantity::Reaction(_)) => {}
         }
     }
     let mut remarks = Vec::new();
-    if places > 0 {
+    let are = |count: usize| if count == 1 { "is" } else { "are" };
+    if beyond > 0 {
         remarks.push(format!(
-            "{places} of the coordinates are far from any leaf of this length ({longest}): are the data in the \
-             scenario's unit of length?"
+            "{beyond} of the coordinates {} far from any leaf of this length ({longest}): are the data in the \
+             scenario's unit of length?",
+            are(beyond)
+        ));
+    }
+    if missed > 0 {
+        remarks.push(format!(
+            "{missed} of the coordinates {} more than half of the leaf's length ({longest}) from the fitted leaf: \
+             are lengths and forces in the scenario's units?",
+            are(missed)
         ));
     }
     let given = |key: &str| {
@@ -218,6 +230,10 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
         .flat_map(|case| &case.observed)
         .collect();
     observed.sort_by_key(|it| it.number);
+    let of = |number: usize| {
+        let found = observed.binary_search_by_key(&number, |it| it.number);
+        found.map_or_else(|_| String::new(), |at| observed[at].experiment.name.clone())
+    };
     all.into_iter()
         .map(|(component, band)| {
             let sd = stats.sd(component);
@@ -226,7 +242,8 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
                 Compared::Vein { rod, sigma, .. } => (Some(rod + 1), Some(sigma)),
             };
             FitResidual {
-                experiment: observed[component.experiment].experiment.name.clone(),
+                experiment: of(component.experiment),
+                number: component.experiment + 1,
                 what: component.what.column(),
                 rod,
                 sigma,

@@ -128,6 +128,16 @@ impl Coordinate {
         }
     }
 
+    /// So far on the way from the initial value to another, by orders of magnitude.
+    pub fn on_the_way(&self, to: f64, part: f64) -> f64 {
+        let way = to - self.start;
+        let far = match self.log {
+            true => part * way.abs(),
+            false => (1.0 + way.abs()).powf(part) - 1.0,
+        };
+        self.start + far * way.signum()
+    }
+
     /// d value/d coordinate.
     pub fn slope(&self, coordinate: f64) -> f64 {
         match self.log {

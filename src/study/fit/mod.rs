@@ -19,6 +19,7 @@ mod interval;
 mod least_squares;
 mod model;
 mod neighbourhood;
+mod profile;
 mod quantity;
 mod responses;
 mod result;

@@ -42,6 +42,9 @@ pub struct FitParameter {
 pub struct FitResidual {
     /// The experiment.
     pub experiment: String,
+    /// Its position in the data, from 1.
+    #[serde(skip)]
+    pub number: usize,
     /// `tip_x`, `frequency_1`, ..., or `x`, `y`, `z` of a point on a vein.
     pub what: String,
     /// The rod, counted from 1, and the fraction of its length, of a point on a vein.

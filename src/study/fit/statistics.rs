@@ -121,6 +121,15 @@ impl<'m, 'a> Statistics<'m, 'a> {
         insensitive.sum::<f64>().sqrt() <= INSENSITIVE
     }
 
+    /// Whether the data drove a coordinate far from its initial value without determining it, or to
+    /// a bound.
+    pub fn ran_away(&self, k: usize) -> bool {
+        let (free, theta) = (&self.model.coordinates[k], self.point.theta[k]);
+        let far = (theta - free.start).abs() > OPEN;
+        let vague = || self.quantile * self.deviation(k).0 > OPEN;
+        free.bounds.contains(&theta) || far && vague()
+    }
+
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
     pub fn assumed(&self, kind: Kind) -> Option<f64> {
         let alike = |component: &&Component| component.what.kind() == kind;

@@ -29,6 +29,9 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
+/// Smaller coefficients would be written as zero.
+const UNWRITTEN: f64 = 5e-3;
+
 /// A sentence for each number and each undetermined combination.
 pub(super) fn sentences(
     parameters: &[FitParameter],
@@ -64,8 +67,10 @@ fn percent(part: f64) -> String {
 
 fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate]) -> String {
     let key = |k: usize| parameters[k].key.as_str();
-    let all_logs = open.parts.iter().all(|(k, _)| free[*k].log);
-    match open.parts.as_slice() {
+    let parts = open.parts.iter().copied();
+    let parts: Vec<_> = parts.filter(|(_, part)| part.abs() >= UNWRITTEN).collect();
+    let all_logs = parts.iter().all(|(k, _)| free[*k].log);
+    match parts.as_slice() {
         [(k, _)] if open.exactly => format!("{}: not at all", key(*k)),
         [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
             (Some(low), None) => format!("{}: only that it is above {low:.2e}", key(*k)),
@@ -103,4 +108,48 @@ fn digits(value: f64) -> f64 {
 fn short(value: f64) -> String {
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a combination of logarithms.
+    fn said(parts: &[(&str, f64)]) -> String {
+        let coordinate = |(key, _): &(&str, f64)| Coordinate {
+            keys: key.parse().unwrap(),
+            log: true,
+            unit: 1.0,
+            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            bounded: false,
+            start: 0.0,
+        };
+        let parameter = |(key, _): &(&str, f64)| FitParameter {
+            key: (*key).into(),
+            value: 1.0,
+            low: None,
+            high: None,
+            determined: false,
+            profiled: false,
+        };
+        let free: Vec<Coordinate> = parts.iter().map(coordinate).collect();
+        let parameters: Vec<FitParameter> = parts.iter().map(parameter).collect();
+        let coefficients = parts.iter().map(|part| part.1).enumerate();
+        let open = Undetermined {
+            parts: coefficients.collect(),
+            exactly: true,
+        };
+        sentence(&open, &parameters, &free)
+    }
+
+    #[test]
+    fn what_does_not_change_is_left_out() {
+        let [a, b, c] = ["stiffness.torsion", "stiffness.axial", "coupling.y"];
+        let together = said(&[(a, 1.0), (b, 0.002), (c, 0.5)]);
+        assert!(together.contains("torsion") && together.contains("t^0.5"));
+        assert!(!together.contains("axial"), "{together}");
+        assert_eq!(said(&[(a, 1.0), (b, -0.002)]), format!("{a}: not at all"));
+        let ratio = said(&[(a, 1.0), (b, 1.0), (c, 0.001)]);
+        assert_eq!(ratio, format!("{a} and {b}: only as their ratio"));
+    }
 }
