@@ -125,12 +125,8 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     };
     let mut before: Option<(&Level, Vec<Eigenpair>)> = None;
     let sufficient_grids = sufficient_grids(run);
-    for (k, level) in run
-        .levels
-        .iter()
-        .enumerate()
-        .skip(sufficient_grids.saturating_sub(GRIDS))
-    {
+    let skipped = sufficient_grids.saturating_sub(GRIDS);
+    for (k, level) in run.levels.iter().enumerate().skip(skipped) {
         if k >= sufficient_grids && !series.grids.is_empty() && series.undecided().is_none() {
             break;
         }

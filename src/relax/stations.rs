@@ -11,7 +11,7 @@ use crate::shape::equally_spaced;
 const PARTS: usize = 16;
 
 /// Stations closer than this are the same.
-const SAME: f64 = 1e-14;
+pub const SAME: f64 = 1e-14;
 
 /// Advice if interpolated stations are less accurate than the tolerance.
 const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \

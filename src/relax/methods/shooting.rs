@@ -10,8 +10,9 @@ use crate::relax::equilibrium::{
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, Progress, RelaxError};
 use crate::relax::segments::coarsest;
+use crate::relax::stations::SAME;
 use crate::scenario::{Scenario, longest};
-use crate::shape::RodShape;
+use crate::shape::{RodShape, equally_spaced};
 use crate::undulation::Undulation;
 use glam::DVec3;
 use std::time::Instant;
@@ -28,6 +29,37 @@ fn station_grid(scenario: &Scenario) -> Grid {
     let leaf = Leaf::new(scenario);
     let segments = coarsest(&leaf, SEGMENTS).max(leaf.kinks().len() + 1);
     Grid::new(segments, leaf.kinks())
+}
+
+/// The stations `own` and those that divide a vein into `parts` equal parts: the solution is
+/// integrated to all of them, so that none is interpolated.
+fn with_requested(own: &[f64], parts: Option<usize>) -> Vec<f64> {
+    let requested = parts.map(equally_spaced).unwrap_or_default();
+    let mut all = own.to_vec();
+    let is_own = |at: &f64| {
+        let next = own.partition_point(|station| at - station >= SAME);
+        own.get(next).is_some_and(|station| station - at < SAME)
+    };
+    all.extend(requested.iter().filter(|at| !is_own(at)));
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The rods at those of their `stations` that are in `own`, too.
+fn at_own(own: &[f64], stations: &[f64], rods: &[RodShape]) -> Vec<RodShape> {
+    let at_own = |rod: &RodShape| {
+        let nodes = rod.nodes.iter().zip(stations);
+        let nodes = nodes.filter(|(_, at)| own.binary_search_by(|o| o.total_cmp(at)).is_ok());
+        RodShape {
+            length: rod.length,
+            nodes: nodes.map(|(node, _)| *node).collect(),
+        }
+    };
+    rods.iter().map(at_own).collect()
+}
+
+fn curve(rod: &RodShape) -> Vec<DVec3> {
+    rod.nodes.iter().map(|node| node.position).collect()
 }
 
 /// Refuses a number of intervals that is out of range or needs too much memory for this number
@@ -91,7 +123,8 @@ pub fn shoot(
 ) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
-    let stations = grid.sigma().to_vec();
+    let own = grid.sigma().to_vec();
+    let stations = with_requested(&own, options.stations);
     let bvp_options = bvp::Options {
         intervals,
         limit: options.limit.clone(),
@@ -114,7 +147,7 @@ pub fn shoot(
             accuracy.residual = Some(solution.defect);
             accuracy.error_estimate = Some(solution.error.position);
             energy = Some(solution.energy);
-            index = index_near(scenario, grid, &solution.rods);
+            index = index_near(scenario, grid, &at_own(&own, &stations, &solution.rods));
             let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
             (outcome, solution.work, solution.rods)
         }
@@ -123,7 +156,7 @@ pub fn shoot(
     let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
     let tip_force_sum = tips.iter().map(|node| node.rotation * node.n).sum();
-    let curve = |rod: &RodShape| rod.nodes.iter().map(|node| node.position).collect();
+    let rods_at_own = at_own(&own, &stations, &rods);
     Equilibrium {
         scenario: scenario.name.clone(),
         method: options.method,
@@ -146,16 +179,16 @@ pub fn shoot(
         },
         sensitivities: None,
         margin: None,
-        undulation: Undulation::at_stations(scenario, &stations, &rods, accuracy.error_estimate),
+        undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
         shape: Shape {
-            curve_stations: stations.clone(),
             stations,
             joined: scenario.joined,
-            curves: rods.iter().map(curve).collect(),
+            curves: rods_at_own.iter().map(curve).collect(),
+            curve_stations: own,
             rods,
         },
     }
