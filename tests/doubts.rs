@@ -95,5 +95,5 @@ fn a_tip_held_out_of_reach_is_named() {
     assert_eq!(lost.outcome, Outcome::Diverged);
     let said = [lost.remark.unwrap_or_default(), lost.doubts.concat()].concat();
     assert!(said.contains("tip.position is 40 from"), "{said}");
-    assert!(!said.contains("lower"), "{said}");
+    assert!(!said.contains("lower load"), "{said}");
 }

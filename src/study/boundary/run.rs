@@ -193,8 +193,12 @@ impl Run<'_, '_> {
         let mut curve = curves::follow(plane, &grid, seed, &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
+            // If the index changes nowhere, the equilibria only touch the curve, of which another
+            // sheet is on both sides.
+            let bounds = |point: &Verified| point.indices[0] != point.indices[1];
+            let none = !curve.points.iter().any(bounds);
             remove_known(&mut curve, &self.known);
-            if curve.points.is_empty() {
+            if curve.points.is_empty() || none {
                 return;
             }
         }
