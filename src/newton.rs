@@ -126,11 +126,13 @@ pub enum Equations<'s> {
     AnySign { largest: f64 },
     /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
-    /// With a positive definite matrix, shifted where necessary; an increment above the given
-    /// size ends the iteration.
+    /// With a positive definite matrix, shifted where necessary if it may be; an increment above
+    /// the given size ends the iteration.
     Definite {
         solver: &'s mut Definite,
         largest: f64,
+        /// Whether a region where the energy is not convex may be crossed.
+        shifted: bool,
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
     },
@@ -302,6 +304,7 @@ impl Linear<'_> {
             }
             Equations::Definite {
                 solver,
+                shifted,
                 cg_tolerance: loosest,
                 ..
             } => {
@@ -312,7 +315,7 @@ impl Linear<'_> {
                         return Some(tolerance);
                     }
                     self.shift = (4.0 * self.shift).max(FIRST_SHIFT);
-                    if self.shift > LARGEST_SHIFT {
+                    if !*shifted || self.shift > LARGEST_SHIFT {
                         return None;
                     }
                 }

@@ -1,7 +1,7 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
 use super::kit::*;
-use crate::relax::{self, Equilibrium, Method, Options, Outcome, Settings};
+use crate::relax::{self, Equilibrium, Method, Options, Outcome, Route, Settings};
 use crate::report::numbers::brief;
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
@@ -28,6 +28,10 @@ pub struct Relax {
     /// With --method shooting: shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
     #[arg(long, value_name = "N")]
     intervals: Option<usize>,
+
+    /// Which equilibrium, where there are several: that of a leaf which is loaded slowly before its tips are brought together, or of one released from arcs under all of its loads
+    #[arg(long, value_name = "NAME", value_parser = words::<Route>(Route::ALL.map(Route::word)), default_value_t)]
+    path: Route,
 
     /// Stop at a saddle instead of leaving it for a stable equilibrium
     #[arg(long)]
@@ -108,6 +112,7 @@ impl Relax {
             intervals: self.intervals,
             keep_unstable: self.keep_unstable,
             full_model: self.full_model,
+            route: self.path,
         };
         self.method.with(settings).map_err(|unfit| {
             let value = unfit.value.map(|value| format!(" {value}"));
@@ -119,6 +124,7 @@ impl Relax {
     fn solve(&self, job: &Job) -> Result<Equilibrium, Refusal> {
         let options = Options {
             method: self.method()?,
+            route: self.path,
             tolerance: self.request.tolerance,
             modes: self.modes.unwrap_or(DEFAULT_MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),

@@ -295,6 +295,14 @@ impl DiscreteLeaf {
         0.5 * stretch.dot(self.spring(j, i) * stretch)
     }
 
+    /// Puts on parts of the loads and of the coupling of the `whole` leaf.
+    pub fn load_in_part(&mut self, whole: &DiscreteLeaf, [loads, coupling]: [f64; 2]) {
+        self.load_factor = loads * whole.load_factor;
+        for (own, full) in self.coupling.iter_mut().zip(&whole.coupling) {
+            *own = coupling * *full;
+        }
+    }
+
     /// Sets all rest curvatures to `factor` times those of the leaf.
     pub fn set_rest(&mut self, factor: f64) {
         let n = self.segments();

@@ -4,6 +4,7 @@ use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::margin::Margin;
 use crate::relax::method::Method;
+use crate::relax::path::Path;
 use crate::relax::saddle::Saddle;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
@@ -300,6 +301,10 @@ pub struct Equilibrium {
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,
+    /// How the leaf came to this equilibrium: `None` for shooting, under a dead moment, and where
+    /// an unstable one was looked for.
+    #[serde(flatten)]
+    pub path: Option<Path>,
     /// Derivatives of the results with respect to the requested numbers of the scenario.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivities: Option<Vec<Sensitivity>>,

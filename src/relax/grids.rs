@@ -152,7 +152,7 @@ impl Run<'_, '_> {
                 // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
                 _ if self.too_coarse(level.leaf.segments())
                     && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
-                Ok(_) if !moved || last || self.by_steps => {
+                Ok(_) if !moved || last => {
                     self.push(level);
                     return Ok(());
                 }

@@ -1,5 +1,6 @@
 //! The methods by which a leaf is brought to rest, each with its own options.
 
+use crate::relax::path::Route;
 use crate::words::read_and_write;
 
 /// How a leaf is brought to rest.
@@ -109,6 +110,7 @@ impl Method {
             intervals,
             keep_unstable,
             full_model,
+            route,
         } = settings;
         let shooting = matches!(
             self,
@@ -122,6 +124,10 @@ impl Method {
         if intervals.is_some() && !shooting {
             let why = "only the method shooting has intervals";
             return Err(unfit("intervals", intervals, why));
+        }
+        if route == Route::Release && self.is_shooting() {
+            let why = "shooting follows no motion; use the method semi-implicit or explicit";
+            return Err(unfit("path", None, why));
         }
         if segments.is_some() && self.is_shooting() {
             let why = "shooting has no grid; leave it out, or set the number of intervals";
@@ -171,6 +177,8 @@ pub struct Settings {
     pub keep_unstable: bool,
     /// Whether to solve for the whole leaf.
     pub full_model: bool,
+    /// Which equilibrium is meant.
+    pub route: Route,
 }
 
 /// A setting that a method does not have.

@@ -19,7 +19,7 @@ mod modes;
 mod nodes;
 mod number;
 mod options;
-mod own_motion;
+mod path;
 mod plausible;
 pub(crate) mod predict;
 pub(crate) mod prolong;
@@ -59,6 +59,7 @@ pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
+pub use path::{Event, Happening, Path, Route, Stage};
 pub use request::Relaxation;
 pub use saddle::Saddle;
 pub(crate) use saddle::{NOISY, polish};

@@ -6,12 +6,15 @@ use crate::bvp;
 use crate::limit::Limit;
 use crate::memory::TooMuch;
 use crate::relax::method::Method;
+use crate::relax::path::Route;
 
 /// Options of a relaxation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The method.
     pub method: Method,
+    /// Which equilibrium is meant, where there are several (semi-implicit and explicit method).
+    pub route: Route,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
     /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];

@@ -1,6 +1,7 @@
-//! Prolongation to the grid with all segments halved, and restriction.
+//! Prolongation to the grid with all segments halved or to any other, and restriction.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, Grid, State};
+use crate::relax::stencil::Stencil;
 use glam::{DQuat, DVec3};
 
 /// The state on the refined grid: nodes in common are kept, new ones lie on cubic Hermite
@@ -58,6 +59,71 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     let mut fine = State::new(2 * n, x, q);
     fine.n = forces;
     fine
+}
+
+/// The state on any other grid, interpolated: positions and quaternions by polynomials through
+/// nodes nearby, forces linearly between the midpoints of the segments.
+pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
+    if *grid == leaf.grid {
+        return state.clone();
+    }
+    let n = leaf.segments();
+    let stencils: Vec<Stencil> = (grid.sigma().iter())
+        .map(|sigma| {
+            let [value, _] = Stencil::at(leaf, *sigma);
+            value
+        })
+        .collect();
+    let middle = |i: usize| {
+        let i = i.min(n - 1);
+        leaf.grid.middle(i)
+    };
+    // The segment whose middle is before a place, and the weight of the next.
+    let between = |sigma: f64| {
+        let before = (0..n)
+            .take_while(|i| middle(*i) <= sigma)
+            .count()
+            .saturating_sub(1);
+        let next = (before + 1).min(n - 1);
+        let width = middle(next) - middle(before);
+        let weight = if width > 0.0 {
+            (sigma - middle(before)) / width
+        } else {
+            0.0
+        };
+        (before, next, weight.clamp(0.0, 1.0))
+    };
+    let places: Vec<_> = (0..grid.segments())
+        .map(|i| between(grid.middle(i)))
+        .collect();
+    let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
+    for j in 0..leaf.rods() {
+        let base = state.base(j);
+        for stencil in &stencils {
+            let first = state.q[base + stencil.first];
+            let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+            for (i, weight) in stencil.terms() {
+                let q = state.q[base + i];
+                sum += if q.dot(first) < 0.0 { -q } else { q } * weight;
+            }
+            x.push(stencil.value(|i| state.x[base + i]));
+            q.push(sum.normalize());
+        }
+        for &(before, next, weight) in &places {
+            let [a, b] = [before, next].map(|i| state.n[j * n + i]);
+            forces.push(a.lerp(b, weight));
+        }
+    }
+    let mut other = State::new(grid.segments(), x, q);
+    other.n = forces;
+    // Ends are exact.
+    for j in 0..leaf.rods() {
+        let (from, to) = (state.base(j), other.base(j));
+        for (a, b) in [(from, to), (from + n, to + grid.segments())] {
+            (other.x[b], other.q[b]) = (state.x[a], state.q[a]);
+        }
+    }
+    other
 }
 
 /// The state on the next coarser grid: forces are means over the two halves of a segment.

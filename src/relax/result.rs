@@ -57,6 +57,7 @@ pub fn equilibrium(
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
         },
+        path: run.path.clone(),
         sensitivities: None,
         margin: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
@@ -192,10 +193,6 @@ fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline
     (&finest.leaf.grid, lines.collect())
 }
 
-/// Remark on a leaf that moved in time while softened.
-const SOFTENED: &str = "stiff rods were softened while the leaf moved, and where its own motion ends is not certain: \
-     that takes long, ends at a saddle, or in different equilibria on different grids; simulate shows it";
-
 /// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
 /// of advice where one helps.
 pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
@@ -212,8 +209,7 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
                      its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
-            })
-            .or_else(|| run.moved_softened.then(|| SOFTENED.into())),
+            }),
         ),
         Ok(false) => (
             Outcome::ToleranceNotReached,
@@ -303,9 +299,9 @@ fn advice(run: &Run) -> String {
         true => "the curvatures at rest".to_owned(),
         false => loads.join(" or "),
     };
-    let reached = match run.load_part {
-        part if part > 0.0 && part < 0.995 => {
-            format!(" (it rests under {:.2} % of the loads)", 100.0 * part)
+    let reached = match run.reached {
+        Some((stage, part)) if part > 0.0 => {
+            format!(" (it came to rest up to {:.2} % of {stage})", 100.0 * part)
         }
         _ => String::new(),
     };

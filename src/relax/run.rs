@@ -2,11 +2,13 @@
 //! error estimate of their extrapolation.
 
 use crate::leaf::{DiscreteLeaf, Leaf, System, whole_fields};
-use crate::newton::{Contraction, Work};
+use crate::newton::{Contraction, Stop, Work};
 use crate::relax::defect::{self, Estimate, Linear};
 use crate::relax::level::{Level, complete, positions};
-use crate::relax::method::Method;
+use crate::relax::method::{Method, SemiImplicit};
+use crate::relax::methods::softens;
 use crate::relax::options::{Options, Progress};
+use crate::relax::path::{Path, Route, Stage};
 use crate::relax::richardson::Richardson;
 use crate::relax::saddle::Saddle;
 use glam::DVec3;
@@ -46,6 +48,11 @@ const CORRECTED: f64 = 1e-2;
 /// For leaves with more nodes than this no equations are kept while others are solved, which
 /// saves memory at the cost of another factorisation on a coarse grid.
 const MANY_NODES: usize = 50_000;
+
+/// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
+/// steps of Newton's method, rests where slow loading leads: so did all of 5000 random leaves.
+/// Those of up to 3 lengths that ended elsewhere had taken 20 steps and more.
+const FIRST_VALLEY: (f64, usize) = (2.0, 8);
 
 /// Rounding error per segment.
 const ROUNDING: f64 = 4e-15;
@@ -94,12 +101,15 @@ pub struct Run<'a, 'o> {
     /// Number of pushes off saddles at which the iteration had converged (found by their Morse
     /// index).
     pub pushes: i32,
-    /// Whether the leaf did not come to rest in a first attempt.
-    pub by_steps: bool,
-    /// Whether it took time steps while softened.
-    pub moved_softened: bool,
-    /// Part of the loads under which it came to rest in the second attempt.
-    pub load_part: f64,
+    /// Whether it fails where the leaf would have to leave the valley of its initial guess.
+    pub stays_in_valley: bool,
+    /// How the leaf came to where it is, if that is known.
+    pub path: Option<Path>,
+    /// How far the leaf came on its path before it failed.
+    pub reached: Option<(Stage, f64)>,
+    /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
+    /// led there.
+    pub from_start: Option<(f64, usize)>,
 }
 
 /// What a run found on its grids: see its fields of the same names.
@@ -112,7 +122,6 @@ pub struct Found {
     effects: [Option<f64>; 2],
     solved: usize,
     remaining: f64,
-    moved_softened: bool,
 }
 
 impl<'a, 'o> Run<'a, 'o> {
@@ -147,24 +156,66 @@ impl<'a, 'o> Run<'a, 'o> {
             contraction: Contraction::default(),
             spent: 0,
             pushes: 0,
-            by_steps: false,
-            moved_softened: false,
-            load_part: 0.0,
+            stays_in_valley: false,
+            path: None,
+            reached: None,
+            from_start: None,
         }
     }
 
-    /// Discards all grids and restarts by continuation in loads and stiffness.
-    pub fn restart_by_steps(&mut self) {
-        if !self.by_steps {
-            self.spent = BUDGET / 2;
-        }
-        self.by_steps = true;
+    /// The same run of another leaf, that reduced from the `whole` one or the whole itself, from
+    /// the beginning; its work goes on being counted.
+    pub fn of(mut self, leaf: &'a Leaf, whole: Option<&'a Leaf>) -> Self {
+        (self.leaf, self.whole) = (leaf, whole);
+        self.solved = leaf.rods();
+        (self.linear, self.spare_system) = (None, None);
+        (self.stays_in_valley, self.clearly_stable) = (false, false);
         self.restart();
+        self
+    }
+
+    /// Whether a run ended at a stable equilibrium.
+    pub fn is_answer(&self, end: &Result<bool, Stop>) -> bool {
+        end.is_ok() && self.index == Some(0)
+    }
+
+    /// Whether the leaf is loaded slowly, rather than released.
+    pub fn loads_slowly(&self) -> bool {
+        let disturbed = |how: SemiImplicit| how.keep_unstable || how.disturbance.is_some();
+        let released = match self.options.method {
+            Method::SemiImplicit(how) => disturbed(how),
+            _ => false,
+        };
+        // Under a dead moment it always is, by a method of its own.
+        self.options.route == Route::Loading
+            && !released
+            && self.leaf.loads.tip_moment == DVec3::ZERO
+    }
+
+    /// The path of a leaf that is released.
+    pub fn released(&self) -> Option<Path> {
+        let released = self.options.route == Route::Release && !self.keeps_unstable();
+        (released && self.leaf.loads.tip_moment == DVec3::ZERO).then_some(Path::Released)
+    }
+
+    /// Whether it may come to rest without being loaded in steps: its rods need not be softened.
+    pub fn may_settle_at_once(&self) -> bool {
+        matches!(self.options.method, Method::SemiImplicit(_))
+            && self.leaf.held.is_none()
+            && !softens(self.leaf)
+    }
+
+    /// Whether Newton's method alone came to rest from the start, so near that this is where
+    /// slow loading leads.
+    pub fn is_in_first_valley(&self) -> bool {
+        let near = |&(distance, steps): &(f64, usize)| {
+            distance < FIRST_VALLEY.0 && steps <= FIRST_VALLEY.1
+        };
+        self.from_start.as_ref().is_some_and(near) && self.saddle.is_none()
     }
 
     /// Discards all grids and the results on them.
     pub fn restart(&mut self) {
-        self.moved_softened = false;
         self.saddle = None;
         self.levels.clear();
         self.tabulate();
@@ -186,7 +237,6 @@ impl<'a, 'o> Run<'a, 'o> {
             effects: self.effects,
             solved: self.solved,
             remaining: self.remaining,
-            moved_softened: self.moved_softened,
         }
     }
 
@@ -198,7 +248,6 @@ impl<'a, 'o> Run<'a, 'o> {
         (self.index, self.clearly_stable) = (before.index, before.clearly_stable);
         (self.saddle, self.effects) = (before.saddle, before.effects);
         (self.solved, self.remaining) = (before.solved, before.remaining);
-        self.moved_softened = before.moved_softened;
     }
 
     /// The run of a reduced leaf converted to one of the whole leaf.
@@ -228,15 +277,6 @@ impl<'a, 'o> Run<'a, 'o> {
     /// Whether unstable equilibria are accepted.
     pub fn keeps_unstable(&self) -> bool {
         matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
-    }
-
-    /// Whether a leaf that did not come to rest gets a second attempt.
-    pub fn may_go_by_steps(&self) -> bool {
-        let settles =
-            matches!(self.options.method, Method::SemiImplicit(how) if !how.keep_unstable);
-        // A held tip has been moved to its position by steps already.
-        let free = self.leaf.held.is_none() && self.leaf.loads.tip_moment == DVec3::ZERO;
-        settles && free && !self.out_of_time()
     }
 
     /// Whether the time limit is reached or the run is cancelled.

@@ -189,9 +189,15 @@ pub fn polish(
     index(leaf, state, system, leaf.neutral_shift(), work)
 }
 
-/// Displaces a state at a saddle along its most unstable mode, found by inverse iteration with
-/// the first shift, doubled from 1e-4, that makes the matrix positive definite.
-pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
+/// Finds the most unstable mode at a saddle, by inverse iteration with the first shift, doubled
+/// from 1e-4, that makes the matrix positive definite. It is the solution of the system; false if
+/// there is none.
+pub fn find_unstable_mode(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut Work,
+) -> bool {
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     system.seed_mode();
@@ -203,7 +209,7 @@ pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, wor
         }
         shift *= 2.0;
         if !shift.is_finite() {
-            return;
+            return false;
         }
     }
     for _ in 0..MODE_ITERATIONS {
@@ -212,10 +218,23 @@ pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, wor
             break;
         }
     }
+    true
+}
+
+/// Displaces a state along the mode that was found, to the side of this sign.
+pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
     let (turn, displacement) = system.largest();
     let mut pushed = state.clone();
-    leaf.advance(state, system, PUSH / turn.max(displacement), &mut pushed);
+    let step = sign * PUSH / turn.max(displacement);
+    leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
+}
+
+/// Displaces a state at a saddle along its most unstable mode.
+pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
+    if find_unstable_mode(leaf, state, system, work) {
+        displace(leaf, state, system, 1.0);
+    }
 }
 
 /// The saddle at a state, in the units of the scenario.

@@ -6,6 +6,7 @@ use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
 use crate::relax::options::Progress;
+use crate::relax::path;
 use crate::relax::run::{BUDGET, Run, is_large};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
@@ -85,11 +86,15 @@ impl Run<'_, '_> {
         let explicit = matches!(self.options.method, Method::Explicit { .. });
         let dead_moment = leaf.tip_moment() != DVec3::ZERO;
         if !explicit && !dead_moment && !self.keeps_unstable() {
-            let by_steps = self.by_steps && from_start;
-            let how = (near_rest, by_steps, cg_tolerance);
+            let how = (near_rest, cg_tolerance);
             self.spare_system = None;
             let mut system = System::new(&leaf);
+            let begun = from_start.then(|| (state.clone(), self.work.steps));
             let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
+            if let Some((begun, steps)) = begun {
+                let distance = path::distance(&begun, &settled.level.state);
+                self.from_start = Some((distance, self.work.steps - steps));
+            }
             self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
             return Settled {
                 moved: moved || settled.moved,
@@ -163,10 +168,11 @@ impl Run<'_, '_> {
         leaf: DiscreteLeaf,
         state: State,
         system: &mut System,
-        (near_rest, by_steps, cg_tolerance): (bool, bool, f64),
+        (near_rest, cg_tolerance): (bool, f64),
     ) -> Settled {
         let accuracy = self.accuracy(&leaf);
-        let convex_only = self.whole.is_some() || self.too_coarse(leaf.segments());
+        let convex_only =
+            self.whole.is_some() || self.stays_in_valley || self.too_coarse(leaf.segments());
         let nodes = leaf.rods() * leaf.segments();
         let (most, least) = LEAST_EVALUATIONS;
         let granted = (most * COARSE / leaf.segments()).clamp(least, most);
@@ -183,7 +189,6 @@ impl Run<'_, '_> {
             },
             most_evaluations,
             convex_only,
-            by_steps,
             ..Relaxation::new(state, accuracy, out, &self.options.limit)
         };
         let mut rest = Err(Stop::StepLimit);
@@ -213,14 +218,12 @@ impl Run<'_, '_> {
                 None => {}
             }
             saddle::push_off(&leaf, state, system, relaxation.work);
-            (relaxation.near_rest, relaxation.by_steps) = (false, false);
+            relaxation.near_rest = false;
             relaxation.cg_tolerance = FAR_FROM_REST;
             relaxation.solver.direct = None;
         }
         let Relaxation { state, moved, .. } = relaxation;
         self.contraction = relaxation.solver.contraction;
-        self.load_part = relaxation.load_part.max(self.load_part);
-        self.moved_softened |= relaxation.moved_softened;
         let level = Level { leaf, state };
         Settled { level, rest, moved }
     }

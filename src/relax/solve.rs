@@ -3,7 +3,7 @@
 use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
-use crate::newton::{Stop, Work};
+use crate::newton::Stop;
 use crate::relax::decision::{Decision, Verdict, decide};
 use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
@@ -13,9 +13,10 @@ use crate::relax::modes::{self, List};
 use crate::relax::options::{
     MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
 };
+use crate::relax::path::Path;
 use crate::relax::plausible;
 use crate::relax::result;
-use crate::relax::run::{BUDGET, Run};
+use crate::relax::run::Run;
 use crate::relax::segments::{check_segments, least, reducible};
 use crate::scenario::Scenario;
 use std::time::Instant;
@@ -112,11 +113,6 @@ fn relax_once(
     Ok(found)
 }
 
-/// The coarsest and the finest grid of the second attempt, by continuation in loads and
-/// stiffness.
-const COARSEST_BY_STEPS: usize = 32;
-const FINEST_BY_STEPS: usize = 1024;
-
 /// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
 /// also returns the leaf on each grid that was extrapolated, from coarse to fine.
 pub(crate) fn relax_on_grids(
@@ -139,52 +135,47 @@ pub(crate) fn relax_on_grids(
     let half = reducible(method).then(|| leaf.half()).flatten();
     let planar = reducible(method) && leaf.is_planar();
     let grid = Grid::new(first, leaf.kinks());
-    let mut work = Work::default();
-    if let Some(half) = &half {
-        let mut run = Run::new(half, options, tolerance, progress);
-        run.whole = Some(&leaf);
-        run.planar = planar;
-        run.shape_alone = shape_alone;
-        let end = run.solve(grid.clone());
-        let end = run.settle_by_own_motion(&grid, end);
-        if end.is_ok() && run.index == Some(0) {
-            return Ok(finished(run.completed(&leaf), end, clock));
-        }
-        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
-        // solve the full leaf.
-        work = run.work;
-    }
     let mut run = Run::new(&leaf, options, tolerance, progress);
-    run.work = work;
     run.planar = planar;
     run.shape_alone = shape_alone;
-    let end = rest_from(&mut run, grid);
+    let slowly = run.loads_slowly();
+    run.path = slowly.then_some(Path::STABLE).or_else(|| run.released());
+    if let Some(half) = &half {
+        if !slowly || run.may_settle_at_once() {
+            run = run.of(half, Some(&leaf));
+            let end = run.solve(grid.clone());
+            if run.is_answer(&end) && (!slowly || run.is_in_first_valley()) {
+                return Ok(finished(run.completed(&leaf), end, clock));
+            }
+            // The reduced model fails, as the leaf leaves its valley or breaks the mirror
+            // symmetry: solve the full leaf.
+            run = run.of(&leaf, None);
+        }
+    }
+    if !slowly {
+        let end = run.solve(grid);
+        return Ok(finished(run, end, clock));
+    }
+    if half.is_none() && run.may_settle_at_once() {
+        run.stays_in_valley = true;
+        let end = run.solve(grid.clone());
+        if run.is_answer(&end) && run.is_in_first_valley() {
+            return Ok(finished(run, end, clock));
+        }
+        run = run.of(&leaf, None);
+    }
+    let (run, end) = run.load_slowly(half.as_ref());
     Ok(finished(run, end, clock))
 }
 
-/// Rest, starting on this grid; if that fails, by steps of loads and stiffness on finer ones.
+/// Rest from the start, on this grid and finer ones.
 fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
-    let end = run.solve(grid.clone());
-    let mut end = run.settle_by_own_motion(&grid, end);
-    let mut next = Some(grid);
-    while end.is_err()
-        && run.may_go_by_steps()
-        && let Some(mut grid) = next
-    {
-        // On the requested grid, or on a finer grid in each attempt.
-        let fixed = run.segments().is_some();
-        while !fixed && grid.segments() < COARSEST_BY_STEPS {
-            grid = grid.refined();
-        }
-        run.restart_by_steps();
-        end = run.solve(grid);
-        let failed = run.levels.last().filter(|_| !fixed);
-        next = failed
-            .filter(|_| run.spent <= BUDGET)
-            .map(|level| level.leaf.grid.refined())
-            .filter(|grid| grid.segments() <= FINEST_BY_STEPS);
+    if !run.loads_slowly() {
+        return run.solve(grid);
     }
-    end
+    let arrived = run.arrive(grid)?;
+    let guesses = run.guesses(&arrived);
+    run.follow(guesses)
 }
 
 /// The result of a run, with the modes of a leaf at rest: requested modes are not counted in
@@ -208,6 +199,9 @@ fn finished(
     let (outcome, remark) = result::outcome(&run, end);
     let mut found = result::equilibrium(&run, outcome, remark, wall);
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
+    found
+        .doubts
+        .extend(found.path.as_ref().and_then(Path::doubt));
     found.decide(verdict);
     let modes = modes.or_else(|| {
         let list = List::requested(&run);

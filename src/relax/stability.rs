@@ -80,6 +80,10 @@ impl Run<'_, '_> {
             self.levels.push(level);
             return Ok(before == self.index || self.segments().is_some());
         }
+        if self.stays_in_valley {
+            self.levels.push(level);
+            return Err(Stop::Saddle);
+        }
         self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
         self.pushes += 1;
         if self.pushes > MAX_SADDLES {

@@ -57,8 +57,8 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     State::new(leaf.segments(), x, q)
 }
 
-/// Unstrained rods: v = v0, u = u0.
-fn rest_shapes(leaf: &DiscreteLeaf) -> State {
+/// The natural leaf, unstrained rods: v = v0, u = u0.
+pub fn rest_shapes(leaf: &DiscreteLeaf) -> State {
     let (mut xs, mut qs) = (Vec::new(), Vec::new());
     for j in 0..leaf.rods() {
         let (mut x, mut q): (DVec3, DQuat) = (DVec3::ZERO, leaf.leaf.base(j));

@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::kit::*;
 use crate::relax::{
-    Barrier, Direction, Equilibrium, Fate, Loss, Margin, Mode, Outcome, Push, Sensitivity,
+    Barrier, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Outcome, Path, Push,
+    Sensitivity,
 };
 use crate::study::{All, Found};
 
@@ -20,6 +21,7 @@ impl Reported for Equilibrium {
 
     fn lines(&self) -> Lines {
         let mut lines = vec![("found", found(self))];
+        lines.extend(self.path.as_ref().map(|path| ("path", way(path))));
         if let Some(saddle) = &self.stability.saddle {
             let (index, energy) = (saddle.negative_eigenvalues, significant(saddle.energy));
             let tip = point(saddle.tip.to_array(), decimals(self));
@@ -66,6 +68,20 @@ pub fn found(equilibrium: &Equilibrium) -> String {
             format!("{verdict} (residual {residual:.1e})")
         }
         _ => verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues),
+    }
+}
+
+/// How the leaf came to its equilibrium.
+fn way(path: &Path) -> String {
+    match path {
+        Path::Released => "released from arcs under all loads".into(),
+        Path::Loaded { events, .. } if events.is_empty() => {
+            "stable throughout, from the unloaded veins".into()
+        }
+        Path::Loaded { events, .. } => {
+            let events: Vec<String> = events.iter().map(Event::to_string).collect();
+            events.join(", then ")
+        }
     }
 }
 

@@ -1,11 +1,12 @@
 //! The solution methods, each on one grid or without a grid.
 
-mod by_steps;
 mod damped_motion;
 pub mod explicit;
 pub mod moment;
 pub mod semi_implicit;
 pub mod shooting;
+
+pub use semi_implicit::softens;
 
 use crate::leaf::State;
 use crate::limit::Limit;
@@ -38,15 +39,6 @@ pub struct Relaxation<'a> {
     pub most_evaluations: usize,
     /// Whether to fail at once where the energy is not convex.
     pub convex_only: bool,
-    /// Whether it took time steps: Newton's did not lead to rest.
-    pub in_time: bool,
-    /// Whether this is a second attempt, by continuation in loads and stiffness.
-    pub by_steps: bool,
-    /// Whether it took time steps while softened: its inertia, and that of the leaf with its
-    /// own stiffness, may decide where it comes to rest.
-    pub moved_softened: bool,
-    /// Part of the loads under which the leaf came to rest, in such an attempt.
-    pub load_part: f64,
 }
 
 impl<'a> Relaxation<'a> {
@@ -70,10 +62,6 @@ impl<'a> Relaxation<'a> {
             solver: Definite::default(),
             most_evaluations: usize::MAX,
             convex_only: false,
-            in_time: false,
-            by_steps: false,
-            moved_softened: false,
-            load_part: 0.0,
         }
     }
 }

@@ -11,7 +11,7 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{DiscreteLeaf, State, Sums, System};
+use crate::leaf::{DiscreteLeaf, Leaf, State, Sums, System};
 use crate::newton::{
     Equations, Newton, Stalled, Stop, Work, at_saddle, cg_tolerance, converged, satisfies_lengths,
 };
@@ -35,32 +35,39 @@ const MAX_STEPS: usize = 2000;
 /// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
 /// one is first settled with this compliance, which also gives its segment forces, and then
 /// with its own.
-pub(super) const MOVING_COMPLIANCE: f64 = 2e-3;
+const MOVING_COMPLIANCE: f64 = 2e-3;
 
 /// Approximate largest stretch of a softened leaf by its load.
-pub(super) const MOVING_STRETCH: f64 = 0.05;
+const MOVING_STRETCH: f64 = 0.05;
 
 /// Accuracy to which a softened leaf is settled.
-pub(super) const SOFT_ACCURACY: f64 = 1e-1;
+const SOFT_ACCURACY: f64 = 1e-1;
 
 /// Factor on the compliance of a softened leaf if Newton's method does not converge from it
 /// with the leaf's own stiffness, and its lower limit.
 const STIFFER: f64 = 0.1;
-pub(super) const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
+const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
 /// Newton iterations of a stiff leaf before it is stiffened in steps.
 const STIFF_ITERATIONS: usize = 12;
 
+/// The least compliance of a leaf that moves after so many pushes off saddles.
+fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
+    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
+    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
+}
+
+/// Whether a leaf is so stiff that it is softened while it moves.
+pub fn softens(leaf: &Leaf) -> bool {
+    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
+    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
+}
+
 impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
-        if self.by_steps {
-            return self.settle_by_steps(leaf, system);
-        }
         let stiffest = leaf.stiffest();
-        let load = leaf.leaf.loads.tip_force.length() + leaf.leaf.loads.gravity.length();
-        let moving_compliance =
-            (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
+        let moving_compliance = moving_compliance(&leaf.leaf, self.pushes);
         if stiffest >= moving_compliance {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
@@ -73,14 +80,11 @@ impl Relaxation<'_> {
                     // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
-                self.in_time = false;
-                let rest = self.move_to_rest(&soft, system, SOFT_ACCURACY);
-                self.moved_softened |= self.in_time;
-                rest?;
+                self.move_to_rest(&soft, system, SOFT_ACCURACY)?;
             }
             let before = self.state.clone();
             match self.newton(leaf, system, self.accuracy) {
-                Err(Stop::Stuck) => self.state = before,
+                Err(Stop::Stuck) if !(self.near_rest && self.convex_only) => self.state = before,
                 settled => return settled,
             }
             if soften {
@@ -98,7 +102,7 @@ impl Relaxation<'_> {
     }
 
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
-    pub(super) fn newton(
+    fn newton(
         &mut self,
         leaf: &DiscreteLeaf,
         system: &mut System,
@@ -113,6 +117,7 @@ impl Relaxation<'_> {
         let equations = Equations::Definite {
             solver: &mut self.solver,
             largest: MAX_TURN.min(MAX_SHIFT),
+            shifted: true,
             cg_tolerance: self.cg_tolerance,
         };
         newton.solve(leaf, &mut self.state, system, equations)
@@ -189,7 +194,6 @@ impl Relaxation<'_> {
             match motion.is_newton() {
                 true => motion.accept_newton(),
                 false => {
-                    self.in_time = true;
                     motion.accept(at_saddle(leaf, &self.state, size), part);
                 }
             }

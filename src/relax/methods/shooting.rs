@@ -177,6 +177,7 @@ pub fn shoot(
             mode_shapes: options.mode_shapes,
             ..Stability::default()
         },
+        path: None,
         sensitivities: None,
         margin: None,
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),

@@ -1,0 +1,177 @@
+//! Where the path loses its stability: the leaf moves on, down its energy, to another equilibrium
+//! under the same part of the loading.
+//!
+//! The motion is one of a leaf in a very viscous medium: implicit Euler steps without inertia,
+//! each solved to convergence, so that segments carry the forces of their strains however stiff
+//! they are. It leaves a saddle, or the place of a fold, along the one direction in which the
+//! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
+//! is Newton's method.
+
+use super::walk::{Walk, distance};
+use super::{Happening, choice};
+use crate::leaf::State;
+use crate::newton::{Equations, Newton, Stop, at_saddle};
+use crate::relax::saddle;
+
+/// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
+/// first, the factors by which they rise after a failed step and fall at most after a successful
+/// one, the rate below which there are no springs, and the rates above which the motion fails,
+/// in general and where segments are unresolved.
+const FIRST_RATE: f64 = 10.0;
+const RATE_INCREASE: f64 = 8.0;
+const LARGEST_RATE_DECREASE: f64 = 8.0;
+const LEAST_RATE: f64 = 0.1;
+const LARGEST_RATE: f64 = 1e12;
+const LARGEST_UNRESOLVED: f64 = 1e6;
+
+/// Newton iterations of a step, their accuracy, and the largest increment and the largest change
+/// in a step (radians, lengths): longer steps could leave the valley.
+const ITERATIONS: usize = 12;
+const STEP_ACCURACY: f64 = 1e-3;
+const LARGEST_INCREMENT: f64 = 0.5;
+const LARGEST_CHANGE: f64 = 0.5;
+
+/// Accuracy of the equilibrium at the end of a motion.
+const AT_REST: f64 = 1e-3;
+
+/// Saddles that are left in one motion.
+const SADDLES: usize = 6;
+
+/// Energies of mirror images agree to this part, of the larger one or of one (A/L).
+const SAME_ENERGY: f64 = 1e-3;
+
+/// A leaf that moves no farther (lengths, radians) has not snapped.
+const NEARBY: f64 = 0.05;
+
+impl Walk<'_> {
+    /// From the unstable equilibrium in which Newton's method has put the next state the leaf
+    /// turns to one of its sides.
+    pub fn turn_aside(&mut self, part: f64) -> Result<(), Stop> {
+        let saddle = self.next.clone();
+        let side = choice::side(
+            &self.loading.leaf,
+            &saddle,
+            &mut self.system,
+            self.preferred,
+            self.work,
+        );
+        let mut found: [Option<(f64, State)>; 2] = [None, None];
+        let mut stopped = Stop::Stuck;
+        for (found, sign) in found.iter_mut().zip([side, -side]) {
+            self.next.clone_from(&saddle);
+            choice::push(
+                &self.loading.leaf,
+                &mut self.next,
+                &mut self.system,
+                sign,
+                self.work,
+            );
+            match self.move_to_rest() {
+                Ok(()) => *found = Some((self.loading.leaf.energy(&self.next), self.next.clone())),
+                Err(stop) => stopped = stop,
+            }
+        }
+        let [one, other] = found;
+        let (state, equally_open) = match (one, other) {
+            (Some((e1, one)), Some((e2, other))) => {
+                let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
+                let apart = distance(&one, &other) > NEARBY;
+                match e1 <= e2 || same {
+                    true => (one, same && apart),
+                    false => (other, false),
+                }
+            }
+            (Some((_, one)), None) | (None, Some((_, one))) => (one, false),
+            (None, None) => return Err(stopped),
+        };
+        self.next = state;
+        self.note(part, Happening::Branched { equally_open });
+        Ok(())
+    }
+
+    /// From the last equilibrium before the end of the path the leaf snaps.
+    pub fn snap(&mut self, part: f64) -> Result<(), Stop> {
+        self.carry_last(part);
+        let before = self.next.clone();
+        self.move_to_rest()?;
+        if distance(&before, &self.next) > NEARBY {
+            self.note(part, Happening::Snapped);
+        }
+        Ok(())
+    }
+
+    /// Moves the next state to rest, leaving saddles.
+    fn move_to_rest(&mut self) -> Result<(), Stop> {
+        let leaf = &self.loading.leaf;
+        leaf.strain_forces(&mut self.next);
+        let (mut rate, mut decrease): (f64, f64) = (FIRST_RATE, 1.0);
+        let mut saddles = 0;
+        while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
+            let from = self.next.clone();
+            let step = Newton {
+                accuracy: if rate > 0.0 { STEP_ACCURACY } else { AT_REST },
+                iterations: ITERATIONS,
+                work: self.work,
+                progress: self.progress,
+            };
+            let proximal = Equations::Proximal {
+                solver: &mut self.solver,
+                at: &from,
+                rate,
+                largest: LARGEST_INCREMENT,
+            };
+            let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
+            if moved.is_ok() && distance(&from, &self.next) > LARGEST_CHANGE {
+                moved = Err(Stop::Stuck);
+            }
+            match moved {
+                Ok(_) if rate == 0.0 => {
+                    let shift = leaf.neutral_shift();
+                    match saddle::index(leaf, &self.next, &mut self.system, shift, self.work) {
+                        Some(0) => return Ok(()),
+                        _ => moved = Err(Stop::Saddle),
+                    }
+                }
+                Ok(size) if at_saddle(leaf, &self.next, self.next.shift_to(&from).max(size)) => {
+                    moved = Err(Stop::Saddle);
+                }
+                _ => {}
+            }
+            match moved {
+                Err(Stop::Saddle) => {
+                    saddles += 1;
+                    if saddles > SADDLES {
+                        return Err(Stop::Saddle);
+                    }
+                    let side = choice::side(
+                        leaf,
+                        &self.next,
+                        &mut self.system,
+                        self.preferred,
+                        self.work,
+                    );
+                    choice::push(leaf, &mut self.next, &mut self.system, side, self.work);
+                    leaf.strain_forces(&mut self.next);
+                    rate = FIRST_RATE;
+                }
+                Ok(_) => {
+                    rate /= decrease;
+                    decrease = (2.0 * decrease).min(LARGEST_RATE_DECREASE);
+                    if rate < LEAST_RATE {
+                        rate = 0.0;
+                    }
+                }
+                Err(stop) => {
+                    self.next = from;
+                    rate = (RATE_INCREASE * rate).max(FIRST_RATE);
+                    decrease = 1.0;
+                    if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
+                    {
+                        return Err(stop);
+                    }
+                }
+            }
+        }
+        Err(Stop::StepLimit)
+    }
+}
