@@ -7,6 +7,7 @@ use crate::limit::Limit;
 use crate::memory::TooMuch;
 use crate::relax::method::Method;
 use crate::relax::path::Route;
+use glam::DVec3;
 
 /// Options of a relaxation.
 #[derive(Clone, Debug, Default)]
@@ -15,6 +16,9 @@ pub struct Options {
     pub method: Method,
     /// Which equilibrium is meant, where there are several (semi-implicit and explicit method).
     pub route: Route,
+    /// A force along the lab axes, of any size, that decides to which side a slowly loaded leaf
+    /// turns where both are equally open; zero: down, then to the left, then forward.
+    pub leaning: DVec3,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
     /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];

@@ -138,6 +138,7 @@ impl<'a> Run<'a, '_> {
             (&mut self.work, &mut progress),
             (&self.options.limit, most),
         );
+        walk.leaning = self.options.leaning;
         let end = walk.run();
         let events = std::mem::take(&mut walk.events);
         let reached = (walk.stage, walk.part);

@@ -6,17 +6,17 @@ use crate::newton::Work;
 use crate::relax::saddle;
 use glam::DVec3;
 
-/// Work of the preferred force, as a part of the largest possible, from which on it decides.
+/// Work of the leaning force, as a part of the largest possible, from which on it decides.
 const DECIDES: f64 = 1e-6;
 
-/// The sign of the unstable mode that moves the leaf along the `preferred` force or, if it does
+/// The sign of the unstable mode that moves the leaf along the `leaning` force or, if it does
 /// not matter, in the first of these of which it moves it to one side: down, to the left (along
 /// e2), forward; and of their moments about the base.
 pub fn side(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    preferred: DVec3,
+    leaning: DVec3,
     work: &mut Work,
 ) -> f64 {
     if !saddle::find_unstable_mode(leaf, state, system, work) {
@@ -40,7 +40,7 @@ pub fn side(
     // Turning about an axis, and stretching along one: these tell antisymmetric modes apart.
     let bend = |axis: DVec3, along: DVec3| mean(&move |x: DVec3| x.dot(along) * axis);
     let measures = [
-        uniform(preferred),
+        uniform(leaning),
         uniform(-DVec3::Z),
         uniform(DVec3::Y),
         uniform(DVec3::X),

@@ -52,7 +52,7 @@ impl Walk<'_> {
             &self.loading.leaf,
             &saddle,
             &mut self.system,
-            self.preferred,
+            self.leaning,
             self.work,
         );
         let mut found: [Option<(f64, State)>; 2] = [None, None];
@@ -147,7 +147,7 @@ impl Walk<'_> {
                         leaf,
                         &self.next,
                         &mut self.system,
-                        self.preferred,
+                        self.leaning,
                         self.work,
                     );
                     choice::push(leaf, &mut self.next, &mut self.system, side, self.work);

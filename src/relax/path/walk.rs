@@ -19,6 +19,9 @@ const LONGEST_STEP: f64 = 0.5;
 /// Largest factor on a step after a successful one.
 const GROWTH: f64 = 2.5;
 
+/// Factor on a step that failed.
+const SHORTENED: f64 = 0.25;
+
 /// The distance of a state from its prediction (lengths, radians) that steps are made for, and
 /// the largest accepted.
 const WANTED_DRIFT: f64 = 0.05;
@@ -63,7 +66,7 @@ pub struct Walk<'w> {
     pub stage: Stage,
     pub part: f64,
     /// Towards which a leaf turns aside that may turn to either side: a force on all nodes.
-    pub preferred: DVec3,
+    pub leaning: DVec3,
 }
 
 /// What a step came to.
@@ -97,7 +100,7 @@ impl<'w> Walk<'w> {
             stage: Stage::Loading,
             part: 0.0,
             loading,
-            preferred: DVec3::ZERO,
+            leaning: DVec3::ZERO,
         }
     }
 
@@ -143,7 +146,7 @@ impl<'w> Walk<'w> {
                 }
                 Step::Lost(Stop::Unresolved) => return Err(Stop::Unresolved),
                 Step::Unstable | Step::Lost(_) if !shortest => {
-                    step = (0.5 * (part - at)).max(shortest_step);
+                    step = (SHORTENED * (part - at)).max(shortest_step);
                     continue;
                 }
                 Step::Unstable => self.turn_aside(part)?,

@@ -61,7 +61,10 @@ pub fn traced(
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let scenario = request.base.at(&[(keys, ends[0])])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
-    let (rest, options) = first_equilibrium(&scenario, tolerance, request.keep_unstable)?;
+    let last = request.base.at(&[(keys, ends[1])])?.scenario;
+    let leaning = total_load(&last) - total_load(&scenario);
+    let (rest, options) =
+        first_equilibrium(&scenario, (tolerance, leaning), request.keep_unstable)?;
     let check = |least| check_grid(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
@@ -119,15 +122,22 @@ pub fn traced(
     })
 }
 
+/// The force of all loads of a leaf.
+fn total_load(scenario: &Scenario) -> DVec3 {
+    let length: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
+    length * DVec3::from_array(scenario.gravity) + DVec3::from_array(scenario.tip_force)
+}
+
 /// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how
-/// it was found.
+/// it was found. Where it may turn to either side it turns to that to which the range pushes.
 fn first_equilibrium(
     scenario: &Scenario,
-    tolerance: f64,
+    (tolerance, leaning): (f64, DVec3),
     keep_unstable: bool,
 ) -> Result<(Equilibrium, Options), RelaxError> {
     let options = |keep_unstable| Options {
         tolerance: Some(tolerance),
+        leaning,
         method: SemiImplicit {
             keep_unstable,
             ..SemiImplicit::default()
