@@ -9,6 +9,7 @@ pub mod motion;
 mod pairs;
 pub mod plane;
 pub mod random;
+pub mod real;
 mod relaxing;
 mod shot;
 pub mod valid;
