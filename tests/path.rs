@@ -16,7 +16,12 @@ const SAME: f64 = 0.03;
 /// The tip in lengths of the longest vein.
 fn tip_in_lengths(scenario: &Scenario, options: &Options) -> DVec3 {
     let leaf = relax(scenario, options, &mut |_| {}).unwrap();
-    assert!(leaf.outcome.is_success(), "{}: {:?}", scenario.name, leaf.remark);
+    assert!(
+        leaf.outcome.is_success(),
+        "{}: {:?}",
+        scenario.name,
+        leaf.remark
+    );
     tip(&leaf) / leaf.shape.longest()
 }
 
@@ -68,11 +73,17 @@ fn real_leaves_rest_in_one_equilibrium_whatever_the_numerics() {
         ];
         let off = others.map(|other| other.distance(reference));
         if off.iter().any(|off| *off > SAME) {
-            println!("seed {seed}: {off:?}, mirrored {}", others[6].distance(mirrored));
+            println!(
+                "seed {seed}: {off:?}, mirrored {}",
+                others[6].distance(mirrored)
+            );
             elsewhere.push(seed);
         }
     }
-    println!("{} of {count} elsewhere, {uncertain} uncertain", elsewhere.len());
+    println!(
+        "{} of {count} elsewhere, {uncertain} uncertain",
+        elsewhere.len()
+    );
     assert!(elsewhere.len() <= count / 1000, "{elsewhere:?}");
     assert!(uncertain <= count / 50, "{uncertain}");
 }
@@ -95,7 +106,13 @@ fn methods_agree() {
         method: Method::Explicit { segments: None },
         ..to(1e-3)
     };
-    for name in ["paper/fig04", "paper/fig06", "paper/fig10", "paper/fig13", "classic/fan_3"] {
+    for name in [
+        "paper/fig04",
+        "paper/fig06",
+        "paper/fig10",
+        "paper/fig13",
+        "classic/fan_3",
+    ] {
         let leaf = scenario(name, "leaf.rods=3");
         let [a, b] = [to(1e-3), explicit.clone()].map(|options| tip_in_lengths(&leaf, &options));
         assert!(a.distance(b) < SAME, "{name}: {a} {b}");
@@ -130,8 +147,8 @@ fn a_released_leaf_may_end_elsewhere() {
         route: Route::Release,
         ..Options::default()
     };
-    let [slow, released] = [Options::default(), released]
-        .map(|options| relax(&leaf, &options, &mut |_| {}).unwrap());
+    let [slow, released] =
+        [Options::default(), released].map(|options| relax(&leaf, &options, &mut |_| {}).unwrap());
     assert_eq!(events(&slow), []);
     assert_eq!(released.path, Some(Path::Released));
     assert!(tip(&slow).z < -0.1 && tip(&released).z > 0.1);
@@ -143,7 +160,9 @@ fn a_released_leaf_may_end_elsewhere() {
 fn counts_of_factorisations() {
     let count = |leaf: &Scenario| leaf.relax().unwrap().work.factorizations;
     assert_eq!(count(&scenario("paper/fig04", "")), 6);
-    let real: Vec<usize> = (1..12).map(|seed| count(&parse(&real::leaf(seed)))).collect();
+    let real: Vec<usize> = (1..12)
+        .map(|seed| count(&parse(&real::leaf(seed))))
+        .collect();
     let mut sorted = real.clone();
     sorted.sort_unstable();
     assert!(sorted[sorted.len() / 2] <= 60, "{real:?}");

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use leafdyn::relax::{
-    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, Settings,
+    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, Route, Settings,
 };
 use leafdyn::scenario;
 use leafdyn::study::{self, Keys, MarginProgress, SensitivityError};
@@ -38,6 +38,8 @@ pub struct Asked {
     sensitivity: Vec<String>,
     /// Whether the stability margin is computed; for one leaf only.
     margin: bool,
+    /// Which equilibrium is meant.
+    path: String,
 }
 
 /// Refuses a request with a `ValueError`.
@@ -67,6 +69,7 @@ impl Asked {
             intervals: self.intervals,
             keep_unstable: self.keep_unstable,
             full_model: self.full_model,
+            route: self.route()?,
         };
         method.with(settings).or_else(|unfit| {
             let value = unfit.value.map(|value| format!(" = {value}"));
@@ -79,10 +82,16 @@ impl Asked {
         })
     }
 
+    fn route(&self) -> PyResult<Route> {
+        let route = self.path.parse();
+        route.or_else(|error| refuse(format!("path = {error}")))
+    }
+
     fn options(&self) -> PyResult<Options> {
         check_stations(self.stations)?;
         Ok(Options {
             method: self.method()?,
+            route: self.route()?,
             tolerance: self.tolerance,
             modes: self.modes,
             mode_shapes: self.mode_shapes,

@@ -193,6 +193,11 @@ impl Leaf {
         let all = PyDict::new(py);
         all.set_item(intern!(py, "name"), &found.scenario)?;
         all.set_item(intern!(py, "method"), found.method.word())?;
+        let path = found.path.as_ref();
+        all.set_item(intern!(py, "path"), path.map(|path| path.word()))?;
+        let events = path.map_or(&[][..], |path| path.events());
+        let events: Vec<String> = events.iter().map(ToString::to_string).collect();
+        all.set_item(intern!(py, "path_events"), events)?;
         all.set_item(intern!(py, "outcome"), ended.outcome.word())?;
         all.set_item(intern!(py, "success"), ended.outcome.is_success())?;
         all.set_item(intern!(py, "remark"), ended.remark.as_deref())?;

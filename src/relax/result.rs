@@ -8,6 +8,7 @@ use crate::relax::equilibrium::{
 use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
 use crate::relax::nodes::with_sign_of;
+use crate::relax::path::{Event, Happening, Path, Stage};
 use crate::relax::plausible;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
@@ -57,7 +58,7 @@ pub fn equilibrium(
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
         },
-        path: run.path.clone(),
+        path: path(run),
         sensitivities: None,
         margin: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
@@ -89,6 +90,29 @@ pub fn equilibrium(
             curve_stations: grid.sigma().to_vec(),
         },
     }
+}
+
+/// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
+/// belongs to it.
+fn path(run: &Run) -> Option<Path> {
+    let mut path = run.path.clone()?;
+    if let Path::Loaded { events, .. } = &mut path
+        && run.saddle.is_some()
+    {
+        let joins = run.leaf.joined() && run.leaf.rods() > 1;
+        events.push(Event {
+            stage: if joins {
+                Stage::Joining
+            } else {
+                Stage::Loading
+            },
+            part: 1.0,
+            happening: Happening::Branched {
+                equally_open: false,
+            },
+        });
+    }
+    Some(path)
 }
 
 /// Segments of the coarsest grid from which on its nodes are enough stations.

@@ -186,23 +186,23 @@ impl<'a, 'o> Run<'a, 'o> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // Under a dead moment it always is, by a method of its own.
+        // Under a dead moment, and to its holder, it always is, by methods of their own.
         self.options.route == Route::Loading
             && !released
+            && self.leaf.held.is_none()
             && self.leaf.loads.tip_moment == DVec3::ZERO
     }
 
     /// The path of a leaf that is released.
     pub fn released(&self) -> Option<Path> {
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        (released && self.leaf.loads.tip_moment == DVec3::ZERO).then_some(Path::Released)
+        let held = self.leaf.held.is_some();
+        (released && !held && self.leaf.loads.tip_moment == DVec3::ZERO).then_some(Path::Released)
     }
 
     /// Whether it may come to rest without being loaded in steps: its rods need not be softened.
     pub fn may_settle_at_once(&self) -> bool {
-        matches!(self.options.method, Method::SemiImplicit(_))
-            && self.leaf.held.is_none()
-            && !softens(self.leaf)
+        matches!(self.options.method, Method::SemiImplicit(_)) && !softens(self.leaf)
     }
 
     /// Whether Newton's method alone came to rest from the start, so near that this is where

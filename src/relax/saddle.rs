@@ -2,6 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::newton::{Equations, Newton, Work};
+use crate::relax::path::preference;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -190,17 +191,19 @@ pub fn polish(
 }
 
 /// Finds the most unstable mode at a saddle, by inverse iteration with the first shift, doubled
-/// from 1e-4, that makes the matrix positive definite. It is the solution of the system; false if
-/// there is none.
+/// from 1e-4, that makes the matrix positive definite, from the [`preference`]. It is the solution
+/// of the system; false if there is none.
 pub fn find_unstable_mode(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
+    leaning: DVec3,
     work: &mut Work,
 ) -> bool {
     leaf.assemble(state, system);
     work.force_evaluations += 1;
-    system.seed_mode();
+    let momentum = system.momentum(&preference(leaf, state, leaning));
+    system.set_rhs(&momentum);
     let mut shift = 1e-4;
     loop {
         work.factorizations += 1;
@@ -230,9 +233,15 @@ pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f
     *state = pushed;
 }
 
-/// Displaces a state at a saddle along its most unstable mode.
-pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
-    if find_unstable_mode(leaf, state, system, work) {
+/// Displaces a state at a saddle along its most unstable mode, to the [`preference`].
+pub fn push_off(
+    leaf: &DiscreteLeaf,
+    state: &mut State,
+    system: &mut System,
+    leaning: DVec3,
+    work: &mut Work,
+) {
+    if find_unstable_mode(leaf, state, system, leaning, work) {
         displace(leaf, state, system, 1.0);
     }
 }

@@ -217,7 +217,7 @@ impl Run<'_, '_> {
                 Some(index) => self.saddle = Some(saddle_of(&leaf, state, index)),
                 None => {}
             }
-            saddle::push_off(&leaf, state, system, relaxation.work);
+            saddle::push_off(&leaf, state, system, self.options.leaning, relaxation.work);
             relaxation.near_rest = false;
             relaxation.cg_tolerance = FAR_FROM_REST;
             relaxation.solver.direct = None;

@@ -159,6 +159,7 @@ pub(crate) fn relax_on_grids(
     if half.is_none() && run.may_settle_at_once() {
         run.stays_in_valley = true;
         let end = run.solve(grid.clone());
+        run.stays_in_valley = false;
         if run.is_answer(&end) && run.is_in_first_valley() {
             return Ok(finished(run, end, clock));
         }

@@ -91,7 +91,8 @@ impl Run<'_, '_> {
             return Err(Stop::StepLimit);
         }
         let Level { leaf, mut state } = level;
-        saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+        let leaning = self.options.leaning;
+        saddle::push_off(&leaf, &mut state, &mut system, leaning, &mut self.work);
         let Settled { level, rest, .. } = self.settle(leaf.grid, InitialGuess::Pushed(state));
         self.levels.clear();
         self.push(level);

@@ -61,6 +61,10 @@ class Equilibrium(Viewed):
     """The potential energy."""
     negative_eigenvalues: int | None
     """The Morse index: 0 for a stable leaf; none if it is not known."""
+    path: str | None
+    """How the leaf came to this equilibrium: ``"stable-throughout"``, ``"snapped"``, ``"branched"`` or ``"released"``."""
+    path_events: list[str]
+    """What happened on the way, a phrase each."""
     wall_seconds: float
     """The time of the solution alone."""
 

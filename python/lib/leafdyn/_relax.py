@@ -27,12 +27,14 @@ def _asked(
     stations: SupportsIndex | None = None,
     sensitivity: Iterable[str] = (),
     margin: bool = False,
+    path: str = "loading",
 ) -> dict[str, Any]:
     asked = {**locals(), "sensitivity": list(sensitivity)}
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
     numbers(tolerance=tolerance)
     switches(keep_unstable=keep_unstable, full_model=full_model, mode_shapes=mode_shapes, margin=margin)
     text("method", method, "semi-implicit")
+    text("path", path, "loading")
     return asked
 
 
@@ -49,6 +51,7 @@ def relax(
     method: str = "semi-implicit",
     segments: SupportsIndex | None = None,
     intervals: SupportsIndex | None = None,
+    path: str = "loading",
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: SupportsIndex = 0,
@@ -72,6 +75,9 @@ def relax(
         One fixed grid of so many segments a rod, without extrapolation; left out: as fine as the tolerance needs.
     intervals
         Of shooting; left out: as many as it needs.
+    path
+        Which equilibrium, where there are several: ``"loading"``, that of a leaf which is loaded slowly, or
+        ``"release"``, that of one released from arcs under all of its loads.
     keep_unstable
         Stop at a saddle instead of leaving it.
     full_model
@@ -112,7 +118,7 @@ def relax(
     array([ 0.956663,  0.047746, -0.147358])
     """
     asked = _asked(
-        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, margin=margin
+        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, (), margin, path
     )
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
@@ -129,6 +135,7 @@ def relax_many(
     method: str = "semi-implicit",
     segments: SupportsIndex | None = None,
     intervals: SupportsIndex | None = None,
+    path: str = "loading",
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: SupportsIndex = 0,
@@ -156,7 +163,9 @@ def relax_many(
     """
     if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
         raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
+    asked = _asked(
+        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, path=path
+    )
     leaves = []
     for number, scenario in enumerate(scenarios):
         try:

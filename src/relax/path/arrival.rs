@@ -2,13 +2,15 @@
 
 use super::walk::Walk;
 use super::{Event, Path};
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, half_of, whole_of};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_of, whole_of};
 use crate::newton::Stop;
 use crate::relax::level::{Level, positions};
 use crate::relax::options::Progress;
-use crate::relax::prolong::transfer;
+use crate::relax::prolong::{prolong, transfer};
 use crate::relax::richardson::distance;
 use crate::relax::run::{BUDGET, Run};
+use crate::relax::saddle;
+use crate::relax::settle::InitialGuess;
 
 /// Segments of the coarsest grid of a walk, and of the finest on which a lost stability is
 /// confirmed.
@@ -22,7 +24,15 @@ const FINEST_RESOLVING: usize = 2048;
 /// same equilibrium.
 pub const SAME_PLACE: f64 = 0.05;
 
-/// Limit on nodes times force evaluations of a walk: some seconds.
+/// Energies of the same equilibrium on one grid agree to this part, or of A/L.
+const SAME_ENERGY: f64 = 1e-5;
+
+/// The finest requested grid, in segments of the grid from which it is interpolated.
+const FARTHEST_GRID: usize = 8;
+
+/// Limits on the force evaluations of a walk, and on nodes times these: typical walks take a
+/// dozen, and a few hundred for each loss of stability.
+const MOST_EVALUATIONS: usize = 8000;
 const BUDGET_OF_WALK: usize = BUDGET / 2;
 
 impl<'a> Run<'a, '_> {
@@ -57,6 +67,8 @@ impl<'a> Run<'a, '_> {
             let last = grid.segments() > FINEST || self.segments().is_some();
             self.stays_in_valley = !last;
             let end = self.follow(guesses);
+            // Further grids may show that it has to leave the valley.
+            self.stays_in_valley = false;
             self.path = path;
             if end.is_ok() || last || self.out_of_time() {
                 return (self, end);
@@ -80,13 +92,21 @@ impl<'a> Run<'a, '_> {
                     return Ok(vec![level]);
                 }
                 Ok(()) => {
-                    let confirmed = before.as_ref().is_some_and(|coarser| {
+                    let near = before.as_ref().is_some_and(|coarser| {
                         distance(&positions(coarser, 1), &positions(&level, 2)) < SAME_PLACE
                     });
+                    let confirmed = near
+                        || before
+                            .as_ref()
+                            .is_some_and(|coarser| self.is_alike(coarser, &level));
                     if confirmed || last {
-                        let coarser = before.filter(|_| confirmed);
                         self.path = Some(Path::Loaded { events, confirmed });
-                        return Ok(coarser.into_iter().chain([level]).collect());
+                        // One that is only alike leads to neighbours of its own.
+                        return Ok(match before.filter(|_| confirmed) {
+                            Some(coarser) if near => vec![coarser, level],
+                            Some(coarser) => vec![coarser],
+                            None => vec![level],
+                        });
                     }
                     before = Some(level);
                 }
@@ -103,16 +123,34 @@ impl<'a> Run<'a, '_> {
         }
     }
 
+    /// Whether the equilibrium on a coarser grid has, on the grid of `level`, the energy of that
+    /// there: it is one of a circle of equilibria then, as of a buckled round column, or its
+    /// mirror image.
+    fn is_alike(&mut self, coarser: &Level, level: &Level) -> bool {
+        let Level { leaf, state } = level;
+        let mut other = prolong(&coarser.leaf, &coarser.state);
+        let mut system = System::new(leaf);
+        let index = saddle::polish(leaf, &mut other, &mut system, &mut self.work);
+        let [a, b] = [state, &other].map(|state| leaf.energy(state));
+        index == Some(0) && (a - b).abs() <= SAME_ENERGY * a.abs().max(1.0)
+    }
+
     /// The initial guesses from where a walk arrived: on the grids of the walk, or on the
     /// requested one.
-    pub fn guesses(&self, arrived: &[Level]) -> Vec<(Grid, State)> {
+    pub fn guesses(&mut self, arrived: &[Level]) -> Vec<(Grid, State)> {
         match self.segments() {
             None => (arrived.iter())
                 .map(|level| (level.leaf.grid.clone(), level.state.clone()))
                 .collect(),
             Some(segments) => {
-                let finest = &arrived[arrived.len() - 1];
                 let grid = Grid::new(segments, self.leaf.kinks());
+                let mut finest = arrived[arrived.len() - 1].clone();
+                while FARTHEST_GRID * finest.leaf.segments() < segments {
+                    let state = prolong(&finest.leaf, &finest.state);
+                    finest = self
+                        .settle(finest.leaf.grid.refined(), InitialGuess::Coarser(state))
+                        .level;
+                }
                 let state = transfer(&finest.leaf, &finest.state, &grid);
                 vec![(grid, state)]
             }
@@ -132,7 +170,8 @@ impl<'a> Run<'a, '_> {
                 residual,
             });
         };
-        let most = self.work.force_evaluations + BUDGET_OF_WALK / (leaf.rods() * segments);
+        let allowed = (BUDGET_OF_WALK / (leaf.rods() * segments)).min(MOST_EVALUATIONS);
+        let most = self.work.force_evaluations + allowed;
         let mut walk = Walk::new(
             &leaf,
             (&mut self.work, &mut progress),
@@ -143,7 +182,6 @@ impl<'a> Run<'a, '_> {
         let events = std::mem::take(&mut walk.events);
         let reached = (walk.stage, walk.part);
         let mut state = walk.last();
-        leaf.leaf.hold_tips(&mut state);
         if leaf.tips_move_together() {
             state.join_tips();
         }

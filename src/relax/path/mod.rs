@@ -2,7 +2,7 @@
 //!
 //! The veins of the natural leaf are in their rest shapes, apart and unloaded. Slowly, so that the
 //! leaf is at rest all the time, first the loads are put on in proportion, then the tips are moved
-//! together (or to their holder) while the tissue between the veins is put on. As long as this
+//! together while the tissue between the veins is put on. As long as this
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
 //! method. Where stability is lost the leaf moves on, down its energy ([`snap`]).
 //!
@@ -15,7 +15,7 @@ mod loading;
 mod snap;
 mod walk;
 
-pub use loading::Holders;
+pub use choice::preference;
 pub use walk::distance;
 
 use crate::words::words;
@@ -44,7 +44,7 @@ words! {
     pub enum Stage {
         /// The loads are put on.
         Loading = "loading",
-        /// The tips are moved together, or to their holder, and the tissue is put on.
+        /// The tips are moved together, and the tissue is put on.
         Joining = "joining",
     }
 }

@@ -7,20 +7,20 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
+use super::Happening;
 use super::walk::{Walk, distance};
-use super::{Happening, choice};
 use crate::leaf::State;
 use crate::newton::{Equations, Newton, Stop, at_saddle};
 use crate::relax::saddle;
 
 /// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
 /// first, the factors by which they rise after a failed step and fall at most after a successful
-/// one, the rate below which there are no springs, and the rates above which the motion fails,
-/// in general and where segments are unresolved.
+/// one, the rate below which there are no springs (beside a bifurcation a leaf moves slowly), and
+/// the rates above which the motion fails, in general and where segments are unresolved.
 const FIRST_RATE: f64 = 10.0;
 const RATE_INCREASE: f64 = 8.0;
 const LARGEST_RATE_DECREASE: f64 = 8.0;
-const LEAST_RATE: f64 = 0.1;
+const LEAST_RATE: f64 = 0.02;
 const LARGEST_RATE: f64 = 1e12;
 const LARGEST_UNRESOLVED: f64 = 1e6;
 
@@ -48,24 +48,18 @@ impl Walk<'_> {
     /// turns to one of its sides.
     pub fn turn_aside(&mut self, part: f64) -> Result<(), Stop> {
         let saddle = self.next.clone();
-        let side = choice::side(
-            &self.loading.leaf,
-            &saddle,
-            &mut self.system,
-            self.leaning,
-            self.work,
-        );
+        let leaf = &self.loading.leaf;
+        let system = &mut self.system;
+        if !saddle::find_unstable_mode(leaf, &saddle, system, self.leaning, self.work) {
+            return Err(Stop::Stuck);
+        }
+        let mode = self.system.solution();
         let mut found: [Option<(f64, State)>; 2] = [None, None];
         let mut stopped = Stop::Stuck;
-        for (found, sign) in found.iter_mut().zip([side, -side]) {
+        for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
             self.next.clone_from(&saddle);
-            choice::push(
-                &self.loading.leaf,
-                &mut self.next,
-                &mut self.system,
-                sign,
-                self.work,
-            );
+            self.system.set_solution(&mode);
+            saddle::displace(&self.loading.leaf, &mut self.next, &self.system, sign);
             match self.move_to_rest() {
                 Ok(()) => *found = Some((self.loading.leaf.energy(&self.next), self.next.clone())),
                 Err(stop) => stopped = stop,
@@ -125,14 +119,18 @@ impl Walk<'_> {
                 moved = Err(Stop::Stuck);
             }
             match moved {
-                Ok(_) if rate == 0.0 => {
+                Ok(size)
+                    if rate == 0.0
+                        || at_saddle(leaf, &self.next, self.next.shift_to(&from).max(size)) =>
+                {
                     let shift = leaf.neutral_shift();
-                    match saddle::index(leaf, &self.next, &mut self.system, shift, self.work) {
-                        Some(0) => return Ok(()),
-                        _ => moved = Err(Stop::Saddle),
+                    let (state, system) = (&mut self.next, &mut self.system);
+                    let index = saddle::index(leaf, state, system, shift, self.work);
+                    // Converged to rounding a neutral mode is not unstable.
+                    if index == Some(0) || saddle::polish(leaf, state, system, self.work) == Some(0)
+                    {
+                        return Ok(());
                     }
-                }
-                Ok(size) if at_saddle(leaf, &self.next, self.next.shift_to(&from).max(size)) => {
                     moved = Err(Stop::Saddle);
                 }
                 _ => {}
@@ -143,14 +141,8 @@ impl Walk<'_> {
                     if saddles > SADDLES {
                         return Err(Stop::Saddle);
                     }
-                    let side = choice::side(
-                        leaf,
-                        &self.next,
-                        &mut self.system,
-                        self.leaning,
-                        self.work,
-                    );
-                    choice::push(leaf, &mut self.next, &mut self.system, side, self.work);
+                    let (state, system) = (&mut self.next, &mut self.system);
+                    saddle::push_off(leaf, state, system, self.leaning, self.work);
                     leaf.strain_forces(&mut self.next);
                     rate = FIRST_RATE;
                 }
@@ -163,7 +155,7 @@ impl Walk<'_> {
                 }
                 Err(stop) => {
                     self.next = from;
-                    rate = (RATE_INCREASE * rate).max(FIRST_RATE);
+                    rate = RATE_INCREASE * rate.max(LEAST_RATE);
                     decrease = 1.0;
                     if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
                     {

@@ -16,6 +16,10 @@ const FIRST_STEP: f64 = 0.125;
 const SHORTEST_STEP: f64 = 1.0 / 512.0;
 const LONGEST_STEP: f64 = 0.5;
 
+/// Steps from which on an equilibrium of any index is looked for where none is found that is
+/// surely stable: more expensive.
+const SUSPICIOUS_STEP: f64 = 1.0 / 64.0;
+
 /// Largest factor on a step after a successful one.
 const GROWTH: f64 = 2.5;
 
@@ -31,12 +35,10 @@ const LARGEST_DRIFT: f64 = 0.3;
 /// may be large.
 const LARGEST_INCREMENT: f64 = 2.0;
 
-/// Largest rotation of a holder in a step.
-const HOLDER_TURN: f64 = 0.4;
-
-/// Accuracy of states on the way and at its end.
+/// Accuracy of states on the way, at its end, and where the index is in doubt.
 const ON_THE_WAY: f64 = 1e-3;
 const AT_THE_END: f64 = 1e-4;
+const EXACT: f64 = 1e-10;
 
 /// Newton iterations of a step.
 const ITERATIONS: usize = 8;
@@ -124,29 +126,27 @@ impl<'w> Walk<'w> {
     }
 
     fn walk_stage(&mut self) -> Result<(), Stop> {
-        let longest = (HOLDER_TURN / self.loading.turn()).min(LONGEST_STEP);
-        let shortest_step = SHORTEST_STEP.min(longest);
-        let mut step = FIRST_STEP.min(longest);
+        let mut step = FIRST_STEP;
         while self.part < 1.0 {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 return Err(Stop::StepLimit);
             }
             let at = self.part;
             let part = match at + step {
-                part if part < 1.0 - 0.5 * shortest_step => part,
+                part if part < 1.0 - 0.5 * SHORTEST_STEP => part,
                 _ => 1.0,
             };
-            let shortest = part - at <= 1.01 * shortest_step;
-            match self.step_to(part, shortest) {
+            let shortest = part - at <= 1.01 * SHORTEST_STEP;
+            match self.step_to(part, part - at <= SUSPICIOUS_STEP) {
                 Step::Stable(drift) => {
                     self.accept(part);
                     let factor = (WANTED_DRIFT / drift).sqrt().min(GROWTH);
-                    step = ((part - at) * factor).clamp(shortest_step, longest);
+                    step = ((part - at) * factor).clamp(SHORTEST_STEP, LONGEST_STEP);
                     continue;
                 }
                 Step::Lost(Stop::Unresolved) => return Err(Stop::Unresolved),
                 Step::Unstable | Step::Lost(_) if !shortest => {
-                    step = (SHORTENED * (part - at)).max(shortest_step);
+                    step = (SHORTENED * (part - at)).max(SHORTEST_STEP);
                     continue;
                 }
                 Step::Unstable => self.turn_aside(part)?,
@@ -154,7 +154,7 @@ impl<'w> Walk<'w> {
             }
             self.known.clear();
             self.accept(part);
-            step = FIRST_STEP.min(longest);
+            step = FIRST_STEP;
         }
         Ok(())
     }
@@ -216,15 +216,19 @@ impl<'w> Walk<'w> {
                 .sum();
             self.next.n[k] = last.n[k] + change;
         }
+        for j in 0..last.rods() {
+            let base = last.base(j);
+            (self.next.x[base], self.next.q[base]) = (last.x[base], last.q[base]);
+        }
         self.loading.place_tips(&mut self.next);
     }
 
     /// Predicts and corrects the equilibrium at another part. Where the matrix is not positive
-    /// definite, an unstable one is looked for if `any_sign`.
+    /// definite, one of any index is looked for if `any_sign`, and converged to rounding: a
+    /// neutral mode, as that of a buckled round column, is not unstable.
     fn step_to(&mut self, part: f64, any_sign: bool) -> Step {
         self.predict(part);
         let predicted = self.next.clone();
-        let first = self.known.len() < 2;
         let accuracy = if part < 1.0 { ON_THE_WAY } else { AT_THE_END };
         let definite = |solver| Equations::Definite {
             solver,
@@ -232,27 +236,34 @@ impl<'w> Walk<'w> {
             shifted: false,
             cg_tolerance: CG_TOLERANCE,
         };
-        let found = self.correct(accuracy, ITERATIONS, definite);
-        if let Err(stop) = found {
-            if !any_sign {
-                return Step::Lost(stop);
-            }
-            self.next.clone_from(&predicted);
-            if let Err(stop) = self.correct(accuracy, 2 * ITERATIONS, |_| saddle::ANY_SIGN) {
-                return Step::Lost(stop);
-            }
+        let stable =
+            (self.correct(accuracy, ITERATIONS, definite)).and_then(|_| self.check(&predicted));
+        match stable {
+            Ok((0, drift)) => return Step::Stable(drift),
+            Err(stop) if !any_sign => return Step::Lost(stop),
+            Ok(_) if !any_sign => return Step::Unstable,
+            _ => {}
         }
-        let drift = distance(&self.next, &predicted);
-        if !first && drift > LARGEST_DRIFT {
-            return Step::Lost(Stop::Stuck);
+        self.next.clone_from(&predicted);
+        let found = self.correct(EXACT, 2 * ITERATIONS, |_| saddle::ANY_SIGN);
+        match found.and_then(|_| self.check(&predicted)) {
+            Ok((0, drift)) => Step::Stable(drift),
+            Ok(_) => Step::Unstable,
+            Err(stop) => Step::Lost(stop),
+        }
+    }
+
+    /// The Morse index of the next state, and its distance from the one predicted, if it is
+    /// near that.
+    fn check(&mut self, predicted: &State) -> Result<(usize, f64), Stop> {
+        let drift = distance(&self.next, predicted);
+        if self.known.len() > 1 && drift > LARGEST_DRIFT {
+            return Err(Stop::Stuck);
         }
         let leaf = &self.loading.leaf;
         let shift = leaf.neutral_shift();
-        match saddle::index(leaf, &self.next, &mut self.system, shift, self.work) {
-            Some(0) => Step::Stable(drift),
-            Some(_) => Step::Unstable,
-            None => Step::Lost(Stop::Stuck),
-        }
+        let index = saddle::index(leaf, &self.next, &mut self.system, shift, self.work);
+        Ok((index.ok_or(Stop::Stuck)?, drift))
     }
 
     /// Newton's method from the next state.
