@@ -16,6 +16,7 @@ cargo test --release --test error_estimate -- --nocapture
 LEAFDYN_LEAVES=1000 cargo test --release --test fit_coverage -- --nocapture
 LEAFDYN_LEAVES=143 cargo test --release --test fit_undetermined_family
 cargo bench --bench relax
+cargo bench --bench real_leaves
 cargo bench --bench growth
 cargo bench --bench linear_solvers
 cargo bench --bench shooting
@@ -69,3 +70,16 @@ cp out/fig04/chart.svg docs/chart_fig04_5.svg
 leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=35 --seconds 20 --peers out/peers.csv
 cp out/fig04/chart.svg docs/chart_fig04_35.svg
 python benches/peers/turns.py scenarios/paper/fig04.toml --rods 5,21,35
+
+# A leaf as one measures it. That others do not come to rest is a result; those that take minutes run once.
+leafdyn relax scenarios/measured/lily.toml --tolerance 1e-10 --out out/lily
+lily() { python "benches/peers/$1.py" scenarios/measured/lily.toml "${@:2}" --compare out/lily --csv out/peers.csv || true; }
+lily solve_bvp --tol 1e-3
+lily pyelastica --relax --segments 10
+lily pyelastica --relax --segments 20
+for run in 1 2 3; do
+  for steps in 1 10 100; do lily exudyn --segments 20 --load-steps "$steps"; done
+  for segments in 20 40 80; do lily exudyn --segments "$segments" --load-steps 10 --close-tips; done
+done
+leafdyn chart scenarios/measured/lily.toml --seconds 20 --peers out/peers.csv
+cp out/lily/chart.svg docs/chart_lily.svg

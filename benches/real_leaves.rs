@@ -62,13 +62,25 @@ fn measure(count: u64, first: u64) {
     let seeds = first..first + count;
     let leaves: Vec<Scenario> = seeds.map(|seed| parse(&real::leaf(seed))).collect();
     print_row(&format!("{count} real ones"), &leaves);
-    let template = include_str!("../src/cli/examples/leaf.toml");
+    let measured = |name: &str| {
+        let file = format!(
+            "{}/scenarios/measured/{name}.toml",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        Scenario::read(Path::new(&file)).expect("the scenario is valid")
+    };
     let singles = [
+        ("the lily of README", measured("lily")),
+        ("`measured/grass`", measured("grass")),
+        ("`measured/orchid`", measured("orchid")),
         (
             "`my-leaf`",
             parse(include_str!("../tests/data/my-leaf.toml")),
         ),
-        ("`leafdyn new leaf`", parse(template)),
+        (
+            "`leafdyn new leaf`",
+            parse(include_str!("../src/cli/examples/leaf.toml")),
+        ),
         ("Fig. 4, N = 5", figure("fig04", 5)),
         ("Fig. 4, N = 21", figure("fig04", 21)),
     ];

@@ -12,6 +12,10 @@ Newton's method with exudyn's analytical Jacobian and its sparse factorisation; 
 Newton's method fails, unless --load-steps wants more. The time is that of SolveStatic alone; building the
 model is measured apart.
 
+With --close-tips joined rods start from the reference, too, with their tips apart. Stiff springs between the
+tips, whose natural length goes to zero with the load steps, bring them together. This is how a slender leaf
+that does not come to rest from arcs can be solved; what is left of the gap is printed.
+
 Needs python 3.11 and exudyn (here 1.13.6). One thread, exudyn's default.
 """
 import sys
@@ -30,15 +34,20 @@ from exudyn.lieGroupBasics import ExpSE3
 from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
 
+# Springs between tips that are closed: times the axial stiffness of a rod.
+STIFF_SPRINGS = 1e2
+
+
 class Model:
     """A leaf in exudyn, with n elements a rod."""
 
-    def __init__(self, leaf, n):
+    def __init__(self, leaf, n, close_tips=False):
         middles = (np.arange(n) + 0.5) / n
         self.couple, self.force, self.rest = (sample(part, middles) for part in (leaf.couple, leaf.force, leaf.rest))
         if np.isinf(self.force).any():
             raise Refused("stiffness: inf is not possible here")
         self.leaf, self.n = leaf, n
+        self.from_arcs = leaf.joined and leaf.rods > 1 and not close_tips
         self.system = exudyn.SystemContainer().AddSystem()
         self.ground = self.system.AddNode(items.NodePointGround())
         self.weights = np.ones(n + 1)
@@ -50,7 +59,9 @@ class Model:
         for j, stiffness in enumerate((leaf.coupling * leaf.gap).T / n):
             for pair in zip(markers[j][1:-1], markers[j + 1][1:-1]):
                 self.system.AddObject(items.CartesianSpringDamper(markerNumbers=list(pair), stiffness=stiffness))
-        if leaf.joined:
+        if leaf.joined and close_tips:
+            self.close_tips([rod[-1] for rod in markers])
+        elif leaf.joined:
             for other in markers[1:]:
                 self.system.AddObject(items.SphericalJoint(markerNumbers=[markers[0][-1], other[-1]]))
         for tip in markers[: 1 if leaf.joined else None]:
@@ -69,7 +80,7 @@ class Model:
         for i in range(self.n + 1):
             reference = coordinates(frame[:3, 3], frame[:3, :3])
             start = reference
-            if leaf.joined and leaf.rods > 1:
+            if self.from_arcs:
                 start = coordinates(places[:, i], directors[:, :, i].T)
             node = items.NodeRigidBodyEP(referenceCoordinates=reference, initialCoordinates=start - reference)
             nodes.append(system.AddNode(node))
@@ -85,6 +96,27 @@ class Model:
         clamp = system.AddMarker(items.MarkerNodeRigid(nodeNumber=self.ground, localHT=base))
         system.AddObject(items.GenericJoint(markerNumbers=[clamp, markers[0]]))
         return nodes, markers
+
+    def close_tips(self, tips):
+        """Springs from the first tip to the others; the load factor, of which exudyn makes a time, closes them."""
+        places = np.array([self.system.GetNode(int(rod[-1]))["referenceCoordinates"][:3] for rod in self.nodes])
+        stiffness = [STIFF_SPRINGS * self.force[:, 0].max() / self.leaf.length.min()] * 3
+        springs = []
+        for tip, gap in zip(tips[1:], places[1:] - places[0]):
+            spring = items.CartesianSpringDamper(markerNumbers=[tips[0], tip], stiffness=stiffness, offset=gap)
+            springs.append((self.system.AddObject(spring), gap))
+
+        def close(system, factor):
+            for spring, gap in springs:
+                system.SetObjectParameter(spring, "offset", (1.0 - factor) * gap)
+            return True
+
+        self.system.SetPreStepUserFunction(close)
+
+    def gap(self):
+        """The largest distance of a tip from the first."""
+        tips = self.positions()[:, :, -1]
+        return np.linalg.norm(tips - tips[0], axis=1).max()
 
     def solve(self, load_steps, max_seconds):
         """The outcome and a word about it."""
@@ -122,12 +154,15 @@ def solve(options):
     leaf = Leaf(load(options.scenario, options.set))
     summary = read_summary(options.compare, leaf)
     began = time.perf_counter()
-    model = Model(leaf, options.segments)
+    model = Model(leaf, options.segments, options.close_tips)
     built = time.perf_counter()
     outcome, remark = model.solve(options.load_steps, options.max_seconds)
     seconds = time.perf_counter() - built
     knob = f"n={options.segments}" + (f" load-steps={options.load_steps}" if options.load_steps > 1 else "")
     notes = [f"model      {built - began:.4f} s before, for building it"]
+    if options.close_tips:
+        knob += " close-tips"
+        notes.append(f"gap        {model.gap():.1e} between tips")
     found = partial(at_stations, model.positions()) if outcome == "converged" else None
     run = "exudyn", knob, outcome, remark, seconds
     return conclude(options, leaf, summary, run, notes, found)
@@ -137,6 +172,7 @@ def main():
     parser = arguments("Solve a leaf at rest with exudyn's static solver.")
     parser.add_argument("--segments", type=int, default=50, metavar="N", help="elements a rod (default: 50)")
     parser.add_argument("--load-steps", type=int, default=1, metavar="N", help="load steps (default: 1)")
+    parser.add_argument("--close-tips", action="store_true", help="start with the tips apart, and bring them together")
     options = parser.parse_args()
     if options.segments < 3 or options.load_steps < 1:
         parser.error("--segments: at least 3; --load-steps: at least 1")

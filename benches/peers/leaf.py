@@ -8,14 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
+from section import SIDES, Profile, Stiffness
+
 KEYS = {
     "leaf": ["rods", "length", "fan", "joined"],
     "stiffness": ["torsion", "bending_2", "bending_3", "axial", "shear_2", "shear_3"],
+    "section": ["shape", "diameter", "width", "thickness", "young", "poisson", "mass_density"],
     "rest": ["twist", "bend_2", "bend_3"],
     "coupling": ["x", "y", "z"],
     "load": ["gravity", "tip_force", "tip_moment"],
     "solve": ["tolerance"],
 }
+# Tables on which no equilibrium depends.
+IGNORED = ["units", "dynamics"]
 COLUMNS = ["program", "scenario", "rods", "knob", "seconds", "error", "outcome"]
 
 
@@ -38,7 +43,7 @@ def load(path, overrides):
     if not isinstance(document.get("name"), str):
         raise Refused("name: missing, or not a text")
     for table, entries in document.items():
-        if table == "name":
+        if table == "name" or table in IGNORED:
             continue
         if table not in KEYS or not isinstance(entries, dict):
             raise Refused(f"{table}: unknown, or not a table; allowed: name, {', '.join(KEYS)}")
@@ -62,9 +67,8 @@ class Leaf:
             raise Refused(f"leaf.joined = {self.joined!r}: must be true or false")
         self.length = self.numbers("leaf.length", rods, above=0.0)
         self.angle = self.fan()
-        # (at, value) of every rod: [component][rod], in the order of the directors.
-        self.couple = [self.quantity(f"stiffness.{key}", above=0.0) for key in KEYS["stiffness"][:3]]
-        self.force = [self.quantity(f"stiffness.{key}", above=0.0, rigid=True) for key in KEYS["stiffness"][3:]]
+        # Functions of sigma with knots, of every rod: [component][rod], in the order of the directors.
+        self.couple, self.force = self.stiffnesses()
         self.rest = [self.quantity(f"rest.{key}", default=0.0) for key in KEYS["rest"]]
         self.coupling = np.array([self.numbers(f"coupling.{axis}", rods - 1, default=0.0) for axis in "xyz"])
         if (self.coupling < 0.0).any():
@@ -105,7 +109,8 @@ class Leaf:
         """Knots and values of every rod; a single knot where the quantity is constant."""
         value = self.entry(key, default)
         if not isinstance(value, dict):
-            return [([0.0], [number]) for number in self.numbers(key, self.rods, default, above, rigid=rigid)]
+            numbers = self.numbers(key, self.rods, default, above, rigid=rigid)
+            return [Profile([0.0], [number]) for number in numbers]
         if set(value) != {"at", "value"} or not all(isinstance(part, list) for part in value.values()):
             raise Refused(f"{key}: a profile is {{ at = [...], value = [...] }}")
         at = self.numbers(key, len(value["at"]), value=value["at"])
@@ -116,7 +121,24 @@ class Leaf:
             lists = [lists] * self.rods
         if len(lists) != self.rods or not all(isinstance(item, list) for item in lists):
             raise Refused(f"{key}: value must be one list, or {self.rods} lists, one per rod")
-        return [(at, self.numbers(key, len(at), above=above, value=item)) for item in lists]
+        return [Profile(at, self.numbers(key, len(at), above=above, value=item)) for item in lists]
+
+    def stiffnesses(self):
+        """Of couples and of forces: as given, or those of the section."""
+        if ("stiffness" in self.document) == ("section" in self.document):
+            raise Refused("stiffness, section: one of them is wanted")
+        if "stiffness" in self.document:
+            keys = KEYS["stiffness"]
+            couple = [self.quantity(f"stiffness.{key}", above=0.0) for key in keys[:3]]
+            return couple, [self.quantity(f"stiffness.{key}", above=0.0, rigid=True) for key in keys[3:]]
+        shape = self.entry("section.shape")
+        if shape not in SIDES:
+            raise Refused(f"section.shape = {shape!r}: must be one of {', '.join(SIDES)}")
+        sides = zip(*[self.quantity(f"section.{side}", above=0.0) for side in SIDES[shape]])
+        young, poisson = self.quantity("section.young", above=0.0), self.quantity("section.poisson", 0.3, above=-1.0)
+        rods = list(zip(sides, young, poisson))
+        all_six = [[Stiffness(component, shape, *rod) for rod in rods] for component in range(6)]
+        return all_six[:3], all_six[3:]
 
     def vector(self, key):
         if not isinstance(self.entry(key, [0.0] * 3), list):
@@ -157,7 +179,7 @@ class Leaf:
 
 def sample(quantity, sigma):
     """Values of a quantity at fractions of the length: [rod][component][node]."""
-    return np.array([[np.interp(sigma, *rod) for rod in rods] for rods in quantity]).swapaxes(0, 1)
+    return np.array([[rod(sigma) for rod in rods] for rods in quantity]).swapaxes(0, 1)
 
 
 def read_summary(folder, leaf):

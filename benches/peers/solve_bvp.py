@@ -30,7 +30,7 @@ class Problem(Leaf):
     def __init__(self, document):
         super().__init__(document)
         self.unit = unit = self.length.max()
-        self.stiffness = stiffness = max(max(value) for component in self.couple for _, value in component)
+        self.stiffness = stiffness = max(rod(rod.at).max() for component in self.couple for rod in component)
         self.scale = (self.length / unit)[:, None, None]
         self.profiles = [(self.couple, 1 / stiffness), (self.force, unit**2 / stiffness), (self.rest, unit)]
         self.weight = self.gravity * unit**3 / stiffness
@@ -41,7 +41,7 @@ class Problem(Leaf):
         self.section = lru_cache(maxsize=4)(self.section_at)
 
     def first_mesh(self):
-        knots = [at for component, _ in self.profiles for rods in component for at, _ in rods]
+        knots = [rod.at for component, _ in self.profiles for rods in component for rod in rods]
         # Rounded, as a knot at 0.3 and a node at 0.30000000000000004 are one.
         return np.unique(np.concatenate([np.linspace(0.0, 1.0, FIRST_NODES), *knots]).round(12))
 
