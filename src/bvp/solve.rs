@@ -24,11 +24,11 @@ const MOST_LOCAL: f64 = 1e-9;
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
 
-/// Solves the boundary-value problem of a scenario. `progress` is called for each
-/// correction.
+/// Solves the boundary-value problem of a scenario, as accurately as possible if not as required.
+/// `progress` is called for each correction.
 ///
 /// # Errors
-/// If no solution is found: the reason, and the last shape.
+/// If no solution is found at all: the reason, and the last shape.
 pub fn solve(
     scenario: &Scenario,
     options: &Options,
@@ -47,9 +47,17 @@ pub fn solve(
         tolerance = (SHARPER * tolerance).max(LEAST_LOCAL);
         let (stations, rods) = (options.stations, &solution.rods[..]);
         let start = Start::Leaf { stations, rods };
-        let mut sharper = solve_once(scenario, start, tolerance, options, progress)?;
-        sharper.work += solution.work;
-        solution = sharper;
+        match solve_once(scenario, start, tolerance, options, progress) {
+            Ok(mut sharper) => {
+                sharper.work += solution.work;
+                solution = sharper;
+            }
+            Err(failure) => {
+                solution.work += failure.work;
+                solution.unsharpened = Some(failure.reason);
+                break;
+            }
+        }
     }
     Ok(solution)
 }
@@ -133,6 +141,7 @@ fn solve_near(
         growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
         condition: newton.condition(),
         neutral: newton.neutral(stations),
+        unsharpened: None,
         intervals: newton.nodes.sigma,
         work: Work::default(),
     })

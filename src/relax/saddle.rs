@@ -1,5 +1,6 @@
 //! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::newton::{Equations, Newton, Work};
 use glam::DVec3;
@@ -214,7 +215,12 @@ pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, wor
     }
     let (turn, displacement) = system.largest();
     let mut pushed = state.clone();
-    leaf.advance(state, system, PUSH / turn.max(displacement), &mut pushed);
+    leaf.advance(
+        state,
+        system,
+        PUSH / larger(turn, displacement),
+        &mut pushed,
+    );
     *state = pushed;
 }
 
