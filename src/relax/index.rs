@@ -17,9 +17,10 @@ use glam::DVec3;
 /// The finest grid on which an equilibrium is looked for first.
 const FINEST: usize = 1024;
 
-/// Largest and smallest tolerance of further grids, on which its eigenvalues are compared.
+/// Largest and smallest tolerance of further grids, on which its eigenvalues are compared: on the
+/// grids that a smaller one needs, rounding hides the signs of soft ones.
 const TOLERANCE: f64 = 1e-4;
-const LEAST_TOLERANCE: f64 = 1e-8;
+const LEAST_TOLERANCE: f64 = 1e-5;
 
 /// Equilibria farther apart than this, in lengths, are different ones, and so are those that are
 /// farther apart than their errors times the second number.
@@ -79,20 +80,16 @@ fn index_from(
     let Level { leaf, state } = &mut guess;
     let mut system = System::new(leaf);
     let begun = state.clone();
-    run.index = saddle::polish(leaf, state, &mut system, &mut run.work);
-    eprintln!("DBG {} polished {:?} moved {}", leaf.segments(), run.index, state.shift_to(&begun));
-    run.index?;
+    run.index = Some(saddle::polish(leaf, state, &mut system, &mut run.work)?);
     if saddle::clearly_stable(leaf, state, &mut system, &mut run.work) {
         return (state.shift_to(&begun) < SAME_PLACE).then_some(Some(0));
     }
     run.push(guess);
     let mut end = run.refine();
-    eprintln!("DBG refined {:?} index {:?} error {:?} away {:e}", end, run.index, run.error(), distance_from(run, given));
     end.ok()?;
     // No other equilibrium is of interest.
     let lost = &mut |_: &mut Run, _| Err(Stop::StepLimit);
     let verdict = decide(run, &mut end, lost).verdict;
-    eprintln!("DBG verdict {:?} index {:?} error {:?} away {:e} levels {}", verdict, run.index, run.error(), distance_from(run, given), run.levels.len());
     let found = run.error().unwrap_or(f64::INFINITY);
     let allowed = SAME_PLACE.min(SAFETY * (error + found));
     (distance_from(run, given) <= allowed).then_some(match verdict {

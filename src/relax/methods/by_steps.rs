@@ -83,6 +83,7 @@ impl Relaxation<'_> {
                     step = (2.0 * step).min(LONGEST);
                     continue;
                 }
+                Err(Stop::Memory) => return Err(Stop::Memory),
                 Err(_) => self.state = before,
             }
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
@@ -147,6 +148,7 @@ impl Relaxation<'_> {
                         rate = 0.0;
                     }
                 }
+                Err(Stop::Memory) => return Err(Stop::Memory),
                 Err(stop) => {
                     self.state = from;
                     rate = (RATE_INCREASE * rate).max(FIRST_RATE);
