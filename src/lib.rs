@@ -107,6 +107,7 @@ mod figure;
 #[cfg(feature = "cli")]
 pub mod files;
 mod lanes;
+mod largest;
 mod leaf;
 mod limit;
 pub mod memory;

@@ -106,6 +106,13 @@ pub(crate) fn branches(rods: usize, segments: usize) -> Result<(), TooMuch> {
     })
 }
 
+/// The factorised sparse matrix of a leaf, of so many numbers.
+pub(crate) fn factor(numbers: usize) -> Result<(), TooMuch> {
+    check(&[numbers, 8], SMALLER_GRID, || {
+        format!("a factorised matrix of {numbers} numbers")
+    })
+}
+
 /// The matrices of a shooting method.
 pub(crate) fn shooting(rods: usize, intervals: usize) -> Result<(), TooMuch> {
     // Measured: five matrices of (12 N)^2 numbers per interval.

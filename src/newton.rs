@@ -6,7 +6,10 @@ mod convergence;
 use convergence::{BALANCED, NEUTRAL_STEP, ROUNDING};
 pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_lengths};
 
-use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
+use crate::largest::larger;
+use crate::leaf::{
+    DiscreteLeaf, Field, Increment, Solved, SparseError, SparsePattern, State, System,
+};
 use crate::rod::RESOLVED_TURN;
 use serde::Serialize;
 use std::ops::Add;
@@ -59,6 +62,36 @@ pub enum Stop {
     StepLimit,
     /// No step lowers the energy, however short, or Newton's method fails.
     Stuck,
+    /// A matrix does not fit into the memory that is allowed.
+    Memory,
+}
+
+/// Why equations that need a positive definite matrix were not solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    /// The matrix is not positive definite.
+    Indefinite,
+    /// It does not fit into the memory that is allowed.
+    Memory,
+}
+
+/// A matrix with pivots that have no sign is not positive definite.
+impl From<SparseError> for Unsolved {
+    fn from(error: SparseError) -> Self {
+        match error {
+            SparseError::Memory => Unsolved::Memory,
+            SparseError::NotFinite => Unsolved::Indefinite,
+        }
+    }
+}
+
+impl From<SparseError> for Stop {
+    fn from(error: SparseError) -> Self {
+        match error {
+            SparseError::Memory => Stop::Memory,
+            SparseError::NotFinite => Stop::Stuck,
+        }
+    }
 }
 
 /// Relative accuracy of the conjugate gradients after an increment of size `previous`: their
@@ -79,7 +112,7 @@ pub struct Definite {
 
 impl Definite {
     /// Factorises K + `shift` M and solves for the assembled right-hand side plus
-    /// `inertia`; false if the matrix is not positive definite.
+    /// `inertia`.
     pub fn solve(
         &mut self,
         system: &mut System,
@@ -87,34 +120,31 @@ impl Definite {
         inertia: Option<(&[Vec<Increment>], f64)>,
         tolerance: f64,
         work: &mut Work,
-    ) -> bool {
+    ) -> Result<(), Unsolved> {
         work.factorizations += 1;
         if self.direct.is_none() {
             if !system.factorize(shift) {
-                return false;
+                return Err(Unsolved::Indefinite);
             }
             let solved = system.solve(inertia, tolerance);
-            let (Solved::Yes(iterations)
-            | Solved::Indefinite(iterations)
-            | Solved::TooSlow(iterations)) = solved;
-            work.cg_iterations += iterations;
+            work.cg_iterations += solved.iterations();
             match solved {
-                Solved::Yes(_) => return true,
-                Solved::Indefinite(_) => return false,
-                Solved::TooSlow(_) => {
-                    work.factorizations += 1;
-                    self.direct = SparsePattern::new(system).ok();
-                }
+                Solved::Yes(_) => return Ok(()),
+                Solved::Indefinite(_) | Solved::Singular => return Err(Unsolved::Indefinite),
+                Solved::TooSlow(_) => work.factorizations += 1,
             }
         }
-        let Some(Ok(mut factor)) = self.direct.as_ref().map(|p| p.factorize(system, shift)) else {
-            return false;
+        let pattern = match self.direct.take() {
+            Some(pattern) => pattern,
+            None => SparsePattern::new(system)?,
         };
-        let positive = factor.negative() == 0;
-        if positive {
-            factor.solve(system, inertia);
+        let pattern = self.direct.insert(pattern);
+        let mut factor = pattern.factorize(system, shift)?;
+        if factor.negative() > 0 {
+            return Err(Unsolved::Indefinite);
         }
-        positive
+        factor.solve(system, inertia);
+        Ok(())
     }
 }
 
@@ -209,10 +239,9 @@ impl Newton<'_> {
             if turn > RESOLVED_TURN {
                 return Err(Stop::Unresolved);
             }
-            let solved = linear.solve(state, previous, system, self.work);
-            let tolerance = solved.ok_or(Stop::Stuck)?;
+            let tolerance = linear.solve(state, previous, system, self.work)?;
             let (turn, shift) = system.largest();
-            let size = turn.max(shift);
+            let size = larger(turn, shift);
             if !size.is_finite() || size > refused {
                 return Err(Stop::Stuck);
             }
@@ -264,34 +293,34 @@ impl Newton<'_> {
 }
 
 impl Linear<'_> {
-    /// Solves the assembled equations; returns the relative accuracy of the
-    /// solution, or `None` if there is none.
+    /// Solves the assembled equations; returns the relative accuracy of the solution.
     fn solve(
         &mut self,
         state: &State,
         previous: f64,
         system: &mut System,
         work: &mut Work,
-    ) -> Option<f64> {
+    ) -> Result<f64, Stop> {
         match &mut self.equations {
             Equations::AnySign { .. } => {
-                if self.pattern.is_none() {
-                    self.pattern = SparsePattern::new(system).ok();
-                }
-                let pattern = self.pattern.as_ref()?;
-                let mut factor = pattern.factorize(system, self.neutral).ok()?;
+                let pattern = match self.pattern.take() {
+                    Some(pattern) => pattern,
+                    None => SparsePattern::new(system)?,
+                };
+                let pattern = self.pattern.insert(pattern);
+                let mut factor = pattern.factorize(system, self.neutral)?;
                 factor.solve(system, None);
                 work.factorizations += 1;
-                Some(0.0)
+                Ok(0.0)
             }
             Equations::Unsymmetric => {
                 work.factorizations += 1;
-                if !system.factorize_indefinite() {
-                    return None;
-                }
                 // One rod has no coupling: this is a direct solution.
-                system.solve(None, 0.0);
-                Some(0.0)
+                let regular = system.factorize_indefinite();
+                match regular && matches!(system.solve(None, 0.0), Solved::Yes(_)) {
+                    true => Ok(0.0),
+                    false => Err(Stop::Stuck),
+                }
             }
             Equations::Proximal {
                 solver, at, rate, ..
@@ -299,8 +328,11 @@ impl Linear<'_> {
                 state.increments_to(at, &mut self.back);
                 let springs = Some((self.back.as_slice(), *rate));
                 let shift = self.neutral + *rate;
-                let positive = solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work);
-                positive.then_some(PROXIMAL_ACCURACY)
+                match solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work) {
+                    Ok(()) => Ok(PROXIMAL_ACCURACY),
+                    Err(Unsolved::Indefinite) => Err(Stop::Stuck),
+                    Err(Unsolved::Memory) => Err(Stop::Memory),
+                }
             }
             Equations::Definite {
                 solver,
@@ -311,12 +343,14 @@ impl Linear<'_> {
                 let tolerance = cg_tolerance(previous, *loosest);
                 loop {
                     let shift = self.neutral + self.shift;
-                    if solver.solve(system, shift, None, tolerance, work) {
-                        return Some(tolerance);
+                    match solver.solve(system, shift, None, tolerance, work) {
+                        Ok(()) => return Ok(tolerance),
+                        Err(Unsolved::Memory) => return Err(Stop::Memory),
+                        Err(Unsolved::Indefinite) => {}
                     }
                     self.shift = (4.0 * self.shift).max(FIRST_SHIFT);
                     if !*shifted || self.shift > LARGEST_SHIFT {
-                        return None;
+                        return Err(Stop::Stuck);
                     }
                 }
             }

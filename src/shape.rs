@@ -1,5 +1,6 @@
 //! The state of rods at stations along them, which every method returns.
 
+use crate::largest::larger;
 use glam::{DQuat, DVec3};
 use serde::{Serialize, Serializer};
 
@@ -67,10 +68,6 @@ impl Difference {
 
     /// The larger of each component; NaN counts as infinite.
     pub fn max(self, other: Difference) -> Self {
-        let larger = |a: f64, b: f64| match a.is_nan() || b.is_nan() {
-            true => f64::INFINITY,
-            false => a.max(b),
-        };
         Difference {
             position: larger(self.position, other.position),
             rotation: larger(self.rotation, other.rotation),

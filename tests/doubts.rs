@@ -20,8 +20,9 @@ fn what_can_hardly_be_meant_is_named() {
         load.tip_force=[21.0, 0.0, 0.0] => stretched by 21 %
         load.tip_force=[19.0, 0.0, 0.0] =>
         rest.stretch=1.5 =>
-        leaf.fan=[-60.0] => leaf.fan is in radians, and -60 is
-        leaf.fan=[-6.28] =>
+        leaf.fan=[-60.0] => leaf.fan is in radians, and -60 is more than a turn
+        leaf.fan=[2.0] => leaf.fan is in radians, and 2 is more than a right angle
+        leaf.fan=[-1.57] =>
         SOFT; load.tip_force=[-1.2, 0, 0] => turned through itself
         SHORT; load.gravity=[0, 0, -9.81] => not the acceleration
         SHORT; load.gravity=[0, 0, -9.81e-3] =>
@@ -34,6 +35,73 @@ fn what_can_hardly_be_meant_is_named() {
         assert_eq!(said.is_empty(), part.is_empty(), "{entries}: {said:?}");
         let named = said.len() <= 1 && said.iter().all(|it| it.contains(part));
         assert!(named, "{entries}: {said:?}");
+    }
+}
+
+/// A rod of a section, in cm, N and s, or in units without names.
+fn of_section(named: bool, entries: &str) -> Vec<String> {
+    let text = r#"
+        name = "leaf"
+        units = { length = "cm", force = "N" }
+        leaf = { rods = 1, length = 15.0, fan = [0.0] }
+        section = { shape = "circle", diameter = { at = [0.0, 1.0], value = [0.12, 0.06] }, young = 2e4, mass_density = 1e-5 }
+        load = { gravity = [0.0, 0.0, -1e-4] }"#;
+    let text = match named {
+        true => text.to_owned(),
+        false => text.replace("units = { length = \"cm\", force = \"N\" }", ""),
+    };
+    settle(base(&text, entries).scenario(), 1e-5).doubts
+}
+
+/// A weight of which the mass is another, by a slip of units of the density, and a section in
+/// other units than the length. Nothing is said of a leaf in water, or without weight.
+#[test]
+fn sections_in_other_units_are_named() {
+    let table = "
+        => 
+        section.mass_density=1e-8 => the acceleration of gravity would be
+        section.mass_density=1e-3 => the acceleration of gravity would be
+        load.gravity=[0.0, 0.0, -2e-5] =>
+        load.gravity=[0.0, 0.0, 0.0]; section.mass_density=1e-8 =>
+    ";
+    for (entries, part) in pairs(table) {
+        let said = of_section(true, entries);
+        assert_eq!(said.is_empty(), part.is_empty(), "{entries}: {said:?}");
+        assert!(said.concat().contains(part), "{entries}: {said:?}");
+    }
+    let unnamed = |entries: &str| of_section(false, entries);
+    assert!(
+        unnamed("section.mass_density=1e-8")
+            .concat()
+            .contains("acceleration")
+    );
+    assert!(unnamed("section.mass_density=1e-4").is_empty());
+    let thick = of_section(true, "section.diameter=20.0; load.gravity=[0, 0, 0]").concat();
+    assert!(
+        thick.starts_with("the section of vein 1 is 20 across, and the vein is 15 long"),
+        "{thick}"
+    );
+    assert!(of_section(true, "section.diameter=14.0; load.gravity=[0, 0, 0]").is_empty());
+}
+
+/// Angles of a clamped tip in degrees; rings and twists in radians are meant.
+#[test]
+fn angles_of_a_held_tip_in_degrees_are_named() {
+    let held = |entries: &str| {
+        let text = held("clamped").replace("[1.0, 0.0, 0.0]", "[0.6, 0.0, 0.0]");
+        let leaf = Scenario::from_toml_with(&text, "rod", &common::entries(entries)).unwrap();
+        let leaf = relaxed(&leaf, &to(1e-4));
+        [leaf.remark.unwrap_or_default(), leaf.doubts.concat()].concat()
+    };
+    assert!(held("tip.angles=30.0").contains("tip.angles is in radians, and 30 is"));
+    assert!(held("tip.twist=90.0").contains("tip.twist is in radians, and 90 is"));
+    for meant in [
+        "tip.angles=3.141592653589793",
+        "tip.twist=6.0",
+        "tip.twist=7.0",
+        "tip.angles=1.0",
+    ] {
+        assert!(!held(meant).contains("radians"), "{meant}");
     }
 }
 

@@ -15,7 +15,7 @@ fn figure(arguments: &str) -> String {
 
 /// What the groups of a name hold.
 fn groups<'s>(svg: &'s str, name: &str) -> Vec<&'s str> {
-    let start = format!("<g id=\"{name}\">");
+    let start = format!("<g class=\"{name}\">");
     let groups = svg.split(start.as_str()).skip(1);
     groups.flat_map(|rest| rest.split("</g>").next()).collect()
 }

@@ -50,7 +50,7 @@ fn panels_are_those_of_the_data() {
     contains(&svg, &[&format!("residuals of {sd}")]);
     assert!(!svg.contains("free numbers") && !svg.contains("from above"));
     // Ticks 1 and 2, then 3 and 4, then those of the data.
-    let panels: Vec<&str> = svg.split("<g id=\"result\">").skip(1).collect();
+    let panels: Vec<&str> = svg.split("<g class=\"result\">").skip(1).collect();
     let [tip_z, tip_x] = panels[..] else {
         panic!("{} panels of results", panels.len());
     };
@@ -58,6 +58,6 @@ fn panels_are_those_of_the_data() {
     let tip_x = tip_x.split("</g>").next().unwrap();
     assert!(tip_z.contains(">2<") && !tip_z.contains(">3<"), "{tip_z}");
     assert!(tip_x.contains(">4<") && !tip_x.contains(">2<"), "{tip_x}");
-    let data = svg.split("<g id=\"residuals\">").nth(1).unwrap();
+    let data = svg.split("<g class=\"residuals\">").nth(1).unwrap();
     assert!(data.contains(">7<") && !data.contains(">2.5<"), "{data}");
 }

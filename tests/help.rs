@@ -10,7 +10,7 @@ const OPTIONS: &str = "
     simulate => --tolerance --set --out --json --method explicit semi-implicit --segments --step --resume
     chart => --seconds --methods --peers --rods --tolerance --set --out --json shooting-from-rest
     map => --vary --methods --cell-seconds --shard --draw --show --tolerance --set --out --json
-    trace => --vary --switch --keep-unstable --segments --points --cross-section --tolerance --set --out --json
+    trace => --vary --switch --keep-unstable --segments --points --tolerance --set --out --json
 ";
 
 const STATUSES: &str = "

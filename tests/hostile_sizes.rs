@@ -54,6 +54,23 @@ fn as_much_as_is_allowed_is_used_and_no_more() {
     assert!(grids.iter().all(|n| n.count() <= 32), "{grids:?}");
 }
 
+/// Tissue so stiff that the whole matrix must be factorised, which is larger than the leaf on its
+/// grid: that is no lack of stability.
+#[test]
+fn a_matrix_that_does_not_fit_is_named() {
+    let place = Workplace::new();
+    place.write("wide.toml", leaf("wide", 100));
+    let stiff = "--set coupling.y=1e7 --set coupling.z=1e7 --full-model --segments 100";
+    let run = place.run(format!(
+        "relax wide.toml {stiff} --memory 62MB --write none"
+    ));
+    let run = run
+        .ends(1)
+        .says(&["does not fit into the memory that is allowed"]);
+    assert!(!run.out.contains("lowers the energy"), "{}", run.out);
+    place.ok(format!("relax wide.toml {stiff} --memory 2GB --write none"));
+}
+
 #[test]
 fn a_large_scenario_is_weighed_before_it_is_parsed() {
     let place = Workplace::new();

@@ -17,6 +17,8 @@ const REFUSED: &str = "
     relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
     relax leaf.toml --modes 101 => --modes
     relax leaf.toml --modes -1 => --modes
+    relax leaf.toml --modes 3 --method shooting => --modes 3: modes are those of a relaxed leaf: use the method semi-implicit
+    relax leaf.toml --modes 3 --method shooting-from-rest => --modes 3: modes are
     relax leaf.toml --modes all => --modes
     relax leaf.toml --method shooting --segments 8 => --segments 8: shooting has no grid
     relax leaf.toml --intervals 4 => --intervals 4: only the method shooting has intervals
@@ -64,7 +66,7 @@ const REFUSED: &str = "
     trace leaf.toml --vary load.gravity[2]=1..1 => the same
     trace leaf.toml --vary stiffness.axial=100..-5 => greater than 0
     trace leaf.toml --vary load.gravity[2]=0..1 --points 1 => 2 or more
-    trace leaf.toml --vary load.gravity[2]=0..1 --cross-section -1 => greater than 0
+    trace leaf.toml --vary load.gravity[2]=0..1 --cross-section 1 => unexpected argument '--cross-section'
     trace leaf.toml --vary load.gravity[2]=0..1 --tolerance 5 => tolerance
     trace leaf.toml --vary load.gravity[2]=0..1 --segments 0 => segments
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[2]=0..-3 => varies twice
@@ -74,7 +76,6 @@ const REFUSED: &str = "
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=1..1 => the same
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary stiffness.axial=100..-5 => greater than 0
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --vary load.gravity[0]=0..1 => 3 times
-    trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --cross-section 1 => vary one number
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --map 16 => as 16x16
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --map 0x4 => from 1 to 256
     trace leaf.toml --vary load.gravity[2]=0..-1 --vary load.gravity[1]=0..1 --map 4x1000 => from 1 to 256
@@ -114,6 +115,22 @@ const REFUSED: &str = "
 #[test]
 fn bad_requests_are_refused_before_anything_is_written() {
     workplace::all_refused("", REFUSED);
+}
+
+/// Messages of the library name an option where they are about one, not where a name is like it.
+#[test]
+fn a_file_named_like_an_option_is_a_file() {
+    let place = Workplace::new();
+    for file in ["step 1.toml", "modes = 3.toml"] {
+        place.write(file, "leaf = { rod = 1 }");
+        let run = place.command("relax").arg(file).output().unwrap();
+        let run = Run::from(run).ends(2);
+        assert!(
+            run.err.starts_with(&format!("error: {file}:")),
+            "{}",
+            run.err
+        );
+    }
 }
 
 #[test]

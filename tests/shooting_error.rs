@@ -5,7 +5,9 @@ mod common;
 
 use common::random::{drawn, leaves};
 use common::*;
-use leafdyn::internals::bvp::{Options, Precision, Solution, Start, solve};
+use leafdyn::internals::bvp::{Options, Precision, Reason, Solution, Start, solve};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// All files, the paper's with few veins.
 fn scenes() -> Vec<Scenario> {
@@ -79,6 +81,30 @@ fn of_every_scene_at_every_tolerance() {
 #[test]
 fn of_random_leaves() {
     at_all_tolerances(&drawn(leaves(), 60), &[1e-7, 1e-8, 1e-9, 1e-10]);
+}
+
+/// A run that is stopped says so, and not that corrections do not decrease: on the way from arcs,
+/// and from a leaf at rest.
+#[test]
+fn the_end_of_the_time_is_no_divergence() {
+    let leaf = scenario("paper/fig04", "leaf.rods=3");
+    let rest = settle(&leaf, 1e-4);
+    let stations = &rest.shape.stations[..];
+    let near = Start::Leaf {
+        stations,
+        rods: &rest.shape.rods,
+    };
+    for start in [Start::Arcs, near] {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let mut options = Options::new(start, stations, Precision::Error(1e-9));
+        options.limit.cancel = Some(cancel.clone());
+        let failure = solve(&leaf, &options, &mut |_| {
+            cancel.store(true, Ordering::Relaxed)
+        });
+        let reason = failure.expect_err("it was stopped").reason;
+        assert_eq!(reason, Reason::OutOfTime);
+        assert!(reason.to_string().starts_with("the time allowed was over"));
+    }
 }
 
 /// Asked for an accuracy, it is kept, and estimates are below it.

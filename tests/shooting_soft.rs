@@ -41,7 +41,9 @@ fn under_tension_only_many_intervals_succeed() {
         match failure.reason {
             Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
             Reason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
-            Reason::Singular(_) | Reason::TooMuch(_) => panic!("{}", failure.reason),
+            Reason::Singular(_) | Reason::TooMuch(_) | Reason::OutOfTime => {
+                panic!("{}", failure.reason)
+            }
         }
         assert!(failure.reason.to_string().contains("use more intervals"));
         assert_eq!(failure.part, 1.0);

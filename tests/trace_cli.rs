@@ -89,15 +89,13 @@ fn a_fork_is_found_and_both_its_sides() {
 fn a_leaf_that_is_pulled_obeys_hookes_law() {
     let place = Workplace::new();
     for (name, axial, length) in [("fig07a", 9.0, 1.5), ("fig07b", 10.29, 1.0)] {
-        let vary = "--vary load.tip_force[0]=0..20 --cross-section 0.05 --out h";
+        let vary = "--vary load.tip_force[0]=0..20 --out h";
         let trace = place.told(0, format!("trace scenarios/paper/{name}.toml {vary}"));
         let number = |key: &str| trace["law"][key].number();
         assert!(number("r_squared") > 0.99999 && number("deviation") < 1e-3);
         // The veins lie askew and shear, which takes a part of their stiffness.
         let straight = 21.0 * axial / length;
         assert!(number("slope") < straight && number("slope") > 0.7 * straight);
-        let young = number("slope") * number("length") / 0.05;
-        assert!((number("young") / young - 1.0).abs() < 1e-12);
         let parts = ["displacement along x / cm", "force / N", "slope", "N/cm"];
         contains(&place.picture("h/trace"), &parts);
     }

@@ -142,7 +142,7 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
         let off = off.length();
         assert!(off <= allowed, "{what}: off by {off:.1e} of {allowed:.1e}");
     }
-    index_near(&scenario, point.grid.clone(), rods)
+    index_near(&scenario, point.grid.clone(), rods, point.error * length)
 }
 
 /// `LEAFDYN_TRACES=200 cargo test --release --test trace_verified -- --nocapture`.

@@ -110,7 +110,6 @@ pub struct Asked {
     segments: Option<usize>,
     tolerance: Option<f64>,
     points: Option<usize>,
-    cross_section: Option<f64>,
 }
 
 impl Asked {
@@ -124,7 +123,6 @@ impl Asked {
             segments: self.segments,
             tolerance: self.tolerance,
             most_points: self.points.unwrap_or(MOST_POINTS),
-            cross_section: self.cross_section,
         })
     }
 }

@@ -271,7 +271,7 @@ def test_the_remedy_of_a_missing_file() -> None:
         ("check", {"intervals": 10**30}, ValueError, "intervals = 10{30}: allowed"),
         ("all_shapes", {"tolerance": "x"}, TypeError, "tolerance = 'x'"),
         ("trace", {"vary": "load.gravity[2]=-1..-2", "points": 10**30}, ValueError, "points = 10{30}: allowed"),
-        ("trace", {"vary": "load.gravity[2]=-1..-2", "cross_section": "x"}, TypeError, "cross_section = 'x'"),
+        ("trace", {"vary": "load.gravity[2]=-1..-2", "tolerance": "x"}, TypeError, "tolerance = 'x'"),
         ("trace", {"vary": "load.gravity[2]=-1..-2", "switch": "x"}, TypeError, "switch = 'x'"),
         ("trace", {"vary": None}, TypeError, 'vary = None: must be text, such as "load.gravity'),
         ("map", {"vary": "load.gravity[2]=-1..-2", "methods": 3}, TypeError, "methods = 3: must be text"),
@@ -324,6 +324,5 @@ def test_messages_name_no_options_of_the_program() -> None:
         with pytest.raises(leafdyn.ScenarioError, match="^set ") as refused:
             leafdyn.relax(fan(2), set=wrong)
         assert "--" not in str(refused.value)
-    with pytest.raises(ValueError, match="vary one number"):
-        vary = ["load.gravity[2]=-1..-2", "stiffness.torsion=1..2"]
-        leafdyn.trace(fan(2), vary, cross_section=1.0)
+    with pytest.raises(ValueError, match="^modes = 3: "):
+        leafdyn.relax(fan(2), modes=3, method="shooting")

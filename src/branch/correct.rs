@@ -5,6 +5,7 @@ use super::family::{OutOfRange, clamp};
 use super::field::{add, at_same_nodes, between, dot, is_finite, largest, plus};
 use super::states::rate;
 use super::{Direction, Point, Solution};
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Field, Solved, State};
 use crate::relax::NOISY;
 use crate::relax::prolong::prolong;
@@ -150,7 +151,7 @@ impl Equations<'_> {
                 -off / (dot(&plane.dual, &rate) + plane.own)
             });
             let increments = plus(&forces, step, &rate);
-            let size = largest(&increments).max(step.abs());
+            let size = larger(largest(&increments), step.abs());
             if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }

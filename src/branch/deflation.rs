@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized};
 use super::field::{add, combined, dot, is_finite, largest, times};
 use super::{Direction, Point, Solution};
+use crate::largest::larger;
 use crate::leaf::{Bordered, Field, System};
 
 /// Singular values below this, relative to the largest, count as zero.
@@ -246,9 +247,8 @@ impl Solved {
             add(&mut increments, *part, mode);
         }
         let changes: Vec<f64> = solution.iter().skip(p).copied().collect();
-        let size = changes
-            .iter()
-            .fold(largest(&increments), |m, v| m.max(v.abs()));
+        let sizes = changes.iter().map(|v| v.abs());
+        let size = sizes.fold(largest(&increments), larger);
         match is_finite(&increments) && size <= LARGEST {
             true => Ok((increments, changes, size)),
             false => Err(Stuck::NotConverged),

@@ -236,7 +236,7 @@ pub(super) fn factorized<'p>(
     system: &System,
     shift: f64,
 ) -> Result<SparseFactor<'p>, Stuck> {
-    (pattern.factorize(system, shift)).map_err(|_| Stuck::TooLarge)
+    Ok(pattern.factorize(system, shift)?)
 }
 
 /// Whether the iteration has converged with a Newton step of this size after `previous`.

@@ -44,8 +44,7 @@ pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
 }
 
 pub fn largest(a: &Field) -> f64 {
-    let all = a.iter().flatten().flatten();
-    all.fold(0.0, |m, v| m.max(v.abs()))
+    crate::largest::largest(a.iter().flatten().flatten().map(|v| v.abs()))
 }
 
 /// The increments that lead from one state to another on the same grid.

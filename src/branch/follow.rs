@@ -247,9 +247,7 @@ impl Followed {
             (coarse, displacements(coarse, fine))
         });
         let largest = |displacements: &[DVec3]| {
-            displacements
-                .iter()
-                .fold(0.0, |m: f64, d| m.max(d.length()))
+            crate::largest::largest(displacements.iter().map(|d| d.length()))
         };
         let differences = before.1.iter().zip(&now.1).map(|(a, b)| *b - *a);
         let differences: Vec<DVec3> = differences.collect();

@@ -7,6 +7,7 @@ use super::field::every_second;
 use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::both_sides;
 use super::{Direction, Point};
+use crate::largest::larger;
 use crate::leaf::{Grid, State};
 use crate::relax::prolong::{prolong, restrict};
 use glam::DVec3;
@@ -233,7 +234,7 @@ fn refine_in(
             return Err(Doubt::OtherIndex);
         }
         moved = finer.moved;
-        table.noise = table.noise.max(finer.unfinished);
+        table.noise = larger(table.noise, finer.unfinished);
         now = finer.point;
         let values = Values::of(&mut equations, &now.state, now.fraction)?;
         table.push(equations.grid().segments(), values);

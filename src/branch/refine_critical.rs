@@ -7,6 +7,7 @@ use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
 use super::states::{eigenvalue_rounding, stiffest_condensed};
+use crate::largest::larger;
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 use rayon::prelude::*;
@@ -72,7 +73,7 @@ pub fn refine_critical(
         if critical.kind == Kind::Branching {
             let across = interpolate_across(&mut equations, &critical, values.fraction, accuracy);
             if let Some(across) = across {
-                table.common = table.common.max(across.error);
+                table.common = larger(table.common, across.error);
                 table.slope = Some(across.slope);
                 values = across.values;
             }
@@ -124,9 +125,9 @@ impl Softening {
             true => {
                 let slope = critical.slope.abs() / (FINER * segments as f64).powi(2);
                 let found = self.unsoftened(family, equations, critical, slope)?;
-                table.softening = table.softening.max(found.fraction_error);
+                table.softening = larger(table.softening, found.fraction_error);
                 if fold {
-                    table.common = table.common.max(found.error);
+                    table.common = larger(table.common, found.error);
                 }
                 stiffest = stiffest.min(1.0 / self.0);
                 growth = CUBIC.iter().map(|weight| weight.abs()).sum();
@@ -136,11 +137,11 @@ impl Softening {
         let rounding = eigenvalue_rounding(stiffest, segments);
         let along = rounding / critical.slope.abs();
         if fold {
-            table.noise = table.noise.max(along);
+            table.noise = larger(table.noise, along);
         }
         // Near a fold the parameter depends quadratically on arclength.
-        let of_value = (rounding / critical.steepness()).max(growth * along * along);
-        table.rounding = (table.rounding).max(growth * (of_value + critical.rounding));
+        let of_value = larger(rounding / critical.steepness(), growth * along * along);
+        table.rounding = larger(table.rounding, growth * (of_value + critical.rounding));
         Ok((values, growth))
     }
 
@@ -159,7 +160,7 @@ impl Softening {
             let rounding = f64::EPSILON / self.0 / slope;
             let less = SOFTENINGS.into_iter().find(|less| *less < self.0);
             match less {
-                Some(less) if found.error.max(found.fraction_error) > rounding => self.0 = less,
+                Some(less) if larger(found.error, found.fraction_error) > rounding => self.0 = less,
                 _ => return Ok(found),
             }
         }

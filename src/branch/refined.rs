@@ -2,6 +2,7 @@
 
 use super::equations::{Equations, Stuck};
 use super::family::{Family, Leaves, OutOfRange};
+use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::relax::richardson::Richardson;
 use crate::relax::shape_of;
@@ -144,7 +145,7 @@ impl Values {
     pub fn distance(&self, other: &Values) -> f64 {
         let points = self.points.chunks(3).zip(other.points.chunks(3));
         let squares = points.map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
-        squares.fold(0.0, f64::max).sqrt()
+        largest(squares).sqrt()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Point;
 use super::equations::{Equations, Stuck};
 use super::family::OutOfRange;
+use crate::largest::larger;
 
 /// A point found by a step.
 pub struct Found {
@@ -49,7 +50,10 @@ fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, S
     let near = equations.moved(&now.solution(), &now.tangent, step)?;
     let [fraction] = near.params;
     let point = equations.correct(&near.state, fraction, Some(&now.tangent))?;
-    let drift = (near.state.shift_to(&point.state)).max((point.fraction - fraction).abs());
+    let drift = larger(
+        near.state.shift_to(&point.state),
+        (point.fraction - fraction).abs(),
+    );
     Ok(Found { point, step, drift })
 }
 

@@ -1,6 +1,7 @@
 //! Why a branch ends, or does not begin.
 
 use super::family::OutOfRange;
+use crate::leaf::SparseError;
 
 /// Why no point is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,4 +32,13 @@ pub enum Stuck {
     /// The second parameter breaks the symmetry to which the branch point is due.
     #[error("the second number breaks the symmetry by which branches cross")]
     Unfolded,
+}
+
+impl From<SparseError> for Stuck {
+    fn from(error: SparseError) -> Self {
+        match error {
+            SparseError::Memory => Stuck::TooLarge,
+            SparseError::NotFinite => Stuck::NotConverged,
+        }
+    }
 }

@@ -65,6 +65,7 @@ pub fn from_arcs(
         };
         match attempt.follow() {
             Ok(near) => return Ok(near),
+            Err(failure) if failure.reason == Reason::OutOfTime => return Err(failure),
             Err(failure) => first = first.or(Some(failure)),
         }
     }
@@ -124,10 +125,12 @@ impl Attempt<'_, '_, '_> {
                     part = next;
                     step *= 2.0;
                 }
-                Err(_) if step > LEAST_STEP && spent < BUDGET => step *= 0.5,
-                Err(reason) => {
+                Err(reason)
+                    if reason == Reason::OutOfTime || step <= LEAST_STEP || spent >= BUDGET =>
+                {
                     return Err(Interrupted { reason, part, near });
                 }
+                Err(_) => step *= 0.5,
             }
         }
         self.log.part = 1.0;

@@ -2,6 +2,7 @@
 
 use super::equations::Equations;
 use super::state::{RodState, STATE};
+use crate::largest::larger;
 use crate::tableau::{A, B, C, E3, E5, STAGES};
 
 /// Largest number of steps of an initial-value problem.
@@ -199,14 +200,7 @@ fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) ->
                 (value(STATE * j + i) / scale).powi(2)
             })
             .sum();
-        // Not f64::max, which would ignore a NaN.
-        let rms = (sum / STATE as f64).sqrt();
-        if rms.is_nan() || rms > largest {
-            largest = rms;
-        }
-        if largest.is_nan() {
-            return largest;
-        }
+        largest = larger(largest, (sum / STATE as f64).sqrt());
     }
     largest
 }

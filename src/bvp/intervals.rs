@@ -11,6 +11,7 @@ use super::equations::{Equations, difference};
 use super::propagate::{LinearStep, Perturbations, group};
 use super::state::{RodState, TANGENT};
 use super::trajectory::{Nodes, Trajectory};
+use crate::largest::{larger, largest};
 
 /// Largest growth of a perturbation over one interval.
 pub const GROWTH: f64 = 1e3;
@@ -57,11 +58,11 @@ impl Units {
 
     /// The unit of the sum of all forces at the tip.
     pub fn total_force(&self) -> f64 {
-        self.force.iter().fold(0.0, |m, f| m.max(*f))
+        crate::largest::largest(self.force.iter().copied())
     }
 
     pub fn largest_moment(&self) -> f64 {
-        self.moment.iter().fold(0.0, |m, f| m.max(*f))
+        crate::largest::largest(self.moment.iter().copied())
     }
 
     /// The difference a - b of two flat states.
@@ -191,7 +192,7 @@ pub fn sensitivities(
                         matrix[(row_index, kinds * j + k)] =
                             value * units.of(from) / units.of(row_index);
                         if from % TANGENT / 3 == row_index % TANGENT / 3 {
-                            largest = largest.max(value.abs());
+                            largest = larger(largest, value.abs());
                         }
                     }
                 }
@@ -281,7 +282,6 @@ fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64
 
 /// Largest sensitivity within one kind of quantity.
 fn own_growth(rows: &[[f64; TANGENT]]) -> f64 {
-    (0..TANGENT)
-        .flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)))
-        .fold(0.0, |m, (i, c)| m.max(rows[i][c].abs()))
+    let own = (0..TANGENT).flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)));
+    largest(own.map(|(i, c)| rows[i][c].abs()))
 }

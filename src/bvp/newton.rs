@@ -15,6 +15,7 @@ use super::march::March;
 use super::solution::{Correction, Log, Neutral, Reason};
 use super::state::RodState;
 use super::trajectory::{Nodes, Trajectory};
+use crate::largest::largest;
 use crate::memory;
 use crate::shape::equally_spaced;
 use glam::DVec3;
@@ -144,7 +145,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         'iterations: for iteration in 0..MAX_ITERATIONS {
             self.now.iteration = iteration;
             let step = self.correction(&residuals);
-            size = largest(&step);
+            size = size_of(&step);
             if !size.is_finite() {
                 break;
             }
@@ -153,8 +154,12 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
-                if let Ok(next) = self.residuals_at(&trial, tolerance) {
-                    let remaining = largest(&self.correction(&next));
+                let tried = self.residuals_at(&trial, tolerance);
+                if let Err(Reason::OutOfTime) = tried {
+                    return Err(Reason::OutOfTime);
+                }
+                if let Ok(next) = tried {
+                    let remaining = size_of(&self.correction(&next));
                     if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance {
                         break (trial, next, remaining / size);
                     }
@@ -179,7 +184,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             let remaining = ratio * size;
             if factor == 1.0 && (remaining <= tolerance || size <= NOISE * tolerance) {
                 let last = self.correction(&next);
-                if largest(&last) <= NOISE * tolerance {
+                if size_of(&last) <= NOISE * tolerance {
                     self.nodes = self.moved(&last, 1.0);
                 }
                 return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
@@ -210,7 +215,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             !self.equations.limit.reached()
         });
         let Some(responses) = responses else {
-            return Err(no_progress(f64::INFINITY));
+            return Err(Reason::OutOfTime);
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
@@ -239,7 +244,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         linear: bool,
     ) -> Result<Vec<Integrated>, Reason> {
         if self.equations.limit.reached() {
-            return Err(no_progress(f64::INFINITY));
+            return Err(Reason::OutOfTime);
         }
         let integrated = integrate(self.equations, nodes, tolerance, linear)?;
         for interval in &integrated {
@@ -294,7 +299,7 @@ impl Newton<'_, '_, '_> {
             Some(neutral) => Reason::Singular(neutral),
             None => {
                 let growths = self.growth.iter().map(|growth| growth.log10());
-                let growth = growths.fold(0.0, f64::max);
+                let growth = largest(growths);
                 Reason::NoConvergence {
                     correction,
                     growth,
@@ -313,7 +318,7 @@ impl Newton<'_, '_, '_> {
             return None;
         }
         let direction = condensed.null();
-        let nudged = self.moved(&direction, NUDGE / largest(&direction));
+        let nudged = self.moved(&direction, NUDGE / size_of(&direction));
         let sampled =
             |nodes: &Nodes| Trajectory::sampled(self.equations, nodes, stations, NUDGE * NUDGE);
         let (at, perturbed) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
@@ -325,9 +330,9 @@ impl Newton<'_, '_, '_> {
             })
             .collect();
         let lengths = displacement.iter().flatten().map(|d| d.length());
-        let largest = lengths.fold(0.0, f64::max);
+        let most = largest(lengths);
         for displacement in displacement.iter_mut().flatten() {
-            *displacement /= largest;
+            *displacement /= most;
         }
         Some(Neutral {
             ratio: self.condition(),
@@ -340,16 +345,11 @@ impl Residuals {
     fn largest(&self, condensed: Option<&March>) -> f64 {
         let tip = condensed.map(|condensed| condensed.scaled(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();
-        defects.fold(0.0, |m, value| value.abs().max(m))
+        largest(defects.map(|value| value.abs()))
     }
 }
 
 /// The largest component of an increment.
-fn largest(step: &[Vec<f64>]) -> f64 {
-    step.iter()
-        .flatten()
-        .fold(0.0, |m: f64, value| match value.is_nan() {
-            true => f64::INFINITY,
-            false => m.max(value.abs()),
-        })
+fn size_of(step: &[Vec<f64>]) -> f64 {
+    largest(step.iter().flatten().map(|value| value.abs()))
 }

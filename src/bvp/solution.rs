@@ -149,6 +149,9 @@ pub struct Solution {
     pub condition: f64,
     /// The corresponding direction, where the equations are nearly singular.
     pub neutral: Option<Neutral>,
+    /// Why no attempt to reach the accuracy with smaller local errors succeeded, if this is the
+    /// solution before it.
+    pub unsharpened: Option<Reason>,
     /// Work done.
     pub work: Work,
 }
@@ -179,6 +182,8 @@ pub enum Reason {
     Singular(Neutral),
     /// The necessary number of intervals takes too much memory.
     TooMuch(TooMuch),
+    /// The time allowed was over, or the run was cancelled.
+    OutOfTime,
 }
 
 impl From<TooMuch> for Reason {
@@ -243,6 +248,9 @@ impl fmt::Display for Reason {
                 neutral.ratio
             ),
             Reason::TooMuch(too_much) => too_much.fmt(f),
+            Reason::OutOfTime => {
+                f.write_str("the time allowed was over before shooting had converged: allow more")
+            }
         }
     }
 }

@@ -24,11 +24,11 @@ const MOST_LOCAL: f64 = 1e-9;
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
 
-/// Solves the boundary-value problem of a scenario. `progress` is called for each
-/// correction.
+/// Solves the boundary-value problem of a scenario, as accurately as possible if not as required.
+/// `progress` is called for each correction.
 ///
 /// # Errors
-/// If no solution is found: the reason, and the last shape.
+/// If no solution is found at all: the reason, and the last shape.
 pub fn solve(
     scenario: &Scenario,
     options: &Options,
@@ -40,18 +40,44 @@ pub fn solve(
             return solve_once(scenario, options.start, tolerance, options, progress);
         }
     };
-    let longest = longest(&scenario.rods);
-    let mut tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
-    let mut solution = solve_once(scenario, options.start, tolerance, options, progress)?;
-    while solution.error.position > accuracy * longest && tolerance > LEAST_LOCAL {
+    let tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
+    let solution = solve_once(scenario, options.start, tolerance, options, progress)?;
+    let enough = accuracy * longest(&scenario.rods);
+    Ok(sharpened(
+        solution,
+        tolerance,
+        enough,
+        |solution, tolerance| {
+            let (stations, rods) = (options.stations, &solution.rods[..]);
+            let start = Start::Leaf { stations, rods };
+            solve_once(scenario, start, tolerance, options, progress)
+        },
+    ))
+}
+
+/// A solution with the local error `tolerance`, or the last of the attempts with smaller ones that
+/// start from the one before, until the error of its positions is at most `enough`.
+fn sharpened(
+    mut solution: Solution,
+    mut tolerance: f64,
+    enough: f64,
+    mut attempt: impl FnMut(&Solution, f64) -> Result<Solution, Failure>,
+) -> Solution {
+    while solution.error.position > enough && tolerance > LEAST_LOCAL {
         tolerance = (SHARPER * tolerance).max(LEAST_LOCAL);
-        let (stations, rods) = (options.stations, &solution.rods[..]);
-        let start = Start::Leaf { stations, rods };
-        let mut sharper = solve_once(scenario, start, tolerance, options, progress)?;
-        sharper.work += solution.work;
-        solution = sharper;
+        match attempt(&solution, tolerance) {
+            Ok(mut sharper) => {
+                sharper.work += solution.work;
+                solution = sharper;
+            }
+            Err(failure) => {
+                solution.work += failure.work;
+                solution.unsharpened = Some(failure.reason);
+                break;
+            }
+        }
     }
-    Ok(solution)
+    solution
 }
 
 /// Solves with one tolerance, and with a coarser one for comparison.
@@ -133,7 +159,67 @@ fn solve_near(
         growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
         condition: newton.condition(),
         neutral: newton.neutral(stations),
+        unsharpened: None,
         intervals: newton.nodes.sigma,
         work: Work::default(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A solution with this error of its positions.
+    fn within(position: f64) -> Solution {
+        Solution {
+            stations: vec![0.0, 1.0],
+            rods: Vec::new(),
+            energy: 1.0,
+            error: Difference {
+                position,
+                ..Difference::default()
+            },
+            defect: 0.0,
+            intervals: vec![0.0, 1.0],
+            growth: 0.0,
+            condition: 1.0,
+            neutral: None,
+            unsharpened: None,
+            work: Work {
+                iterations: 1,
+                ..Work::default()
+            },
+        }
+    }
+
+    fn failed() -> Failure {
+        Failure {
+            reason: Reason::OutOfTime,
+            part: 1.0,
+            rods: Vec::new(),
+            work: Work {
+                iterations: 10,
+                ..Work::default()
+            },
+        }
+    }
+
+    /// What was found is not lost when an attempt to improve it fails, and says why it was not
+    /// improved.
+    #[test]
+    fn a_failed_attempt_leaves_the_solution_before() {
+        let mut attempts = vec![Err(failed()), Ok(within(1e-5))];
+        let mut tolerances = Vec::new();
+        let found = sharpened(within(1e-3), 1e-9, 1e-6, |before, tolerance| {
+            tolerances.push((before.error.position, tolerance));
+            attempts.pop().unwrap()
+        });
+        assert_eq!(tolerances, [(1e-3, 1e-11), (1e-5, 1e-13)]);
+        assert_eq!(found.error.position, 1e-5);
+        assert_eq!(found.unsharpened, Some(Reason::OutOfTime));
+        assert_eq!(found.work.iterations, 12);
+
+        let enough = sharpened(within(1e-6), 1e-9, 1e-6, |_, _| Err(failed()));
+        assert_eq!(enough.unsharpened, None);
+    }
 }

@@ -6,6 +6,7 @@ use glam::DVec3;
 use super::dop853::{Integrator, Unbounded};
 use super::equations::Equations;
 use super::state::RodState;
+use crate::largest::{larger, largest};
 use crate::shape::{NodeState, RodShape};
 
 /// Ends of the intervals: 0 = sigma_0 < ... < sigma_K = 1, and the
@@ -168,19 +169,18 @@ impl Trajectory {
     pub fn largest(&self, j: usize) -> (f64, f64) {
         self.states.iter().fold((0.0, 0.0), |(n, m), y| {
             let rod = RodState::read(y, j);
-            (rod.n.length().max(n), rod.m.length().max(m))
+            (larger(n, rod.n.length()), larger(m, rod.m.length()))
         })
     }
 
     /// Largest angle by which the directors of a rod turn along it.
     pub fn turn(&self, equations: &Equations) -> f64 {
-        (0..equations.rods())
-            .map(|j| {
-                let q = |y: &[f64]| RodState::read(y, j).q;
-                let turns = self.states.windows(2);
-                turns.map(|y| q(&y[0]).angle_between(q(&y[1]))).sum::<f64>()
-            })
-            .fold(0.0, f64::max)
+        let turn = |j: usize| {
+            let q = |y: &[f64]| RodState::read(y, j).q;
+            let turns = self.states.windows(2);
+            turns.map(|y| q(&y[0]).angle_between(q(&y[1]))).sum::<f64>()
+        };
+        largest((0..equations.rods()).map(turn))
     }
 
     /// The shape in the units of the scenario, at its stations.

@@ -192,8 +192,10 @@ impl Map {
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;
         study::map(request, &todo, &mut |new| {
-            let journal = journal.as_mut();
-            failed = journal.and_then(|it| it.append(request, &new).err());
+            // Cells that were being solved still arrive after a failure, which they must not hide.
+            if let Some(journal) = &mut journal {
+                unless_failed(&mut failed, || journal.append(request, &new));
+            }
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
@@ -203,6 +205,13 @@ impl Map {
             failed.is_none()
         });
         failed.map_or(Ok(rows), |error| Err(error.into()))
+    }
+}
+
+/// Writes unless something before could not be written, which is kept.
+fn unless_failed<E>(failed: &mut Option<E>, write: impl FnOnce() -> Result<(), E>) {
+    if failed.is_none() {
+        *failed = write().err();
     }
 }
 
@@ -228,6 +237,19 @@ fn shards(folder: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A cell that is written after one that could not be does not hide that.
+    #[test]
+    fn the_first_failure_is_kept() {
+        let (mut failed, mut written) = (None, 0);
+        for result in [Ok(()), Err("no space left"), Ok(()), Err("closed")] {
+            unless_failed(&mut failed, || {
+                written += 1;
+                result
+            });
+        }
+        assert_eq!((failed, written), (Some("no space left"), 2));
+    }
 
     #[test]
     fn only_files_of_shards_are_recognized() {

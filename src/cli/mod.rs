@@ -23,8 +23,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use clap::{Parser, Subcommand};
 
 use crate::files::{self, Checkpointer};
+use crate::relax::RelaxError;
 use crate::report::{FileError, Refused, json, numbers::brief};
 use crate::scenario::printable;
+use crate::study::{ChartError, MapRefused, TraceError};
 
 /// What verbs are made of.
 mod kit {
@@ -77,6 +79,21 @@ impl Cli {
     }
 }
 
+/// Whether a refusal is one of the library about an option: others may begin with any words, such
+/// as the name of a file.
+fn is_about_an_option(refusal: &Refusal) -> bool {
+    let of_trace = refusal.downcast_ref::<TraceError>();
+    let of_chart = refusal.downcast_ref::<ChartError>();
+    refusal.is::<RelaxError>()
+        || refusal.is::<crate::simulate::Refused>()
+        || refusal.is::<MapRefused>()
+        || matches!(of_trace, Some(TraceError::Relax(_) | TraceError::Option(_)))
+        || matches!(
+            of_chart,
+            Some(ChartError::Relax(_) | ChartError::Seconds(_))
+        )
+}
+
 /// Rewrites a message of the library about an option as the user types it:
 /// `segments = 2: ...` becomes `--segments 2: ...`.
 fn name_options(refusal: Refusal) -> Refusal {
@@ -94,7 +111,7 @@ fn name_options(refusal: Refusal) -> Refusal {
         return format!("{text}raise the limit with --memory").into();
     }
     match text.split_once(' ') {
-        Some((option, rest)) if OPTIONS.contains(&option) => {
+        Some((option, rest)) if OPTIONS.contains(&option) && is_about_an_option(&refusal) => {
             format!("--{option} {}", rest.trim_start_matches("= ")).into()
         }
         _ => refusal,
@@ -245,13 +262,17 @@ fn show_report(report: &str) -> Result<(), Refusal> {
     show(printable(report).as_bytes())
 }
 
-/// Writes to standard output. A closed pipe (`| head`) is not an error.
+/// Writes to standard output. Whoever reads a report may close it when he has seen enough
+/// (`| head`); of JSON half is of no use.
 fn show(bytes: &[u8]) -> Result<(), Refusal> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("cannot write to standard output: {error}").into())
+        Err(error)
+            if error.kind() == io::ErrorKind::BrokenPipe && !JSON.load(Ordering::Relaxed) =>
+        {
+            Ok(())
         }
-        _ => Ok(()),
+        Err(error) => Err(format!("cannot write to standard output: {error}").into()),
+        Ok(()) => Ok(()),
     }
 }

@@ -44,10 +44,6 @@ pub struct Trace {
     /// Of a boundary also a coarse map under the curves: the index in so many cells along both numbers, each reached from one beside it
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = cells)]
     map: Option<[usize; 2]>,
-
-    /// Area of the leaf's cross-section: gives Young's modulus where a tip force varies
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    cross_section: Option<f64>,
 }
 
 impl Trace {
@@ -85,7 +81,6 @@ impl Trace {
             segments: self.segments,
             tolerance: self.request.tolerance,
             most_points: self.points,
-            cross_section: self.cross_section,
         }
     }
 

@@ -214,6 +214,6 @@ mod tests {
         let svg = svg(&check);
         assert!(svg.contains("could not be compared"));
         assert_eq!(svg.matches("rest:").count(), 6);
-        assert!(!svg.contains("id=\"differences\""));
+        assert!(!svg.contains("class=\"differences\""));
     }
 }

@@ -21,7 +21,8 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     )?;
     for mark in &drawing.marks {
         match mark {
-            Mark::Group(name) => writeln!(out, "<g id=\"{name}\">")?,
+            // No id, as there may be several of a kind.
+            Mark::Group(name) => writeln!(out, "<g class=\"{name}\">")?,
             Mark::EndGroup => writeln!(out, "</g>")?,
             Mark::Shape { path, fill, stroke } => {
                 write!(out, "<path d=\"")?;
@@ -98,7 +99,7 @@ pub fn escaped(text: &str) -> String {
         .collect()
 }
 
-/// The picture as text; checks that groups are closed and numbers are finite.
+/// The picture as text; checks that groups are closed, ids do not repeat and numbers are finite.
 #[cfg(test)]
 pub fn text(drawing: &Drawing) -> String {
     let mut bytes = Vec::new();
@@ -106,6 +107,13 @@ pub fn text(drawing: &Drawing) -> String {
     let svg = String::from_utf8(bytes).unwrap();
     assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    let mut ids: Vec<_> = svg
+        .split(" id=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next())
+        .collect();
+    ids.sort_unstable();
+    assert!(ids.windows(2).all(|pair| pair[0] != pair[1]), "{ids:?}");
     svg
 }
 

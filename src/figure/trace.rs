@@ -318,7 +318,4 @@ fn draw_law(
     key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));
     key.entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
-    if let Some(young) = law.young {
-        key.entry(page, "Young's modulus", &short(young), |_, _| ());
-    }
 }

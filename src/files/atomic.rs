@@ -5,8 +5,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::mem;
 use std::path::{Path, PathBuf};
-use std::process;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::{Builder, NamedTempFile};
 
 use crate::report::FileError;
 
@@ -63,9 +64,8 @@ pub(super) struct Draft(PathBuf);
 impl Draft {
     /// Begins a file under another name.
     pub fn begin(file: &Path) -> io::Result<(Self, File)> {
-        let path = draft_path(file);
         let mut paths = unfinished();
-        let created = File::create(&path)?;
+        let (created, path) = create_draft(file)?.keep().map_err(|kept| kept.error)?;
         paths.push(path.clone());
         Ok((Draft(path), created))
     }
@@ -98,10 +98,17 @@ pub(super) fn rename(draft: &Path, file: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A hidden name in the folder of `file` that no other process uses.
-fn draft_path(file: &Path) -> PathBuf {
+/// A new file in the folder of `file`, under a hidden name that cannot be predicted: nothing that
+/// stands there, such as a link, is opened.
+fn create_draft(file: &Path) -> io::Result<NamedTempFile> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    file.with_file_name(format!(".{name}.{}.part", process::id()))
+    let folder = file.parent().filter(|it| !it.as_os_str().is_empty());
+    Builder::new()
+        .prefix(&format!(".{name}."))
+        .suffix(".part")
+        .make_in(folder.unwrap_or(Path::new(".")), |path| {
+            File::create_new(path)
+        })
 }
 
 /// Creates the output folder and its parents.
@@ -114,8 +121,7 @@ pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
 /// a long computation.
 pub fn check_writable(folder: &Path) -> Result<(), FileError> {
     let existing = nearest_existing(folder);
-    let probe = draft_path(&existing.join("probe"));
-    let written = File::create(&probe).and_then(|_| fs::remove_file(&probe));
+    let written = create_draft(&existing.join("probe")).and_then(NamedTempFile::close);
     written.map_err(|reason| not_writable(folder, existing, reason))
 }
 
@@ -166,6 +172,41 @@ mod tests {
         assert_eq!(failed.unwrap_err().to_string(), "disk full");
         assert_eq!(fs::read(&file).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    /// A link that stands where drafts used to be written is not followed, nor is one that stands
+    /// where the file goes.
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_a_link() {
+        let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let target = outside.path().join("target");
+        fs::write(&target, "outside").unwrap();
+        let links = [
+            "a.json".into(),
+            format!(".a.json.{}.part", std::process::id()),
+        ];
+        for link in links {
+            std::os::unix::fs::symlink(&target, folder.path().join(link)).unwrap();
+        }
+        let probe = format!(".probe.{}.part", std::process::id());
+        std::os::unix::fs::symlink(outside.path().join("new"), folder.path().join(probe)).unwrap();
+        check_writable(folder.path()).unwrap();
+        let file = folder.path().join("a.json");
+        write_file(&file, |out| out.write_all(b"inside")).unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"outside");
+        assert_eq!(fs::read(&file).unwrap(), b"inside");
+        assert!(!file.is_symlink());
+        assert_eq!(names(outside.path()), ["target"]);
+    }
+
+    /// Drafts of the same file by the same process are different files.
+    #[test]
+    fn names_of_drafts_are_not_predictable() {
+        let folder = tempfile::tempdir().unwrap();
+        let begin = || Draft::begin(&folder.path().join("a.json")).unwrap().0;
+        let (first, second) = (begin(), begin());
+        assert_ne!(first.path(), second.path());
     }
 
     #[test]

@@ -31,28 +31,26 @@ pub fn widest_arch() -> Arch {
     Arch::new()
 }
 
-/// The widest instructions available whose width divides a group.
-pub fn arch() -> Arch {
-    match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Arch::V3(*simd),
-        arch => arch,
-    }
-}
-
 /// A loop over groups.
 pub trait Kernel {
     /// Processes the lanes from `part` on, as many as an instruction has.
     fn run<S: Simd>(&mut self, simd: S, part: usize);
 }
 
-/// Runs a loop with the instructions of `arch`.
+/// Runs a loop with the instructions of `arch` or, if these are wider than a group, with the
+/// widest that are not.
 pub fn run(arch: Arch, kernel: &mut impl Kernel) {
     struct Parts<'a, K>(&'a mut K);
     impl<K: Kernel> pulp::WithSimd for Parts<'_, K> {
         type Output = ();
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
+            const {
+                assert!(
+                    GROUP.is_multiple_of(S::F64_LANES),
+                    "a group has whole parts"
+                )
+            };
             let mut part = 0;
             while part < GROUP {
                 self.0.run(simd, part);
@@ -61,7 +59,8 @@ pub fn run(arch: Arch, kernel: &mut impl Kernel) {
         }
     }
     match arch {
-        // Not compiled for wider instructions than a group.
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(*simd, Parts(kernel)),
         #[cfg(target_arch = "x86_64")]
         Arch::V3(simd) => Simd::vectorize(simd, Parts(kernel)),
         #[cfg(target_arch = "x86_64")]
@@ -179,7 +178,17 @@ impl<S: Simd> Lanes<S> {
         self.with(self.simd.div_f64s(one, self.v))
     }
 
-    /// The larger one.
+    /// The larger of two sizes; infinite where one of them is not a number.
+    #[inline(always)]
+    pub fn larger(self, other: Self) -> Self {
+        let sum = (self + other).v;
+        let known = self.simd.equal_f64s(sum, sum);
+        let most = self.simd.max_f64s(self.v, other.v);
+        let infinite = self.simd.splat_f64s(f64::INFINITY);
+        self.with(self.simd.select_f64s(known, most, infinite))
+    }
+
+    /// The larger one, where both are numbers.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         self.with(self.simd.max_f64s(self.v, other.v))
@@ -290,5 +299,49 @@ impl From<Lanes<Scalar>> for f64 {
     #[inline(always)]
     fn from(single: Lanes<Scalar>) -> Self {
         single.v
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Count(usize);
+
+    impl Kernel for Count {
+        fn run<S: Simd>(&mut self, _: S, _: usize) {
+            self.0 += 1;
+        }
+    }
+
+    struct Width;
+
+    impl pulp::WithSimd for Width {
+        type Output = usize;
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            S::F64_LANES
+        }
+    }
+
+    /// Instructions that are wider than a group are no reason to take one number at a time.
+    #[test]
+    fn a_group_takes_as_few_parts_as_the_instructions_allow() {
+        let mut count = Count(0);
+        run(widest_arch(), &mut count);
+        assert_eq!(count.0, GROUP / widest_arch().dispatch(Width).min(GROUP));
+    }
+
+    #[test]
+    fn a_lane_that_is_no_number_stays_the_largest() {
+        let largest = |sizes: [f64; 3]| {
+            let [a, b, c] = sizes.map(Lanes::from);
+            f64::from(a.larger(b).larger(c))
+        };
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        for at in 0..3 {
+            let mut sizes = [1.0, 3.0, 2.0];
+            sizes[at] = f64::NAN;
+            assert_eq!(largest(sizes), f64::INFINITY, "{at}");
+        }
     }
 }

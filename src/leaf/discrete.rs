@@ -5,6 +5,7 @@ use super::grid::Grid;
 use super::loads::{RodLoad, RodLoads, group_loads};
 use super::state::State;
 use crate::lanes::{GROUP, Vectors};
+use crate::largest::largest;
 use crate::rod::{Ends, Section, Segment};
 use glam::DVec3;
 use pulp::Scalar;
@@ -83,7 +84,7 @@ impl DiscreteLeaf {
             let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
             state.n[j * n + i] = idle.frame * force;
             let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
-            violation = violation.max(off.abs().max_element());
+            violation = largest([violation, off.x.abs(), off.y.abs(), off.z.abs()]);
         }
         violation
     }

@@ -4,7 +4,7 @@
 use super::chain::lanes_of;
 use super::discrete::DiscreteLeaf;
 use super::loads::{GroupLoads, RodLoads, group_loads};
-use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, arch, run};
+use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, run, widest_arch};
 use crate::rod::{FIELDS, Fields, GroupFields, GroupLaws, laws};
 use crate::tableau::{A, B, C, STAGES};
 use glam::{DQuat, DVec3};
@@ -78,7 +78,7 @@ impl<'a> Flow<'a> {
         let fields = vec![[Four::default(); FIELDS]; groups];
         let mut flow = Flow {
             leaf,
-            arch: arch(),
+            arch: widest_arch(),
             loads: (0..groups)
                 .map(|group| group_loads(lanes_of(group, leaf.rods()).map(load)))
                 .collect(),

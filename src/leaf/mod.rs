@@ -9,6 +9,8 @@ mod flow;
 mod grid;
 mod loads;
 mod mirror;
+#[cfg(test)]
+mod not_a_number;
 mod rate;
 mod sparse;
 mod state;
@@ -23,6 +25,6 @@ pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
 pub use mirror::{half_of, whole_fields, whole_of};
 pub use rate::{Forces, LeafRate, Response, at_constant_force};
-pub use sparse::{Bordered, SparseFactor, SparsePattern};
+pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, Sums, System};

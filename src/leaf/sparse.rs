@@ -4,6 +4,7 @@
 use super::state::{Field, Increment};
 use super::system::System;
 use super::unknowns::{Unknowns, entries, lower_triangle};
+use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -45,10 +46,14 @@ pub struct SparseFactor<'a> {
     memory: MemBuffer,
 }
 
-/// The matrix could not be factorised: too large for the memory there is.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
-#[error("the sparse factorisation of the leaf does not fit into memory")]
-pub struct SparseError;
+/// Why a matrix could not be factorised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SparseError {
+    /// It is too large for the memory that is allowed.
+    Memory,
+    /// A pivot is not a finite number: it has no sign.
+    NotFinite,
+}
 
 impl SparsePattern {
     /// Orders the unknowns by nested dissection of the grid of rods and nodes,
@@ -70,7 +75,8 @@ impl SparsePattern {
         });
         let (lower, places) = lower_triangle(size, &pairs);
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let upper = lower.transpose().to_col_major().map_err(|_| SparseError)?;
+        let upper = lower.transpose().to_col_major();
+        let upper = upper.map_err(|_| SparseError::Memory)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -81,7 +87,11 @@ impl SparsePattern {
             SymmetricOrdering::Identity,
             params,
         )
-        .map_err(|_| SparseError)?;
+        .map_err(|_| SparseError::Memory)?;
+        let SymbolicCholeskyRaw::Supernodal(supernodes) = symbolic.raw() else {
+            unreachable!("supernodes are forced");
+        };
+        memory::factor(supernodes.len_val()).map_err(|_| SparseError::Memory)?;
         Ok(SparsePattern {
             symbolic,
             lower,
@@ -144,9 +154,7 @@ impl SparsePattern {
         shift: f64,
         border: &[Field],
     ) -> Result<SparseFactor<'_>, SparseError> {
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
-            return Err(SparseError);
-        };
+        let symbolic = self.supernodes();
         let mut values = vec![0.0; self.lower.compute_nnz()];
         let (unknowns, first_border) = (&self.unknowns, self.border);
         let mut places = self.places.iter();
@@ -175,7 +183,7 @@ impl SparsePattern {
             subdiagonal: vec![0.0; self.size],
             forward: vec![0; self.size],
             inverse: vec![0; self.size],
-            memory: MemBuffer::try_new(scratch).map_err(|_| SparseError)?,
+            memory: MemBuffer::try_new(scratch).map_err(|_| SparseError::Memory)?,
         };
         supernodal::factorize_supernodal_numeric_intranode_lblt(
             &mut factor.values,
@@ -188,17 +196,31 @@ impl SparsePattern {
             MemStack::new(&mut factor.memory),
             Default::default(),
         );
-        Ok(factor)
+        let finite = factor.has_finite_pivots();
+        finite.then_some(factor).ok_or(SparseError::NotFinite)
+    }
+
+    fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => symbolic,
+            _ => unreachable!("supernodes are forced"),
+        }
     }
 }
 
 impl SparseFactor<'_> {
     fn parts(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.pattern.symbolic.raw() else {
-            unreachable!("a pattern that is not supernodal is not factorised");
-        };
+        let symbolic = self.pattern.supernodes();
         let perm = PermRef::new_checked(&self.forward, &self.inverse, self.pattern.size);
         supernodal::SupernodalIntranodeLbltRef::new(symbolic, &self.values, &self.subdiagonal, perm)
+    }
+
+    /// What is not a number in the matrix spreads to a pivot.
+    fn has_finite_pivots(&self) -> bool {
+        let parts = self.parts();
+        let mut nodes = (0..parts.symbolic().n_supernodes()).map(|s| parts.supernode(s).val());
+        nodes.all(|pivots| (0..pivots.ncols()).all(|k| pivots[(k, k)].is_finite()))
+            && self.subdiagonal.iter().all(|value| value.is_finite())
     }
 
     /// Number of negative eigenvalues, by Sylvester's law of inertia: the

@@ -1,5 +1,6 @@
 //! Positions, rotations and segment forces of all nodes of a leaf.
 
+use crate::largest::largest;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 
@@ -112,14 +113,14 @@ impl State {
             a.distance(b)
         };
         let nodes = (0..self.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
-        nodes.fold(0.0, |most, (j, i)| most.max(distance(j, i)))
+        largest(nodes.map(|(j, i)| distance(j, i)))
     }
 
     /// The largest change of a segment's force between this state and another on the
     /// same grid.
     pub fn force_change(&self, other: &State) -> f64 {
         let changes = self.n.iter().zip(&other.n).map(|(a, b)| a.distance(*b));
-        changes.fold(0.0, f64::max)
+        largest(changes)
     }
 
     /// Writes the increments of all nodes but the bases that lead to another state on the same grid.

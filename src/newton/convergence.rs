@@ -1,5 +1,6 @@
 //! Convergence tests of Newton's method.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, State};
 
 /// An increment (radians, lengths) below this that does not decrease is due to rounding.
@@ -45,7 +46,7 @@ impl Contraction {
     /// Updates the constant with an increment after one of size `previous`.
     pub fn update(&mut self, size: f64, previous: f64) {
         if previous < ASYMPTOTIC {
-            self.0 = self.0.max(size / (previous * previous));
+            self.0 = larger(self.0, size / (previous * previous));
         }
     }
 
@@ -83,7 +84,7 @@ pub fn converged(
         false => first,
     };
     let [before, now] = cg_tolerances;
-    let remaining = quadratic.max(now * size);
+    let remaining = larger(quadratic, now * size);
     let bounded = rate * now * size <= BOUND * accuracy * before;
     match size < rounding && rate > DECREASING {
         true => Some(size),

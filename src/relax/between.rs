@@ -1,5 +1,6 @@
 //! A leaf between two stations where it is known: the equilibrium equations integrated from both.
 
+use crate::largest::larger;
 use crate::leaf::{Flow, RodFields, Slice};
 use glam::DVec3;
 
@@ -38,7 +39,7 @@ pub fn integrated_between(
         if !near(a) || !near(b) {
             return None;
         }
-        error = error.max(0.25 * (a + b).length());
+        error = larger(error, 0.25 * (a + b).length());
     }
     behind.reverse();
     let sections = before.iter().zip(&behind).zip(points);

@@ -1,5 +1,6 @@
 //! The first-order response of a leaf to jumps of its fields, and its subtraction.
 
+use crate::largest::larger;
 use crate::leaf::{Field, Jump, RodFields, Solved, State, System, Tangent, shift, turn};
 use crate::relax::level::Level;
 use crate::rotation;
@@ -165,11 +166,6 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     }
 }
 
-/// The larger of two numbers; NaN if one is.
-pub fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b <= a { a } else { b }
-}
-
 /// The state with its nodes displaced.
 fn moved(state: &State, response: &Response) -> State {
     let mut moved = state.clone();
@@ -179,20 +175,4 @@ fn moved(state: &State, response: &Response) -> State {
         }
     }
     moved
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_number_that_is_none_stays_the_largest() {
-        let largest = |numbers: [f64; 3]| numbers.into_iter().fold(0.0, larger);
-        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
-        for at in 0..3 {
-            let mut numbers = [1.0, 3.0, 2.0];
-            numbers[at] = f64::NAN;
-            assert!(largest(numbers).is_nan(), "{at}");
-        }
-    }
 }

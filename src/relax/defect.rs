@@ -13,9 +13,10 @@
 //! from which it is integrated, to the solution of the equations themselves, in each round by
 //! the relative error of the linear equations: about a hundredth on 8 segments.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::correction::{Tangents, apply, larger, largest_rotation_and_stress};
+use crate::relax::correction::{Tangents, apply, largest_rotation_and_stress};
 use crate::relax::level::Level;
 use crate::relax::nodes::nodes;
 use crate::rotation;
@@ -65,7 +66,7 @@ pub struct Estimate {
 impl Estimate {
     /// The largest error of a position.
     pub fn largest(&self) -> f64 {
-        self.at_nodes.max(self.between)
+        larger(self.at_nodes, self.between)
     }
 }
 

@@ -129,14 +129,19 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// Angular frequency omega, radians per time; `None` if it is unstable.
+    /// Angular frequency omega, radians per time: zero if the mode is neutral, `None` if it is
+    /// unstable.
     pub fn frequency(&self) -> Option<f64> {
-        (self.eigenvalue >= 0.0).then(|| self.eigenvalue.sqrt())
+        match self.is_neutral() {
+            true => Some(0.0),
+            false => (self.eigenvalue >= 0.0).then(|| self.eigenvalue.sqrt()),
+        }
     }
 
     /// Rate gamma at which the leaf leaves an unstable equilibrium, per time.
     pub fn growth(&self) -> Option<f64> {
-        (self.eigenvalue < 0.0).then(|| (-self.eigenvalue).sqrt())
+        let unstable = self.eigenvalue < 0.0 && !self.is_neutral();
+        unstable.then(|| (-self.eigenvalue).sqrt())
     }
 
     /// Whether the eigenvalue is zero within its error.

@@ -1,5 +1,6 @@
 //! The leaf at the nodes of its grids, extrapolated over them.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, RodFields};
 use crate::relax::level::{Level, positions};
 use crate::relax::richardson::{Richardson, distance};
@@ -69,7 +70,7 @@ pub fn finer_nodes(
         };
         let mut nodes: Vec<Vec<Node>> = rods.clone().map(|j| on(k, j)).collect();
         excess += add_remainder(&mut nodes, &reached, [&levels[k - 1].leaf, &levels[k].leaf]);
-        if between + excess > allowed {
+        if !excess.is_finite() || between + excess > allowed {
             break;
         }
         (grid, reached, between) = (k, nodes, between + excess);
@@ -103,7 +104,7 @@ fn add_remainder(
         let position = |i: usize| DVec3::from_slice(&remainders[i]);
         for (node, (stencil, lower)) in nodes.iter_mut().zip(&stencils) {
             let difference = stencil.value(position) - lower.value(position);
-            error = error.max(difference.length());
+            error = larger(error, difference.length());
             for (i, weight) in stencil.terms() {
                 (node.iter_mut().zip(&remainders[i])).for_each(|(sum, it)| *sum += weight * it);
             }
@@ -112,16 +113,26 @@ fn add_remainder(
     error
 }
 
-/// Ratio, at least one, of the largest changes of positions by the last grid at the nodes of the
-/// grid before and at those of the first: errors may be larger by it, as with a boundary layer
-/// between the nodes of the first grid.
+/// Ratio of the largest changes of positions by the last grid at the nodes of the grid before and
+/// at those of the first: errors may be larger by it, as with a boundary layer between the nodes
+/// of the first grid.
 fn layer_ratio(levels: &[Level]) -> f64 {
     let [first, .., before, finest] = levels else {
         return 1.0;
     };
     let change = |stride| distance(&positions(before, stride), &positions(finest, 2 * stride));
-    let ratio = change(1) / change(before.leaf.segments() / first.leaf.segments());
-    if ratio.is_finite() { ratio } else { 1.0 }
+    ratio(
+        change(1),
+        change(before.leaf.segments() / first.leaf.segments()),
+    )
+}
+
+/// Ratio of a change to another, which is a part of it; one if there is no change.
+fn ratio(change: f64, part: f64) -> f64 {
+    match change == 0.0 {
+        true => 1.0,
+        false => change / part,
+    }
 }
 
 /// The values of a rod extrapolated over `levels` at the ends of so many parts; its quaternions on
@@ -175,4 +186,16 @@ fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
 /// Of q and -q the one nearer to `other`.
 pub fn with_sign_of(q: DQuat, other: DQuat) -> DQuat {
     if q.dot(other) < 0.0 { -q } else { q }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_between_nodes_that_do_not_move_is_no_small_one() {
+        assert_eq!(ratio(3e-9, 1e-9), 3.0);
+        assert_eq!(ratio(3e-9, 0.0), f64::INFINITY);
+        assert_eq!(ratio(0.0, 0.0), 1.0);
+    }
 }

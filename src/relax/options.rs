@@ -171,6 +171,12 @@ pub enum RelaxError {
         /// Requested number of modes.
         found: usize,
     },
+    /// Shooting has no grids on which eigenvalues are computed.
+    #[error("modes = {found}: modes are those of a relaxed leaf: use the method semi-implicit")]
+    ModesByShooting {
+        /// Requested number of modes.
+        found: usize,
+    },
     /// The number of intervals is out of range.
     #[error("intervals = {found}: allowed are 1 to {MAX_INTERVALS}")]
     Intervals {

@@ -260,6 +260,9 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 Stop::StepLimit if explicit => format!(
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
+                Stop::Memory => format!(
+                    "the factorised matrix of the leaf on {finest} segments does not fit into the memory that is allowed: use fewer rods or segments, or raise the limit on memory"
+                ),
                 Stop::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments{}",
                     advice(run)
@@ -282,8 +285,8 @@ const COUNTS: f64 = 0.1;
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
 fn advice(run: &Run) -> String {
-    if let Some(far) = plausible::out_of_reach(run.leaf.scenario()) {
-        return format!(": {far}");
+    if let Some(slip) = plausible::slip(run.leaf.scenario()) {
+        return format!(": {slip}");
     }
     let Some(level) = run.levels.last() else {
         return String::new();

@@ -1,5 +1,7 @@
 //! Extrapolation over nested grids, and its error estimate.
 
+use crate::largest::{larger, largest};
+
 /// A column of order p is extrapolated further only if its changes from grid
 /// to grid shrink by 2^p, or nearly so: at most this many times less.
 const ORDER_SLACK: f64 = 1.5;
@@ -120,7 +122,7 @@ impl Richardson {
         if columns < last {
             // Its order is not confirmed: the error estimate is its last change.
             let change = distance(&row[columns], &before[columns]);
-            let error = (UNORDERED * change).max(SAFETY.1 * correction(columns));
+            let error = larger(UNORDERED * change, SAFETY.1 * correction(columns));
             return Some(Best { columns, error });
         }
         // With two grids the only reference is the size of the leaf, one.
@@ -129,7 +131,7 @@ impl Richardson {
         let safety = (SLOPE * ratio.sqrt()).clamp(SAFETY.0, SAFETY.1);
         Some(Best {
             columns,
-            error: safety * correction(last),
+            error: larger(0.0, safety * correction(last)),
         })
     }
 
@@ -184,15 +186,11 @@ impl Richardson {
 }
 
 /// Largest distance between points whose components are three consecutive values each:
-/// invariant under rotation of the axes.
+/// invariant under rotation of the axes. Infinite if one is not a number.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     let square =
         |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-    a.chunks(3)
-        .zip(b.chunks(3))
-        .map(square)
-        .fold(0.0, f64::max)
-        .sqrt()
+    largest(a.chunks(3).zip(b.chunks(3)).map(square)).sqrt()
 }
 
 #[cfg(test)]
@@ -219,6 +217,17 @@ mod tests {
             let told = best.error;
             assert!(error <= told && told < 1e3 * error, "{error} {told}");
         }
+    }
+
+    /// A value that could not be computed has no small error.
+    #[test]
+    fn what_is_not_a_number_is_far_away() {
+        assert_eq!(distance(&[0.0; 6], &[0.0, 0.0, 1.0, 0.0, 2.0, 0.0]), 2.0);
+        let lost = [0.0, 0.0, 1.0, f64::NAN, 0.0, 0.0];
+        assert_eq!(distance(&[0.0; 6], &lost), f64::INFINITY);
+        let mut table = table(|h| 1.0 + h * h, 2);
+        table.push(4, vec![f64::NAN, 0.0, 0.0]);
+        assert_eq!(table.best().map(|best| best.error), Some(f64::INFINITY));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::newton::{Equations, Newton, Work};
 use crate::relax::path::preference;
@@ -228,7 +229,7 @@ pub fn find_unstable_mode(
 pub fn displace(leaf: &DiscreteLeaf, state: &mut State, system: &System, sign: f64) {
     let (turn, displacement) = system.largest();
     let mut pushed = state.clone();
-    let step = sign * PUSH / turn.max(displacement);
+    let step = sign * PUSH / larger(turn, displacement);
     leaf.advance(state, system, step, &mut pushed);
     *state = pushed;
 }

@@ -80,6 +80,10 @@ fn relax_once(
         let found = options.modes;
         return Err(RelaxError::Modes { found });
     }
+    if options.mode_shapes && options.method.is_shooting() {
+        let found = options.modes;
+        return Err(RelaxError::ModesByShooting { found });
+    }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
             let shape_alone = options.modes == 0;

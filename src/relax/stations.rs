@@ -1,5 +1,6 @@
 //! A leaf at rest at other stations.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Leaf};
 use crate::relax::between::{Section, integrated_between, mean};
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
@@ -104,7 +105,7 @@ impl Equilibrium {
                 let error = if at_rest { next - station } else { 0.0 };
                 (points.iter().map(mean).collect(), error)
             });
-            between = between.max(error * leaf.scale.length);
+            between = larger(between, error * leaf.scale.length);
             for (&at, section) in points.iter().zip(&sections) {
                 for (j, fields) in section.iter().enumerate() {
                     rods[j].push(shape::node_of(&leaf, (j, at), fields));

@@ -231,7 +231,7 @@ fn write_columns(
     table.write_record(columns.split(','))?;
     for row in rows {
         let cell = |column: &str| match &row[column] {
-            Value::String(text) => text.clone(),
+            Value::String(text) => text_cell(text).into(),
             Value::Bool(yes) => yes.to_string(),
             Value::Number(count) if count.is_u64() => match row["seconds"].is_null() {
                 // Nothing was measured.

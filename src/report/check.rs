@@ -33,8 +33,11 @@ fn judgement(check: &Check) -> String {
     let allowed = format!("positions within {position}, rotations within {rotation} rad");
     let headline = headline(&check.verdict);
     match &check.verdict {
-        Verdict::Agree => format!("{headline}: {allowed}"),
-        Verdict::Differ => format!("{headline}: to agree, {allowed}"),
+        Verdict::Agree => match check.indices() {
+            Some(_) => format!("{headline}: {allowed}, the same index"),
+            None => format!("{headline}: {allowed}; their indices are not compared"),
+        },
+        Verdict::Differ => format!("{headline}: to agree, {allowed}, the same index"),
         Verdict::NotCompared(reason) => format!("{headline}: {reason}"),
     }
 }
@@ -60,9 +63,10 @@ fn results(check: &Check) -> Lines {
             lines.push(("", format!("{} by shooting", place(tip))));
         }
     }
-    let mut energy = significant(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
+    let digits = |energy: f64| as_accurate(relaxed, energy, energy);
+    let mut energy = digits(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
     if let Some(solution) = check.solution() {
-        energy += &format!(", {} by shooting", significant(solution.energy));
+        energy += &format!(", {} by shooting", digits(solution.energy));
     }
     lines.push(("energy", energy));
     lines
@@ -140,7 +144,7 @@ mod tests {
         let report = sample::check(1, 8, 0.1).report(Vec::new());
         for part in [
             "fan: 1 vein, relaxed and by shooting\n",
-            "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad\n",
+            "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad, the same index\n",
             "  shooting unstable equilibrium of index 2 (2 negative eigenvalues) in 20.00 ms\n",
             "at 1.000 of the length\n           rotations by ",
             "positions differ by more than both errors\n",

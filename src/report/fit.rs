@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::kit::*;
-use crate::study::{Fit, FitOutcome, FitParameter};
+use crate::study::{Fit, FitOutcome, FitParameter, FitResidual};
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;
@@ -52,11 +52,17 @@ impl Reported for Fit {
 }
 
 fn number(parameter: &FitParameter) -> String {
-    let end = |end: Option<f64>| end.map_or("?".into(), brief);
+    // The interval has two digits.
+    let error = match (parameter.low, parameter.high) {
+        (Some(low), Some(high)) => 0.05 * (high - low),
+        _ => 0.0,
+    };
+    let digits = |value: f64| brief(rounded_to(value, error));
+    let end = |end: Option<f64>| end.map_or("?".into(), digits);
     let (low, high) = (end(parameter.low), end(parameter.high));
-    let key = &parameter.key;
+    let (key, value) = (&parameter.key, digits(parameter.value));
     match parameter.determined {
-        true => format!("{key} = {} (95 %: {low} to {high})", brief(parameter.value)),
+        true => format!("{key} = {value} (95 %: {low} to {high})"),
         false => format!("{key} not determined (95 %: {low} to {high})"),
     }
 }
@@ -65,7 +71,11 @@ fn number(parameter: &FitParameter) -> String {
 pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
     let mut table = csv::Writer::from_writer(out);
     for residual in &fit.residuals {
-        table.serialize(residual)?;
+        let experiment = text_cell(&residual.experiment).into();
+        table.serialize(FitResidual {
+            experiment,
+            ..residual.clone()
+        })?;
     }
     table.flush()
 }

@@ -120,7 +120,15 @@ pub fn table(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::
 /// The rows alone, each a whole line.
 pub fn lines(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
     // The columns of the axes, then those of the row.
-    append_csv(rows.iter().map(|row| (request.texts(row.cell), row)), out)
+    let rows = rows.iter().map(|row| {
+        let detail = text_cell(&row.detail).into();
+        let row = MapRow {
+            detail,
+            ..row.clone()
+        };
+        (request.texts(row.cell), row)
+    });
+    append_csv(rows, out)
 }
 
 /// Reads the rows of a file. Header lines may repeat, as in concatenated files. An
@@ -176,7 +184,11 @@ fn row(
         return Err(format!("it has no cell {}", place.join(", ")));
     };
     match record.deserialize::<MapRow>(Some(header)) {
-        Ok(row) => Ok(MapRow { cell, ..row }),
+        Ok(row) => Ok(MapRow {
+            cell,
+            detail: text_of_cell(&row.detail).into(),
+            ..row
+        }),
         Err(error) => Err(match error.kind() {
             csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
             _ => error.to_string(),

@@ -23,8 +23,9 @@ impl Reported for Equilibrium {
         let mut lines = vec![("found", found(self))];
         lines.extend(self.path.as_ref().map(|path| ("path", way(path))));
         if let Some(saddle) = &self.stability.saddle {
-            let (index, energy) = (saddle.negative_eigenvalues, significant(saddle.energy));
-            let tip = point(saddle.tip.to_array(), decimals(self));
+            // It was seen on one grid.
+            let (index, energy) = (saddle.negative_eigenvalues, brief(saddle.energy));
+            let tip = point(saddle.tip.to_array(), decimals(self).min(DECIMALS));
             let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
             lines.push(("left", left));
         }
@@ -34,10 +35,12 @@ impl Reported for Equilibrium {
             if let [tip] = self.tips.as_slice() {
                 lines.push(("tip", point(tip.to_array(), decimals(self))));
             }
-            lines.push(("energy", significant(energy)));
+            lines.push(("energy", as_accurate(self, energy, energy)));
         }
         if let Some(reaction) = &self.reaction {
-            let force = reaction.force.to_array().map(significant).join(", ");
+            let size = reaction.force.length();
+            let force = reaction.force.to_array();
+            let force = force.map(|it| as_accurate(self, it, size)).join(", ");
             lines.push(("reaction", format!("({force}) on the holder of the tip")));
         }
         lines.extend(waves(self).map(|waves| ("waves", waves)));
@@ -131,17 +134,13 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
         let asked = equilibrium.stability.mode_shapes;
         return asked.then(|| "not known".into());
     };
-    let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
-    let list = |values: &mut dyn Iterator<Item = f64>| {
-        let listed: Vec<String> = values.take(MOST_MODES).map(brief).collect();
+    let unstable = |mode: &&Mode| mode.growth().is_some();
+    let list = |modes: &mut dyn Iterator<Item = &Mode>| {
+        let listed: Vec<String> = modes.take(MOST_MODES).map(rate).collect();
         listed.join(", ")
     };
-    let growth = list(&mut modes.iter().filter(unstable).filter_map(Mode::growth));
-    let frequencies = modes.iter().filter(|mode| !unstable(mode));
-    let frequencies = list(&mut frequencies.map(|mode| match mode.is_neutral() {
-        true => 0.0,
-        false => mode.frequency().unwrap_or_default(),
-    }));
+    let growth = list(&mut modes.iter().filter(unstable));
+    let frequencies = list(&mut modes.iter().filter(|mode| !unstable(mode)));
     let phrases = [
         ("growth rates", growth),
         ("lowest frequencies", frequencies),
@@ -152,7 +151,24 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
         .collect();
     let one_grid = modes.iter().any(|mode| mode.error.is_none());
     let note = if one_grid { " (on one grid)" } else { "" };
-    (!phrases.is_empty()).then(|| phrases.join("; ") + note)
+    let neutral = modes.iter().any(Mode::is_neutral);
+    let neutral = match neutral {
+        true => {
+            "; zero within its error: the leaf can move without resistance, or is at a bifurcation"
+        }
+        false => "",
+    };
+    (!phrases.is_empty()).then(|| phrases.join("; ") + note + neutral)
+}
+
+/// The growth rate or the frequency of a mode.
+fn rate(mode: &Mode) -> String {
+    let rate = mode.eigenvalue.abs().sqrt();
+    match mode.error {
+        _ if mode.is_neutral() => "0".into(),
+        Some(error) => brief(rounded_to(rate, 0.5 * error / rate)),
+        None => brief(rate),
+    }
 }
 
 /// How the tip moves when each number changes by 1 %, or by its unit if it is zero.
@@ -163,7 +179,9 @@ fn changes(equilibrium: &Equilibrium) -> Vec<String> {
             false => (0.01 * found.value, format!("1 % of {}", brief(found.value))),
         };
         let tips = found.tips.iter().map(|tip| (*tip * by).to_array());
-        let tips = tips.map(|tip| format!("({})", tip.map(brief).join(", ")));
+        let error = found.tip_error.unwrap_or(0.0) * by.abs();
+        let digits = |it: f64| brief(rounded_to(it, error));
+        let tips = tips.map(|tip| format!("({})", tip.map(digits).join(", ")));
         let tips: Vec<String> = tips.take(1).collect();
         format!("{}: by {what} the tip moves {}", found.key, tips.join(""))
     };
@@ -219,14 +237,19 @@ fn margin_lines(margin: &Margin) -> Vec<String> {
 
 /// A push under which stability is lost.
 fn destabilizing_push(margin: &Margin, push: &Push) -> String {
-    let at = force(margin, push.force.unwrap_or_default());
+    let error = push.error.unwrap_or(0.0);
+    let exact = push.force.unwrap_or_default();
+    let at = force(margin, rounded_to(exact, error));
     let then = match push.then {
         Some(Fate::BendsAside) => "makes it bend aside",
         Some(Fate::Snaps) | None => "snaps it",
     };
     let rest = (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip)));
-    let error = push.error.map(|error| format!(", within {}", bound(error)));
-    let weights = (push.per_weight).map(|part| format!(" ({} weights)", brief(part)));
+    let within = push.error.map(|error| format!(", within {}", bound(error)));
+    let weights = push.per_weight.map(|part| {
+        let part = rounded_to(part, part * error / exact);
+        format!(" ({} weights)", brief(part))
+    });
     let place = match margin.every_tip {
         true => "at every tip",
         false => "at the tip",
@@ -235,7 +258,7 @@ fn destabilizing_push(margin: &Margin, push: &Push) -> String {
         "a push of {at} {} {place} {then}{}{}{}",
         directions(margin, push),
         rest.unwrap_or_default(),
-        error.unwrap_or_default(),
+        within.unwrap_or_default(),
         weights.unwrap_or_default(),
     )
 }
@@ -250,7 +273,8 @@ fn stable_directions(margin: &Margin) -> Option<String> {
 }
 
 fn barrier(margin: &Margin, barrier: &Barrier) -> String {
-    let energy = with_unit(barrier.energy, margin.units.energy().as_deref());
+    let energy = rounded_to(barrier.energy, barrier.error.unwrap_or(0.0));
+    let energy = with_unit(energy, margin.units.energy().as_deref());
     let error = (barrier.error).map(|error| format!(" within {}", bound(error)));
     let lifted = barrier.height.map(|height| {
         let height = with_unit(height, margin.units.length.as_deref());
@@ -341,7 +365,7 @@ fn equilibrium_line(number: usize, found: &Found) -> String {
     let index = leaf.stability.negative_eigenvalues;
     let stability = index.map_or("of unknown stability".into(), stable_or_index);
     let tip = match &leaf.tips[..] {
-        [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
+        [tip] => format!(", tip {}", point(tip.to_array(), decimals(leaf))),
         _ => String::new(),
     };
     let within = match leaf.accuracy.error_estimate {
@@ -355,5 +379,6 @@ fn equilibrium_line(number: usize, found: &Found) -> String {
     };
     let starts = counted(found.starts, "start", "starts");
     let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
-    format!("{number:>2}. energy {energy:.10}: {stability}{tip}{within} ({starts}{plain})")
+    let energy = as_accurate(leaf, energy, energy);
+    format!("{number:>2}. energy {energy}: {stability}{tip}{within} ({starts}{plain})")
 }

@@ -72,6 +72,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
             ratio: 1e-10,
             displacement: vec![zero; rods],
         }),
+        unsharpened: None,
         work: bvp::Work::default(),
     };
     let shot = Shot {

@@ -1,5 +1,6 @@
 //! Layout of results: labelled lines for the console, rows for CSV.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
 use std::io::{self, Write};
@@ -22,6 +23,26 @@ pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     let names = files.iter().filter_map(|file| file.file_name());
     let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
     format!("{}: {}", folder.display(), names.join(", "))
+}
+
+/// What spreadsheets take for the beginning of a formula, which they run.
+const FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+
+/// Before a text spreadsheets take this for a sign that it is one.
+const TEXT: char = '\'';
+
+/// The cell of a text that comes from a name, such as that of an experiment.
+pub fn text_cell(text: &str) -> Cow<'_, str> {
+    match text.starts_with(FORMULA) && text.parse::<f64>().is_err() {
+        true => format!("{TEXT}{text}").into(),
+        false => text.into(),
+    }
+}
+
+/// The text in a cell.
+pub fn text_of_cell(cell: &str) -> &str {
+    let text = cell.strip_prefix(TEXT);
+    text.filter(|text| text_cell(text) == cell).unwrap_or(cell)
 }
 
 /// Writes rows as CSV without a header; each may be a tuple of tuples and arrays, whose
@@ -51,7 +72,10 @@ pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut rows: Vec<HashMap<String, String>> = Vec::new();
     for (file, status, json) in results {
         let Flat(mut cells) = serde_json::from_slice(json)?;
-        let head = [("file", file.clone()), ("exit_status", status.to_string())];
+        let head = [
+            ("file", text_cell(file).into()),
+            ("exit_status", status.to_string()),
+        ];
         cells.retain(|(name, _)| name != "exit_status");
         cells.splice(0..0, head.map(|(name, cell)| (name.to_string(), cell)));
         let mut after = 0;
@@ -114,7 +138,7 @@ impl<'de> Deserialize<'de> for Flat {
             }
 
             fn visit_str<E>(self, value: &str) -> Result<Flat, E> {
-                Cells::one(value)
+                Cells::one(text_cell(value))
             }
 
             fn visit_unit<E>(self) -> Result<Flat, E> {
@@ -160,4 +184,33 @@ impl<'de> Deserialize<'de> for Flat {
 /// The header of a table with these columns, which commas separate.
 pub fn header(columns: &str) -> Vec<u8> {
     format!("{columns}\n").into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_look_like_formulas_are_cells_of_text() {
+        let names = [
+            "=cmd|' /C calc'!A0",
+            "@SUM(1+1)",
+            "+1+1",
+            "-2+3",
+            "\t=1",
+            "rod",
+            "-2",
+            "'a",
+        ];
+        for name in names {
+            let cell = text_cell(name);
+            let runs = cell.starts_with(FORMULA) && cell.parse::<f64>().is_err();
+            assert!(!runs, "{cell}");
+            assert_eq!(text_of_cell(&cell), name);
+        }
+        let refused = br#"{ "scenario": "=1+1", "tolerance": -1e-6 }"#.to_vec();
+        let table = rows_of_json(&[("@a.toml".into(), 2, refused)]).unwrap();
+        let table = String::from_utf8(table).unwrap();
+        assert!(table.contains("'@a.toml,2,'=1+1,-1e-6"), "{table}");
+    }
 }

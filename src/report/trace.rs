@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::kit::*;
+use super::numbers;
 use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::study::{
@@ -32,7 +33,7 @@ impl Reported for Trace {
         let branches = self.branches.iter().enumerate();
         let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
         lines.extend(labelled("branch", branches));
-        lines.extend((self.law.iter()).flat_map(|law| labelled("law", law_lines(self, law))));
+        lines.extend(self.law.iter().map(|law| ("law", law_line(self, law))));
         let errors = self.branches.iter().flat_map(|branch| &branch.points);
         let errors = errors.filter_map(|point| point.error);
         lines.extend(errors.reduce(f64::max).map(|worst| {
@@ -74,20 +75,16 @@ fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<Strin
     lines
 }
 
-/// The fitted line of force against displacement, and Young's modulus from its slope.
-fn law_lines(trace: &Trace, law: &Law) -> Vec<String> {
+/// The fitted line of force against displacement.
+fn law_line(trace: &Trace, law: &Law) -> String {
     let unit = slope_unit(&trace.units);
-    let mut lines = vec![format!(
-        "force against displacement along {}: slope {:.6}{unit}, R² = {:.7}, off the line by {:.2} % at most",
+    format!(
+        "force against displacement along {}: slope {}{unit}, R² = {:.7}, off the line by {:.2} % at most",
         ['x', 'y', 'z'][law.axis],
-        law.slope,
+        brief(law.slope),
         law.r_squared,
         100.0 * law.deviation
-    )];
-    let length = law.length;
-    let young = |young| format!("Young's modulus {young:.6}, over a length of {length:.6}");
-    lines.extend(law.young.map(young));
-    lines
+    )
 }
 
 /// The unit of force per displacement after a blank, or nothing if it is not known.
@@ -109,18 +106,32 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
     let stability = stable_or_index(point.index);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
-            format!(", tip ({:.7}, {:.7}, {:.7})", tip.x, tip.y, tip.z)
+            let decimals = point.error.map_or(DECIMALS, decimals_within);
+            format!(", tip {}", numbers::point(tip.to_array(), decimals))
         }
         _ => String::new(),
     };
     let reaction = point.reaction.map(|force| {
-        let [x, y, z] = force.to_array().map(short);
+        let error = trace.tolerance * force.length();
+        let [x, y, z] = force.to_array().map(|it| short(rounded_to(it, error)));
         format!(", reaction ({x}, {y}, {z})")
     });
     let reaction = reaction.unwrap_or_default();
-    let value = trace.keys.text(point.value);
+    let value = value_of(trace, point);
     format!("{value}: {stability}{tip}{reaction}")
 }
+
+/// The number that varies at a point: as it was prescribed, or with the digits that its error
+/// leaves.
+fn value_of(trace: &Trace, point: &TracePoint) -> String {
+    match point.value_error {
+        Some(error) => known(point.value, error),
+        None => trace.keys.text(point.value),
+    }
+}
+
+/// Decimals of a tip without an error.
+const DECIMALS: usize = 3;
 
 fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
     let what = match point.kind {
@@ -132,7 +143,7 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
         Some(error) => format!(", within {}", power_of_ten(error)),
         None => String::new(),
     };
-    let (value, after) = (trace.keys.text(point.value), point.index);
+    let (value, after) = (value_of(trace, point), point.index);
     format!("{what} at {value}{within}: index {before} to {after}")
 }
 
@@ -280,11 +291,11 @@ pub fn is_special(point: &BoundaryPoint) -> bool {
 }
 
 fn place_in_plane(boundary: &Boundary, point: &BoundaryPoint) -> String {
-    let number = |i: usize| {
-        let value = boundary.keys[i].text(point.values[i]);
-        match point.errors[i] {
-            0.0 => value,
-            error => format!("{value} within {}", power_of_ten(error)),
+    let number = |i: usize| match point.errors[i] {
+        0.0 => boundary.keys[i].text(point.values[i]),
+        error => {
+            let value = known(point.values[i], error);
+            format!("{value} within {}", power_of_ten(error))
         }
     };
     format!("({}, {})", number(0), number(1))

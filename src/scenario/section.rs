@@ -116,6 +116,11 @@ impl Section {
         }
     }
 
+    /// Its larger side, where that is largest.
+    fn largest_side(&self) -> f64 {
+        self.width.max_abs().max(self.thickness.max_abs())
+    }
+
     /// A property at a fraction of the length.
     pub fn at(&self, property: Property, sigma: f64) -> f64 {
         let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
@@ -231,6 +236,22 @@ impl Radii {
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
         Some((section.area(sigma) / std::f64::consts::PI).sqrt())
+    }
+}
+
+impl Radii {
+    /// The larger side of the section of a rod, where that is largest.
+    pub fn largest_side(&self, rod: usize) -> Option<f64> {
+        self.0.get(rod).map(|section| section.largest_side())
+    }
+
+    /// Whether the sections have a mass.
+    pub fn have_mass(&self) -> bool {
+        !self.0.is_empty()
+            && self
+                .0
+                .iter()
+                .all(|section| section.mass_density.min() > 0.0)
     }
 }
 

@@ -38,7 +38,8 @@ pub struct CheckOptions {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Both find the same shape within the tolerance.
+    /// Both find the same shape within the tolerance and, where both know it, the same number of
+    /// negative eigenvalues.
     Agree,
     /// They do not.
     Differ,
@@ -166,10 +167,20 @@ impl Check {
         let same = |found: Difference| {
             found.position <= self.allowed() && found.rotation <= self.allowed_rotation()
         };
-        match self.difference.is_some_and(same) {
+        let contradict = self
+            .indices()
+            .is_some_and(|[relaxed, shot]| relaxed != shot);
+        match self.difference.is_some_and(same) && !contradict {
             true => Verdict::Agree,
             false => Verdict::Differ,
         }
+    }
+
+    /// The numbers of negative eigenvalues of the relaxed leaf and of the boundary-value solution,
+    /// if both are known.
+    pub fn indices(&self) -> Option<[usize; 2]> {
+        let relaxed = self.relaxed.stability.negative_eigenvalues;
+        Some([relaxed?, self.shot.as_ref()?.negative_eigenvalues?])
     }
 
     /// The boundary-value solution, if there is one.
@@ -267,7 +278,10 @@ fn shoot(
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
-            Ok(solution) => index_at(scenario, grid, &solution.stations, &solution.rods),
+            Ok(solution) => {
+                let shape = (&solution.stations[..], &solution.rods[..]);
+                index_at(scenario, grid, shape, solution.error.position)
+            }
             Err(_) => None,
         },
         found,
@@ -321,6 +335,23 @@ mod tests {
         assert_eq!(twisted.verdict, Verdict::Differ);
         let place = Place { rod: 2, sigma: 0.5 };
         assert_eq!(twisted.farthest(Quantity::Rotation), Some(place));
+    }
+
+    /// Both are stable: an index of one of them that is another contradicts that, one that is not
+    /// known does not.
+    #[test]
+    fn another_index_is_a_difference() {
+        let with_index = |index: Option<usize>| {
+            let mut check = fan();
+            assert_eq!(check.indices(), Some([0, 0]));
+            if let Some(shot) = &mut check.shot {
+                shot.negative_eigenvalues = index;
+            }
+            check.compare();
+            check.verdict
+        };
+        assert_eq!(with_index(Some(2)), Verdict::Differ);
+        assert_eq!(with_index(None), Verdict::Agree);
     }
 
     #[test]

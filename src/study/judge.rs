@@ -148,12 +148,12 @@ pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
 }
 
 /// Number of negative eigenvalues of the equilibrium near a shape given at the
-/// nodes of `grid` and possibly at other stations.
+/// nodes of `grid` and possibly at other stations, within `error`.
 pub fn index_at(
     scenario: &Scenario,
     grid: Grid,
-    stations: &[f64],
-    rods: &[RodShape],
+    (stations, rods): (&[f64], &[RodShape]),
+    error: f64,
 ) -> Option<usize> {
     let kept: Vec<usize> = (common(stations, grid.sigma()).into_iter())
         .map(|(i, _)| i)
@@ -163,7 +163,7 @@ pub fn index_at(
         nodes: kept.iter().map(|&i| rod.nodes[i]).collect(),
     };
     let rods: Vec<RodShape> = rods.iter().map(at_nodes).collect();
-    index_near(scenario, grid, &rods)
+    index_near(scenario, grid, &rods, error)
 }
 
 /// Error estimate of a leaf on one grid, in units of length: from the

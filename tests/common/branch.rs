@@ -35,7 +35,6 @@ pub fn request(base: Base, vary: &str, tolerance: f64, most_points: usize) -> Tr
         segments: None,
         tolerance: Some(tolerance),
         most_points,
-        cross_section: None,
     }
 }
 

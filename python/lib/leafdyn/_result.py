@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import secrets
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
@@ -93,9 +94,7 @@ class Result:
         for name in names:
             if kind(name) in kinds:
                 file = place / name
-                draft = place / f".{name}.{os.getpid()}.part"
-                draft.write_bytes(self._files.contents(name))
-                os.replace(draft, file)
+                _write(file, self._files.contents(name))
                 written.append(file)
         return written
 
@@ -114,6 +113,18 @@ class Result:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(read_only(state))
+
+
+def _write(file: Path, contents: bytes) -> None:
+    # A name that cannot be predicted and is new: nothing that stands there, such as a link, is opened.
+    draft = file.with_name(f".{file.name}.{secrets.token_hex(8)}.part")
+    try:
+        with draft.open("xb") as out:
+            out.write(contents)
+        os.replace(draft, file)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
 
 
 class Table(Result):
@@ -175,7 +186,7 @@ TEXTS = ("detail",)
 
 def _column(cells: tuple[str, ...], name: str) -> NDArray[Any]:
     if name in TEXTS:
-        return np.array(cells, dtype=str)
+        return np.array([_text(cell) for cell in cells], dtype=str)
     if cells and all(cell in ("true", "false") for cell in cells):
         return np.array([cell == "true" for cell in cells])
     for number in (int, float):
@@ -183,4 +194,9 @@ def _column(cells: tuple[str, ...], name: str) -> NDArray[Any]:
             return np.array([number(cell or ("nan" if number is float else "")) for cell in cells], dtype=number)
         except (ValueError, OverflowError):
             pass
-    return np.array(cells, dtype=str)
+    return np.array([_text(cell) for cell in cells], dtype=str)
+
+
+def _text(cell: str) -> str:
+    # Before a text that a spreadsheet would run as a formula there is a mark.
+    return cell[1:] if cell[:1] == "'" and cell[1:2] in ("=", "+", "-", "@", "\t", "\r") else cell

@@ -116,7 +116,6 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
-    cross_section: float | None = None,
     progress: Progress = None,
 ) -> Trace: ...
 
@@ -132,7 +131,6 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
-    cross_section: float | None = None,
     progress: Progress = None,
 ) -> Boundary: ...
 
@@ -147,7 +145,6 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
-    cross_section: float | None = None,
     progress: Progress = None,
 ) -> Trace | Boundary:
     """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way. With
@@ -161,8 +158,6 @@ def trace(
         Also follow the branches that cross.
     points
         Most points of a branch, or of a curve to either side.
-    cross_section
-        Area of the leaf's cross-section: gives Young's modulus where a tip force varies.
 
     The others are those of `relax`.
 
@@ -206,7 +201,7 @@ def trace(
     True
     """
     whole(segments=segments, points=points)
-    numbers(tolerance=tolerance, cross_section=cross_section)
+    numbers(tolerance=tolerance)
     switches(switch=switch, keep_unstable=keep_unstable)
     keys = texts("vary", vary, "load.gravity[2]=-1..-2")
     if not isinstance(vary, str) and len(keys) != 2:
@@ -218,7 +213,6 @@ def trace(
         "segments": segments,
         "tolerance": tolerance,
         "points": points,
-        "cross_section": cross_section,
     }
     found: Trace | Boundary
     with reporter(progress) as heard:

@@ -9,6 +9,7 @@ use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::branch::refined::Refined;
+use crate::largest::larger;
 use crate::leaf::Field;
 
 /// Step of the central differences for the derivative of an eigenvalue.
@@ -311,7 +312,7 @@ impl SingularPoint {
             });
             for i in 0..2 {
                 let most = (dot(&rates[i], &rates[i]) * dot(&mode, &mode)).sqrt();
-                largest = largest.max(forcing[i].abs() / most.max(slope));
+                largest = larger(largest, forcing[i].abs() / most.max(slope));
             }
             let size = forcing[0].hypot(forcing[1]);
             free = [-forcing[1] / size, forcing[0] / size];

@@ -8,6 +8,7 @@ use super::special::Special;
 use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 use crate::branch::states::stiffest_condensed;
+use crate::largest::larger;
 use crate::leaf::State;
 use crate::relax::richardson::Richardson;
 
@@ -124,8 +125,8 @@ impl Table {
             self.amplified = AMPLIFIED;
         }
         for i in 0..2 {
-            self.rounded[i] = self.rounded[i].max(rounding[i]);
-            self.softened[i] = self.softened[i].max(numbers.errors[i]);
+            self.rounded[i] = larger(self.rounded[i], rounding[i]);
+            self.softened[i] = larger(self.softened[i], numbers.errors[i]);
         }
         let tips = state.tips().flat_map(|tip| tip.to_array());
         self.tips.push(state.segments(), tips.collect());

@@ -352,7 +352,7 @@ mod tests {
         map.rows
             .retain(|row| row.cell < 4 && row.method == MapMethod::default());
         let curves = |svg: &str| -> Vec<usize> {
-            let groups = svg.split("<g id=\"curves\">").skip(1);
+            let groups = svg.split("<g class=\"curves\">").skip(1);
             let groups = groups.map(|group| group.split("</g>").next().unwrap());
             let lines = groups.map(|group| group.matches("stroke-width=\"1.6\"").count());
             lines.collect()

@@ -60,7 +60,7 @@ class Diagram {
       this.add("text", { x: left - 6, y: y + 4, "text-anchor": "end" }, tickText(value, rising.decimals, rising.step));
     }
     const across = ticks(this.x[0], this.x[1], chart.log ? Math.min(5, this.x[1] - this.x[0]) : 5);
-    const sign = Math.min(...this.curves.flatMap((curve) => curve.x)) < 0 ? -1 : 1;
+    const sign = this.curves.some((curve) => curve.x.some((x) => x < 0)) ? -1 : 1;
     for (const value of across.values) {
       const x = left + ((value - this.x[0]) / (this.x[1] - this.x[0])) * (right - left);
       this.add("path", { d: `M${x} ${top}V${bottom}`, stroke: "var(--grid)" });

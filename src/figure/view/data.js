@@ -34,6 +34,13 @@ function decode(leaf) {
   return { ...leaf, stations, points, state };
 }
 
+/// The largest size of many numbers. (A function takes only so many arguments as its stack holds.)
+function largestSize(numbers) {
+  let largest = 0;
+  for (const number of numbers) largest = Math.max(largest, Math.abs(number));
+  return largest;
+}
+
 const [lengthUnit, forceUnit] = view.units;
 const momentUnit = lengthUnit && forceUnit ? `${forceUnit} ${lengthUnit}` : null;
 const withUnit = (name, unit) => (unit ? `${name} / ${unit}` : name);

@@ -105,7 +105,7 @@ function inMode(mode, amplitude) {
   if (!mode.decoded) {
     mode.decoded = new Float32Array(bytes(mode.rest));
     mode.by = new Float32Array(bytes(mode.displacement));
-    const largest = Math.max(...mode.by.map(Math.abs), 1e-30);
+    const largest = Math.max(largestSize(mode.by), 1e-30);
     mode.size = Math.min(1, (0.2 * space.box.extent) / largest);
   }
   const points = mode.decoded.map((x, i) => x + amplitude * mode.size * mode.by[i]);

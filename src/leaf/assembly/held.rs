@@ -1,6 +1,7 @@
 //! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
 //! or at a pinned or clamped tip.
 
+use super::component;
 use crate::lanes::Four;
 use crate::leaf::chain::{Chain, Increments, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
@@ -70,8 +71,8 @@ impl DiscreteLeaf {
     /// rod `j`, without those that the mirror image balances.
     pub(super) fn unbalanced_residual(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
         match self.leaf.in_plane(j) {
-            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
-            false => (force.abs().max_element(), moment.abs().max_element()),
+            true => (component(force.with_y(0.0)), moment.y.abs()),
+            false => (component(force), component(moment)),
         }
     }
 }

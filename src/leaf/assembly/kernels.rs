@@ -1,6 +1,7 @@
 //! The loops over the segments of a group of rods.
 
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors};
+use crate::largest::larger;
 use crate::leaf::chain::{Increments, TURNS, lanes_of};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
@@ -108,7 +109,7 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
         for i in 0..n {
             let (element, sections) = rods.element(simd, i, part);
             energy = energy + element.strain_energy(&sections);
-            squared_turn = squared_turn.max(element.squared_turn());
+            squared_turn = squared_turn.larger(element.squared_turn());
             let gradient = on_nodes(element.condensed(&sections));
             if i > 0 {
                 for r in 0..UNKNOWNS {
@@ -162,7 +163,7 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
             *sums = Sums::default();
         }
         sums.energy += energy.where_positive(active, zero).sum();
-        sums.turn = sums.turn.max(squared_turn.largest().sqrt());
+        sums.turn = larger(sums.turn, squared_turn.largest().sqrt());
     }
 }
 

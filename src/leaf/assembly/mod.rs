@@ -12,6 +12,7 @@ use super::discrete::DiscreteLeaf;
 use super::state::State;
 use super::system::{Sums, System, each_group, rods_of};
 use crate::lanes::{GROUP, run};
+use crate::largest::{larger, largest};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -49,7 +50,7 @@ impl DiscreteLeaf {
         let mut total = Sums::default();
         for group in &system.groups {
             total.energy += group.sums.energy;
-            total.turn = total.turn.max(group.sums.turn);
+            total.turn = larger(total.turn, group.sums.turn);
         }
         total
     }
@@ -139,11 +140,11 @@ impl DiscreteLeaf {
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
                 if i > 0 {
                     let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
-                    largest = largest.max(forces).max(moments);
+                    largest = larger(largest, larger(forces, moments));
                 }
                 force = self.load(state, j, i + 1).0 - g_x;
                 moment = -g_b;
-                largest = largest.max(segment.gap.abs().max_element());
+                largest = larger(largest, component(segment.gap));
             }
             moment += self.tip_moment();
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
@@ -152,14 +153,14 @@ impl DiscreteLeaf {
                 Some(held) if held.clamps.is_some() => continue,
                 Some(_) => {}
                 None if self.leaf.joined() => tip += force,
-                None => largest = largest.max(unbalanced_force),
+                None => largest = larger(largest, unbalanced_force),
             }
-            largest = largest.max(unbalanced_moment);
+            largest = larger(largest, unbalanced_moment);
         }
         if self.leaf.mirrored {
             tip.y = 0.0;
         }
-        largest.max(tip.abs().max_element())
+        larger(largest, component(tip))
     }
 
     /// Potential energy of a state: elastic, of the coupling, and of the loads.
@@ -176,4 +177,9 @@ impl DiscreteLeaf {
         }
         energy
     }
+}
+
+/// The largest component of a vector.
+fn component(vector: DVec3) -> f64 {
+    largest(vector.abs().to_array())
 }

@@ -13,7 +13,8 @@ pub use solve::Solved;
 use super::chain::{Chain, Increments, Masses, TipFactor, group_and_lane, of_lane, set_lane};
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
-use crate::lanes::{Four, GROUP, arch};
+use crate::lanes::{Four, GROUP, widest_arch};
+use crate::largest::larger;
 use glam::{DMat3, DVec3};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -123,7 +124,7 @@ impl System {
             segments: n,
             weights: (1..=n).map(|i| leaf.moving_weight(i)).collect(),
             coupling_weights: (1..=n).map(|i| leaf.coupling_weight(i)).collect(),
-            arch: arch(),
+            arch: widest_arch(),
             tip: None,
             gaps,
             moment: DVec3::ZERO,
@@ -294,17 +295,18 @@ impl System {
             .collect()
     }
 
-    /// Largest rotation and largest displacement of the last solution.
+    /// Largest rotation and largest displacement of the last solution; infinite if one is not a
+    /// number.
     pub fn largest(&self) -> (f64, f64) {
         let mut largest = [Four::default(); 2];
         for increment in self.groups.iter().flat_map(|group| &group.solution) {
             for c in 0..6 {
                 for (most, value) in largest[c / 3].0.iter_mut().zip(&increment[c].0) {
-                    *most = most.max(value.abs());
+                    *most = larger(*most, value.abs());
                 }
             }
         }
-        let [turn, shift] = largest.map(|four| four.0.into_iter().fold(0.0, f64::max));
+        let [turn, shift] = largest.map(|four| crate::largest::largest(four.0));
         (turn, shift)
     }
 

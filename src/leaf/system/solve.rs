@@ -23,6 +23,18 @@ pub enum Solved {
     Indefinite(usize),
     /// The iteration limit was reached.
     TooSlow(usize),
+    /// The matrix of a rod under a dead moment is singular.
+    Singular,
+}
+
+impl Solved {
+    /// The number of iterations.
+    pub fn iterations(self) -> usize {
+        match self {
+            Solved::Yes(count) | Solved::Indefinite(count) | Solved::TooSlow(count) => count,
+            Solved::Singular => 1,
+        }
+    }
 }
 
 impl System {
@@ -78,10 +90,10 @@ impl System {
             for group in &mut self.groups {
                 group.solution.copy_from_slice(&group.z);
             }
-            if self.moment != DVec3::ZERO {
-                self.correct_for_moment();
-            }
-            return Solved::Yes(1);
+            return match self.moment == DVec3::ZERO || self.correct_for_moment() {
+                true => Solved::Yes(1),
+                false => Solved::Singular,
+            };
         }
 
         let mut tip_p = tip_z;
@@ -245,8 +257,9 @@ impl System {
 
     /// A dead moment M is not conservative in three dimensions: the derivative of the tip's
     /// moment balance in spatial increments gains -[M]/2, which is skew. It has rank two at
-    /// one node and is included by the Sherman-Morrison-Woodbury formula.
-    fn correct_for_moment(&mut self) {
+    /// one node and is included by the Sherman-Morrison-Woodbury formula. False if the matrix
+    /// with it is singular.
+    fn correct_for_moment(&mut self) -> bool {
         use nalgebra::{Matrix3, Vector3};
         let (last, arch) = (self.segments - 1, self.arch);
         let group = &mut self.groups[0];
@@ -266,16 +279,20 @@ impl System {
         let columns = axes.map(|axis| solve(group, axis));
         let small = Matrix3::identity() + skew * Matrix3::from_columns(&columns);
         let Some(inverse) = small.try_inverse() else {
-            return;
+            return false;
         };
         let turn = Vector3::from_fn(|c, _| group.solution[last][c].0[0]);
         let moment: Vector3<f64> = inverse * (skew * turn);
+        if !moment.iter().all(|component| component.is_finite()) {
+            return false;
+        }
         solve(group, moment.into());
         for (solution, z) in group.solution.iter_mut().zip(&group.z) {
             for c in 0..6 {
                 solution[c].0[0] -= z[c].0[0];
             }
         }
+        true
     }
 }
 

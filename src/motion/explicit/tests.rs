@@ -1,5 +1,4 @@
 use super::*;
-use crate::lanes;
 use crate::leaf::{Grid, Leaf};
 use crate::relax::start;
 use crate::scenario::Scenario;
@@ -100,7 +99,12 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
     // Of many segments, differences of larger forces are left.
     let rounding = 1e-14 * n.max(100) as f64;
     let allowed = rounding * largest.fold(0.0, f64::max);
-    for arch in [widest_arch(), lanes::arch(), Arch::Scalar] {
+    let narrower = match widest_arch() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Arch::V3(*simd),
+        arch => arch,
+    };
+    for arch in [widest_arch(), narrower, Arch::Scalar] {
         let mut explicit = explicit(leaf.clone(), &state);
         explicit.arch = arch;
         explicit.set_damping(0.0);

@@ -45,6 +45,7 @@ impl SemiImplicit {
         };
         self.solver
             .solve(&mut self.system, 0.0, None, accuracy, &mut uncounted)
+            .is_ok()
     }
 
     /// Adds the solved increments to the trial.

@@ -13,7 +13,8 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, Sums, System};
 use crate::newton::{
-    Equations, Newton, Stalled, Stop, Work, at_saddle, cg_tolerance, converged, satisfies_lengths,
+    Equations, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance, converged,
+    satisfies_lengths,
 };
 use crate::relax::methods::Relaxation;
 use crate::relax::methods::damped_motion::Motion;
@@ -221,8 +222,10 @@ impl Relaxation<'_> {
                 None => (leaf.neutral_shift(), None),
             };
             let (solver, work) = (&mut self.solver, &mut *self.work);
-            if solver.solve(system, shift, inertia, tolerance, work) {
-                return Ok(());
+            match solver.solve(system, shift, inertia, tolerance, work) {
+                Ok(()) => return Ok(()),
+                Err(Unsolved::Memory) => return Err(Stop::Memory),
+                Err(Unsolved::Indefinite) => {}
             }
             if motion.resting {
                 return Err(Stop::Saddle);

@@ -147,7 +147,8 @@ pub fn shoot(
             accuracy.residual = Some(solution.defect);
             accuracy.error_estimate = Some(solution.error.position);
             energy = Some(solution.energy);
-            index = index_near(scenario, grid, &at_own(&own, &stations, &solution.rods));
+            let rods = at_own(&own, &stations, &solution.rods);
+            index = index_near(scenario, grid, &rods, solution.error.position);
             let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
             (outcome, solution.work, solution.rods)
         }
@@ -205,7 +206,10 @@ fn outcome_of_solution(
     let (outcome, remark) = match index {
         _ if solution.error.position > tolerance * longest(&scenario.rods) => (
             Outcome::ToleranceNotReached,
-            Some("double precision does not carry more through this leaf: ask for a larger tolerance".into()),
+            Some(match &solution.unsharpened {
+                Some(reason) => format!("this is the best solution found; with smaller local errors {reason}"),
+                None => "double precision does not carry more through this leaf: ask for a larger tolerance".into(),
+            }),
         ),
         Some(1..) => (
             Outcome::Saddle,

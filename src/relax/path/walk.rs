@@ -3,6 +3,7 @@
 
 use super::loading::Loading;
 use super::{Event, Happening, Stage};
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{Definite, Equations, Newton, Stop, Work};
@@ -303,5 +304,5 @@ impl<'w> Walk<'w> {
 pub fn distance(a: &State, b: &State) -> f64 {
     let turns = a.q.iter().zip(&b.q);
     let turns = turns.map(|(a, b)| rotation::log(*b * a.conjugate()).length());
-    turns.fold(a.shift_to(b), f64::max)
+    turns.fold(a.shift_to(b), larger)
 }

@@ -1,5 +1,6 @@
 //! The linear response of a settled leaf to forces, and to changes of its parameters.
 
+use crate::largest::largest;
 use crate::leaf::{
     DiscreteLeaf, Field, Forces, LeafRate, Response, Solved, SparseFactor, SparsePattern, State,
     System,
@@ -129,7 +130,7 @@ fn response(
         let increments = solve(&rhs)?;
         leaf.carried(segments, &increments, &mut gaps, &mut response.carried);
         let all = increments.iter().flatten().flatten();
-        let largest = all.fold(0.0_f64, |most, increment| most.max(increment.abs()));
+        let largest = largest(all.map(|increment| increment.abs()));
         if correction == 0 {
             first = largest;
             response.nodes = increments;

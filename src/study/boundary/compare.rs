@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::known::{IMAGES, image, through};
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
+use crate::largest::largest;
 
 /// Points closer than this part of both ranges are merged: their errors would dominate the
 /// slopes of interpolating polynomials.
@@ -144,12 +145,12 @@ impl Edge {
             .tips
             .windows(2)
             .map(|pair| distance(&pair[0], &pair[1]));
-        off < NEAR + 0.5 * steps.fold(0.0, f64::max)
+        off < NEAR + 0.5 * largest(steps)
     }
 }
 
 /// The largest distance between corresponding tips.
 fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
-    distances.fold(0.0, f64::max)
+    largest(distances)
 }

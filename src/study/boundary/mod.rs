@@ -53,10 +53,6 @@ impl BoundaryRequest {
             let why = format!("map: give from 1 to {most} cells along each number, as 16x16");
             return Err(TraceError::Option(why));
         }
-        if self.trace.cross_section.is_some() {
-            let why = "cross-section: Young's modulus is that of a branch; vary one number";
-            return Err(TraceError::Option(why.into()));
-        }
         Ok(())
     }
 }

@@ -85,6 +85,7 @@ impl Serialize for Shot {
                 Reason::NoConvergence { .. } => ("no-convergence", None, *work),
                 Reason::Unbounded { .. } => ("unbounded", None, *work),
                 Reason::TooMuch(_) => ("too-much-memory", None, *work),
+                Reason::OutOfTime => ("out-of-time", None, *work),
             },
         };
         Keys {

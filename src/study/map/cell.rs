@@ -166,6 +166,7 @@ impl<'a> Cell<'a> {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
                 Reason::TooMuch(_) => MapOutcome::Refused,
+                Reason::OutOfTime => MapOutcome::OutOfTime,
                 _ => MapOutcome::NotConverged,
             };
             let way = match failure.part {
@@ -188,7 +189,12 @@ impl<'a> Cell<'a> {
             return Err((MapOutcome::NotConverged, known));
         }
         Ok(Answer {
-            index: index_at(self.scenario, grid, &answer.stations, &answer.rods),
+            index: index_at(
+                self.scenario,
+                grid,
+                (&answer.stations, &answer.rods),
+                answer.error(),
+            ),
             remark: Some(note),
             ..answer
         })

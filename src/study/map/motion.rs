@@ -1,6 +1,7 @@
 //! Explicit motion with one time step, stable or not: the answer of a plain simulation
 //! of the damped leaf.
 
+use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Stopped};
@@ -8,6 +9,7 @@ use crate::relax::{self, Outcome, RelaxError, Work, index_near, shape_of, start}
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, SAME_LEAF, fine_grid, grid_error};
 use crate::undulation::Undulation;
+use glam::DVec3;
 
 use super::row::{Found, MapOutcome};
 use crate::study::vary::{Knobs, Varied};
@@ -69,15 +71,18 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         }
     }
     let end = motion.snapshot();
-    let speeds = (end.velocity.iter()).map(|v| v.linear.length().max(v.angular.length()));
-    let fastest = speeds.fold(0.0, f64::max);
-    if fastest.is_nan() || fastest > tolerance {
+    let speeds = end
+        .velocity
+        .iter()
+        .map(|v| [v.linear, v.angular].map(DVec3::length));
+    let fastest = largest(speeds.flatten());
+    if fastest > tolerance {
         let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
         return failed(MapOutcome::NotConverged, moves);
     }
     let rods = shape_of(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
-    let index = index_near(scenario, grid.clone(), &rods);
-    if index.is_none() && leaf.loads.tip_moment == glam::DVec3::ZERO {
+    let index = index_near(scenario, grid.clone(), &rods, SAME_LEAF * leaf.scale.length);
+    if index.is_none() && leaf.loads.tip_moment == DVec3::ZERO {
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;

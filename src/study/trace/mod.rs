@@ -39,9 +39,6 @@ pub struct TraceRequest {
     pub tolerance: Option<f64>,
     /// Largest number of points of a branch.
     pub most_points: usize,
-    /// Area of the leaf's cross-section, in the scenario's units, for an
-    /// effective Young's modulus.
-    pub cross_section: Option<f64>,
 }
 
 /// Why a trace cannot be made.
@@ -93,12 +90,6 @@ impl TraceRequest {
         }
         if self.most_points < 2 {
             let why = format!("points {}: must be 2 or more", self.most_points);
-            return Err(TraceError::Option(why));
-        }
-        if let Some(area) = self.cross_section
-            && !(area > 0.0 && area.is_finite())
-        {
-            let why = format!("cross-section {area:?}: must be greater than 0");
             return Err(TraceError::Option(why));
         }
         Ok(())

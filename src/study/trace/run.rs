@@ -180,7 +180,7 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
         _ => None,
     });
     let points: Option<Vec<(f64, DVec3)>> = points.collect();
-    Law::of(*axis, &points?, request.cross_section)
+    Law::of(*axis, &points?)
 }
 
 /// Data common to all branches.
