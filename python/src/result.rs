@@ -278,10 +278,9 @@ impl Leaf {
     /// Displacements and rotations of the modes on the finest grid.
     fn mode_shapes<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 2]> {
         let modes = self.found.stability.modes.as_deref().unwrap_or_default();
-        let (rods, nodes) = match modes.first() {
-            Some(mode) => (mode.displacement.len(), mode.displacement[0].len()),
-            None => (self.found.rod_count, 0),
-        };
+        let shape = modes.first().map(|mode| &mode.displacement);
+        let rods = shape.map_or(self.found.rod_count, Vec::len);
+        let nodes = shape.and_then(|rods| rods.first()).map_or(0, Vec::len);
         let of = |shape: fn(&Mode) -> &Vec<Vec<_>>| {
             let vectors = modes.iter().flat_map(shape).flatten().copied();
             array(py, flat(vectors), &[modes.len(), rods, nodes, 3])

@@ -1,6 +1,8 @@
 //! One scenario of a request, and the delivery of its result.
 
+use std::any::Any;
 use std::fmt::Display;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 use crate::files::{self, Document, Selection, Written};
@@ -41,6 +43,24 @@ pub struct Delivered {
     pub(super) json: Vec<u8>,
     /// Why its files could not be written.
     pub(super) error: Option<String>,
+}
+
+/// Runs a verb on a scenario. A panic, which is an error of the program, fails this scenario alone.
+pub fn attempt(
+    job: &Job,
+    run: impl Fn(&Job) -> Result<Delivered, Refusal>,
+) -> Result<Delivered, Refusal> {
+    // What a panic leaves half done is dropped with the job; files are complete or absent.
+    let done = catch_unwind(AssertUnwindSafe(|| run(job)));
+    done.unwrap_or_else(|cause| Err(format!("{}: {}", job.file, program_error(&*cause)).into()))
+}
+
+/// What a panic says.
+fn program_error(cause: &(dyn Any + Send)) -> String {
+    let text = (cause.downcast_ref::<&str>().copied())
+        .or_else(|| cause.downcast_ref::<String>().map(String::as_str));
+    let cause = text.unwrap_or("no cause is known");
+    format!("an error of the program, not of the scenario, ended the run: {cause}")
 }
 
 impl Job {

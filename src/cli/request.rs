@@ -20,7 +20,7 @@ use crate::scenario::Entries;
 use crate::study::Base;
 use crate::words::{UnknownWord, former};
 
-use super::job::{Delivered, Job};
+use super::job::{Delivered, Job, attempt};
 use super::progress::{ProgressLine, fraction_of};
 use super::{Refusal, Status, name_options, note, refuse, show, show_report};
 
@@ -121,7 +121,8 @@ impl Request {
         self.check_scenarios::<R>(traits, &selection)?;
         let job = |file: &Path| self.open::<R>(file, traits, &selection);
         if let [file] = self.scenarios.as_slice() {
-            let done = run(&job(file)?).map_err(|refusal| self.as_typed(traits, refusal))?;
+            let done = attempt(&job(file)?, &run);
+            let done = done.map_err(|refusal| self.as_typed(traits, refusal))?;
             match self.json {
                 true => show(&done.json)?,
                 false => show_report(&done.report)?,
@@ -143,8 +144,9 @@ impl Request {
         let line = Mutex::new(ProgressLine::new("scenarios", true));
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
-            let done =
-                job.and_then(|job| run(&job).map_err(|refusal| self.as_typed(traits, refusal)));
+            let done = job.and_then(|job| {
+                attempt(&job, &run).map_err(|refusal| self.as_typed(traits, refusal))
+            });
             let done = done.map_err(|refusal| name_options(refusal).to_string());
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
@@ -342,4 +344,53 @@ fn standard_input() -> Result<String, Refusal> {
         .take(crate::scenario::MOST_BYTES + 1)
         .read_to_end(&mut bytes)?;
     Ok(crate::scenario::utf8(bytes, "standard input")?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::Equilibrium;
+    use clap::Parser;
+    use std::fs;
+
+    #[derive(Parser)]
+    struct Verb {
+        #[command(flatten)]
+        request: Request,
+    }
+
+    /// Whichever of several scenarios ends in a panic, the table has a row for each.
+    #[test]
+    fn a_panic_fails_its_scenario_alone() {
+        const LEAF: &str = include_str!("../../scenarios/paper/fig13.toml");
+        for parallel in [true, false] {
+            let folder = tempfile::tempdir().unwrap();
+            let file = |name: &str| folder.path().join(format!("{name}.toml"));
+            let (names, out) = (["first", "second", "third"], folder.path().join("out"));
+            let mut arguments = vec!["relax".into(), "--write".into(), "csv".into()];
+            arguments.extend(["--out".into(), out.clone().into_os_string()]);
+            for name in names {
+                fs::write(file(name), LEAF.replace("fig13", name)).unwrap();
+                arguments.push(file(name).into_os_string());
+            }
+            let verb = Verb::try_parse_from(arguments).unwrap();
+            let traits = VerbTraits {
+                parallel,
+                ..VerbTraits::default()
+            };
+            let run = |job: &Job| match &*job.scenario.name {
+                "first" => panic!("index {} out of bounds", 43),
+                _ => job.deliver(&job.scenario.relax()?, true),
+            };
+            let status = verb.request.each::<Equilibrium>(traits, run).unwrap();
+            assert_eq!(status, Status::Refused);
+            let table = fs::read_to_string(out.join("table.csv")).unwrap();
+            let rows: Vec<&str> = table.lines().skip(1).collect();
+            assert_eq!(rows.len(), names.len(), "{table}");
+            assert!(rows[0].contains("index 43 out of bounds"), "{table}");
+            for (row, status) in rows.iter().zip([",2,", ",0,", ",0,"]) {
+                assert!(row.contains(status), "{table}");
+            }
+        }
+    }
 }

@@ -122,7 +122,7 @@ pub struct Mode {
     pub error: Option<f64>,
     /// Displacement of the nodes of [`Shape::curves`], one list per rod. The largest is as
     /// long as the longest rod; for a mode that rotates the rods without displacing them, the
-    /// largest rotation is 1.
+    /// largest rotation is 1. Empty unless shapes were requested.
     pub displacement: Vec<Vec<DVec3>>,
     /// Rotation vector of these nodes, along the lab axes, radians.
     pub rotation: Vec<Vec<DVec3>>,

@@ -14,6 +14,7 @@ use crate::relax::saddle::ANY_SIGN;
 use crate::relax::series::{Extrapolated, GRIDS, Series};
 use crate::relax::stencil::Stencil;
 use glam::DVec3;
+use std::borrow::Cow;
 
 /// Largest number of unknowns of the finest grid for which modes are computed without their
 /// shapes: about a second.
@@ -116,46 +117,49 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
     let left_out = above.map_or(0, |(others, _)| others);
-    let mut series = Series {
-        index: run.index.unwrap_or(0).saturating_sub(left_out),
-        single: run.clearly_stable || run.segments().is_some(),
-        grids: Vec::new(),
-        tolerance,
-        rounding: 0.0,
+    let mut nested = Nested {
+        series: Series {
+            index: run.index.unwrap_or(0).saturating_sub(left_out),
+            single: run.clearly_stable || run.segments().is_some(),
+            grids: Vec::new(),
+            tolerance,
+            rounding: 0.0,
+        },
+        finest: None,
+        coarser: None,
     };
-    let mut before: Option<(&Level, Vec<Eigenpair>)> = None;
+    let sharp = requested && options.mode_shapes;
+    let low = run.tolerance >= LOW_TOLERANCE && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let enough =
+        |series: &Series| (!sharp || series.accurate()) && (!low || series.grids.len() >= COMPARED);
     let sufficient_grids = sufficient_grids(run);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
     for (k, level) in run.levels.iter().enumerate().skip(skipped) {
-        if k >= sufficient_grids && !series.grids.is_empty() && series.undecided().is_none() {
+        let series = &nested.series;
+        let decided = !series.grids.is_empty() && series.undecided().is_none();
+        if k >= sufficient_grids && decided && enough(series) {
             break;
         }
-        let near = |(coarse, pairs): (&Level, Vec<Eigenpair>)| {
-            interpolated(&coarse.leaf, &pairs, &level.leaf)
-        };
-        let near = before.map(near).unwrap_or_default();
-        let found = on(level, &near);
-        series.rounding = modes::rounding(&level.leaf);
-        match &found {
-            Some(pairs) => series.push(pairs),
+        if !nested.add(Cow::Borrowed(level), on) {
+            if k >= sufficient_grids && nested.finest.is_some() {
+                break;
+            }
             // The series needs consecutive grids.
-            None => series.grids.clear(),
+            nested.clear();
         }
-        before = found.map(|pairs| (level, pairs));
     }
-    let (finest, pairs) = before?;
-    let shapes = shapes(finest, &pairs);
+    nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        let sharp = requested && options.mode_shapes;
-        let low = run.tolerance >= LOW_TOLERANCE && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
-        let enough = |series: &Series| {
-            (!sharp || series.accurate()) && (!low || series.grids.len() >= COMPARED)
-        };
-        refine(run, &mut series, pairs, (on, enough));
+        refine(run, &mut nested, (on, enough));
     }
+    let Nested { series, finest, .. } = nested;
+    let shapes = match options.mode_shapes {
+        true => finest?.shapes(&run.levels.last()?.leaf),
+        false => Vec::new(),
+    };
     let unit = physics.time.powi(-2);
     let mode = |it: Extrapolated| {
-        let (displacement, rotation) = shapes[it.number].clone();
+        let (displacement, rotation) = shapes.get(it.number).cloned().unwrap_or_default();
         Mode {
             eigenvalue: it.value * unit,
             error: it.error.map(|error| error * unit),
@@ -168,6 +172,45 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         undecided: series.undecided(),
         negative: series.negative().map(|negative| left_out + negative),
     })
+}
+
+/// Eigenvalues on nested grids, and the modes on the finest of these.
+struct Nested<'a> {
+    series: Series,
+    finest: Option<OnGrid<'a>>,
+    /// The grid before that.
+    coarser: Option<Cow<'a, Level>>,
+}
+
+/// The lowest modes on one grid: their number and their nodes are those of this grid alone.
+struct OnGrid<'a> {
+    level: Cow<'a, Level>,
+    pairs: Vec<Eigenpair>,
+}
+
+impl<'a> Nested<'a> {
+    /// Adds the modes on the next finer grid; false if they are not found.
+    fn add(
+        &mut self,
+        level: Cow<'a, Level>,
+        on: impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    ) -> bool {
+        let coarser = self.finest.as_ref();
+        let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
+        let Some(pairs) = on(&level, &near) else {
+            return false;
+        };
+        self.series.push(&pairs);
+        self.series.rounding = modes::rounding(&level.leaf);
+        let before = self.finest.replace(OnGrid { level, pairs });
+        self.coarser = before.map(|before| before.level);
+        true
+    }
+
+    fn clear(&mut self) {
+        self.series.grids.clear();
+        (self.finest, self.coarser) = (None, None);
+    }
 }
 
 /// Number of grids that suffice if they determine the signs of the eigenvalues.
@@ -203,63 +246,39 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
-/// Adds finer grids until the eigenvalues are accurate enough, or the limits are reached.
+/// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, or
+/// the limits are reached.
 fn refine(
     run: &Run,
-    series: &mut Series,
-    mut pairs: Vec<Eigenpair>,
+    nested: &mut Nested,
     (on, enough): (
         impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
         impl Fn(&Series) -> bool,
     ),
 ) -> Option<()> {
-    let mut finer: Vec<Level> = Vec::new();
-    while finer.len() < MORE_GRIDS && !enough(series) && !run.out_of_time() {
-        let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
-        let last = levels.last()?;
-        if !is_affordable(run.leaf, &last.leaf.grid.refined()) {
+    for _ in 0..MORE_GRIDS {
+        if enough(&nested.series) || run.out_of_time() {
             break;
         }
-        let next = settle(&levels[levels.len().saturating_sub(2)..], run.tolerance)?;
-        let near = interpolated(&levels.last()?.leaf, &pairs, &next.leaf);
-        pairs = on(&next, &near)?;
-        series.push(&pairs);
-        finer.push(next);
+        let finest = &*nested.finest.as_ref()?.level;
+        if !is_affordable(run.leaf, &finest.leaf.grid.refined()) {
+            break;
+        }
+        let next = settle(nested.coarser.as_deref(), finest, run.tolerance)?;
+        if !nested.add(Cow::Owned(next), &on) {
+            break;
+        }
     }
     Some(())
 }
 
-/// Shapes of modes interpolated to a finer grid.
-fn interpolated(
-    coarse: &DiscreteLeaf,
-    pairs: &[Eigenpair],
-    fine: &DiscreteLeaf,
-) -> Vec<Vec<Increment>> {
-    let nodes = fine.grid.sigma().iter();
-    let stencils: Vec<_> = nodes.map(|&sigma| <Stencil>::at(coarse, sigma)).collect();
-    let on_grid = |pair: &Eigenpair| {
-        let rods = pair.shape.chunks(coarse.segments() + 1);
-        let node = |(rod, [stencil, _]): (&[Increment], &[Stencil; 2])| -> Increment {
-            let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
-            let mut both = [0.0; 6];
-            turn.write_to_slice(&mut both[..3]);
-            shift.write_to_slice(&mut both[3..]);
-            both
-        };
-        rods.flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
-            .collect()
-    };
-    pairs.iter().map(on_grid).collect()
-}
-
-/// The same equilibrium on the next finer grid.
-fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
-    let last = levels.last()?;
-    let mut state = prolong(&last.leaf, &last.state);
-    if levels.len() > 1 {
-        predict(levels, &mut state);
+/// The same equilibrium on the grid next to the `finest`, predicted from a `coarser` one, too.
+fn settle(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> Option<Level> {
+    let mut state = prolong(&finest.leaf, &finest.state);
+    if let Some(coarser) = coarser {
+        predict(&[coarser, finest], &mut state);
     }
-    let leaf = DiscreteLeaf::new(&last.leaf.leaf, last.leaf.grid.refined());
+    let leaf = DiscreteLeaf::new(&finest.leaf.leaf, finest.leaf.grid.refined());
     let mut system = System::new(&leaf);
     let guess = state.clone();
     let newton = Newton {
@@ -275,33 +294,63 @@ fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
 /// Displacements and rotations of all nodes, rod by rod.
 type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
-/// Normalised shapes: the largest displacement is the longest rod's length, and the last of
-/// the largest components is positive.
-fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
-    let length = level.leaf.leaf.scale.length;
-    let nodes = level.leaf.segments() + 1;
-    let shape = |pair: &Eigenpair| {
-        let largest = |part: fn(&[f64; 6]) -> DVec3| {
-            let lengths = pair.shape.iter().map(|node| part(node).length());
-            lengths.fold(0.0, f64::max)
+impl OnGrid<'_> {
+    /// The shapes interpolated to a finer grid.
+    fn interpolated(&self, fine: &DiscreteLeaf) -> Vec<Vec<Increment>> {
+        let coarse = &self.level.leaf;
+        let nodes = fine.grid.sigma().iter();
+        let stencils: Vec<_> = nodes.map(|&sigma| <Stencil>::at(coarse, sigma)).collect();
+        let on_grid = |pair: &Eigenpair| {
+            let rods = pair.shape.chunks(coarse.segments() + 1);
+            let node = |(rod, [stencil, _]): (&[Increment], &[Stencil; 2])| -> Increment {
+                let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
+                let mut both = [0.0; 6];
+                turn.write_to_slice(&mut both[..3]);
+                shift.write_to_slice(&mut both[3..]);
+                both
+            };
+            rods.flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
+                .collect()
         };
-        let (far, turned) = (largest(shift), largest(turn));
-        let (size, part): (f64, fn(&[f64; 6]) -> DVec3) = match far > NO_DISPLACEMENT * turned {
-            true => (far, shift),
-            false => (turned, turn),
+        self.pairs.iter().map(on_grid).collect()
+    }
+
+    /// Normalised shapes at the nodes of the same or a coarser grid: the largest displacement
+    /// is the longest rod's length, and the last of the largest components is positive.
+    fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<Shape> {
+        let length = coarse.leaf.scale.length;
+        let (nodes, segments) = (self.level.leaf.segments() + 1, coarse.segments());
+        let stride = self.level.leaf.segments().div_ceil(segments);
+        let shape = |pair: &Eigenpair| {
+            let rods = pair.shape.chunks(nodes);
+            let shape = rods.map(|rod| rod.iter().step_by(stride).copied().collect());
+            normalized(&shape.collect::<Vec<Vec<Increment>>>(), length)
         };
-        let components = || pair.shape.iter().flat_map(|node| part(node).to_array());
-        let most = components().fold(0.0_f64, |m, c| m.max(c.abs()));
-        // The last of those that are equal up to rounding: a tip's.
-        let sign = components()
-            .rfind(|c| c.abs() > 0.99 * most)
-            .map_or(1.0, f64::signum);
-        let rods = |part: fn(&[f64; 6]) -> DVec3, unit: f64| {
-            let rod = |rod: &[[f64; 6]]| rod.iter().map(|node| part(node) * unit).collect();
-            pair.shape.chunks(nodes).map(rod).collect()
-        };
-        let unit = sign / size;
-        (rods(shift, unit * length), rods(turn, unit))
+        self.pairs.iter().map(shape).collect()
+    }
+}
+
+/// A shape in the scenario's unit of length, normalised.
+fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
+    let nodes = || shape.iter().flatten();
+    let largest =
+        |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
+    let (far, turned) = (largest(shift), largest(turn));
+    let (size, part): (f64, fn(&Increment) -> DVec3) = match far > NO_DISPLACEMENT * turned {
+        true => (far, shift),
+        false => (turned, turn),
     };
-    pairs.iter().map(shape).collect()
+    let components: Vec<f64> = nodes().flat_map(|node| part(node).to_array()).collect();
+    let most = components.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    // The last of those that are equal up to rounding: a tip's.
+    let mut last = components.iter().rev();
+    let sign = last
+        .find(|c| c.abs() > 0.99 * most)
+        .map_or(1.0, |c| c.signum());
+    let rods = |part: fn(&Increment) -> DVec3, unit: f64| {
+        let rod = |rod: &Vec<Increment>| rod.iter().map(|node| part(node) * unit).collect();
+        shape.iter().map(rod).collect()
+    };
+    let unit = sign / size;
+    (rods(shift, unit * length), rods(turn, unit))
 }

@@ -45,6 +45,7 @@ pub struct Series {
 }
 
 impl Series {
+    /// Adds the eigenvalues on a grid twice as fine as the last.
     pub fn push(&mut self, pairs: &[Eigenpair]) {
         let values = pairs.iter().map(|pair| pair.eigenvalue);
         self.grids.push(values.collect());

@@ -179,8 +179,8 @@ fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
         return run.solve(grid);
     }
     let arrived = run.arrive(grid)?;
-    let guesses = run.guesses(&arrived);
-    run.follow(guesses)
+    let guess = run.guess(arrived);
+    run.follow(vec![guess])
 }
 
 /// The result of a run, with the modes of a leaf at rest: requested modes are not counted in

@@ -78,7 +78,8 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
     let shot = Shot {
         tips: vec![turn * relaxed.tips[0]],
         found: Ok(solution),
-        negative_eigenvalues: Some(2),
+        // The same shape is as stable.
+        negative_eigenvalues: Some(if angle == 0.0 { 0 } else { 2 }),
         wall_seconds: 0.02,
     };
     Check::new(relaxed, Some(shot))

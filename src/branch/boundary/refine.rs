@@ -161,7 +161,8 @@ fn refine_from(
             || 2 * manifold.grid().segments() > FINEST;
         let tips = if last { NEUTRAL_TIPS } else { accuracy.tips };
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
-        if tips && exact {
+        let numbers = table.errors().iter().all(|error| *error <= accuracy.tips);
+        if tips && (exact || last && numbers) {
             return Ok(Verified {
                 factorizations,
                 ..table.verified(&manifold, &near, step.special)

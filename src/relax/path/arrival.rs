@@ -47,17 +47,14 @@ impl<'a> Run<'a, '_> {
                 Ok(arrived) => arrived,
                 Err(stop) => return (self, Err(stop)),
             };
-            grid = arrived[arrived.len() - 1].leaf.grid.refined();
-            let guesses = self.guesses(&arrived);
+            grid = arrived.leaf.grid.refined();
+            let (on, state) = self.guess(arrived);
             let path = self.path.take();
             if let Some(half) = half
-                && guesses.iter().all(|(_, state)| is_mirrored(half, state))
+                && is_mirrored(half, &state)
             {
                 self = self.of(half, Some(leaf));
-                let halves = guesses
-                    .iter()
-                    .map(|(grid, state)| (grid.clone(), half_of(half, state)));
-                let end = self.follow(halves.collect());
+                let end = self.follow(vec![(on.clone(), half_of(half, &state))]);
                 self.path.clone_from(&path);
                 if self.is_answer(&end) {
                     return (self.completed(leaf), end);
@@ -66,7 +63,7 @@ impl<'a> Run<'a, '_> {
             }
             let last = grid.segments() > FINEST || self.segments().is_some();
             self.stays_in_valley = !last;
-            let end = self.follow(guesses);
+            let end = self.follow(vec![(on, state)]);
             // Further grids may show that it has to leave the valley.
             self.stays_in_valley = false;
             self.path = path;
@@ -78,9 +75,9 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Walks on this grid, and on finer ones where it does not resolve the leaf or where
-    /// stability was lost; the leaf on one grid, or on two that agree, from coarse to fine. If
-    /// no grid leads to rest, the last state is kept.
-    pub fn arrive(&mut self, mut grid: Grid) -> Result<Vec<Level>, Stop> {
+    /// stability was lost; the leaf on the coarser of two grids that agree. If no grid leads to
+    /// rest, the last state is kept.
+    pub fn arrive(&mut self, mut grid: Grid) -> Result<Level, Stop> {
         let mut before: Option<Level> = None;
         loop {
             let (level, events, end) = self.walk(grid.clone());
@@ -89,7 +86,7 @@ impl<'a> Run<'a, '_> {
             match end {
                 Ok(()) if events.is_empty() => {
                     self.path = Some(Path::STABLE);
-                    return Ok(vec![level]);
+                    return Ok(level);
                 }
                 Ok(()) => {
                     let near = before.as_ref().is_some_and(|coarser| {
@@ -101,12 +98,9 @@ impl<'a> Run<'a, '_> {
                             .is_some_and(|coarser| self.is_alike(coarser, &level));
                     if confirmed || last {
                         self.path = Some(Path::Loaded { events, confirmed });
-                        // One that is only alike leads to neighbours of its own.
-                        return Ok(match before.filter(|_| confirmed) {
-                            Some(coarser) if near => vec![coarser, level],
-                            Some(coarser) => vec![coarser],
-                            None => vec![level],
-                        });
+                        // On finer grids it is followed: two members of a circle of equilibria
+                        // would not be extrapolated.
+                        return Ok(before.filter(|_| confirmed).unwrap_or(level));
                     }
                     before = Some(level);
                 }
@@ -135,26 +129,21 @@ impl<'a> Run<'a, '_> {
         index == Some(0) && (a - b).abs() <= SAME_ENERGY * a.abs().max(1.0)
     }
 
-    /// The initial guesses from where a walk arrived: on the grids of the walk, or on the
-    /// requested one.
-    pub fn guesses(&mut self, arrived: &[Level]) -> Vec<(Grid, State)> {
-        match self.segments() {
-            None => (arrived.iter())
-                .map(|level| (level.leaf.grid.clone(), level.state.clone()))
-                .collect(),
-            Some(segments) => {
-                let grid = Grid::new(segments, self.leaf.kinks());
-                let mut finest = arrived[arrived.len() - 1].clone();
-                while FARTHEST_GRID * finest.leaf.segments() < segments {
-                    let state = prolong(&finest.leaf, &finest.state);
-                    finest = self
-                        .settle(finest.leaf.grid.refined(), InitialGuess::Coarser(state))
-                        .level;
-                }
-                let state = transfer(&finest.leaf, &finest.state, &grid);
-                vec![(grid, state)]
-            }
+    /// The initial guess from where a walk arrived: on the grid of the walk, or on the requested
+    /// one.
+    pub fn guess(&mut self, arrived: Level) -> (Grid, State) {
+        let Some(segments) = self.segments() else {
+            return (arrived.leaf.grid, arrived.state);
+        };
+        let grid = Grid::new(segments, self.leaf.kinks());
+        let mut finest = arrived;
+        while FARTHEST_GRID * finest.leaf.segments() < segments {
+            let state = prolong(&finest.leaf, &finest.state);
+            let finer = finest.leaf.grid.refined();
+            finest = self.settle(finer, InitialGuess::Coarser(state)).level;
         }
+        let state = transfer(&finest.leaf, &finest.state, &grid);
+        (grid, state)
     }
 
     /// Walks on one grid.
