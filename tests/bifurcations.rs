@@ -60,15 +60,9 @@ impl Case {
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
             let apart = apart(&scenario, &eighths(&leaf), &eighths(&own)).position;
             let what = format!("{}: {part} of {critical}, {apart:e}", self.entries);
-            let aside = leaf
-                .path
-                .as_ref()
-                .map_or(leaf.stability.saddle.is_some(), |path| {
-                    !path.events().is_empty()
-                });
             match part < 1.0 {
-                true => assert!(apart < 1e-8 && !aside, "{what}"),
-                false => assert!(apart > 1e-3 && aside, "{what}"),
+                true => assert!(apart < 1e-8 && leaf.stability.saddle.is_none(), "{what}"),
+                false => assert!(apart > 1e-3, "{what}"),
             }
         }
     }

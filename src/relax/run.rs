@@ -186,18 +186,32 @@ impl<'a, 'o> Run<'a, 'o> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // Under a dead moment, and to its holder, it always is, by methods of their own.
+        // Held tips are moved to their holder by a method of their own.
         self.options.route == Route::Loading
             && !released
             && self.leaf.held.is_none()
+            && self.leaf.scenario().rods.len() > 1
             && self.leaf.loads.tip_moment == DVec3::ZERO
+    }
+
+    /// Whether a single vein that was released may be loaded slowly.
+    pub fn may_be_loaded_instead(&self) -> bool {
+        let settles = matches!(
+            self.options.method,
+            Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none()
+        );
+        settles
+            && self.options.route == Route::Loading
+            && self.leaf.held.is_none()
+            && self.leaf.loads.tip_moment == DVec3::ZERO
+            && !self.out_of_time()
     }
 
     /// The path of a leaf that is released.
     pub fn released(&self) -> Option<Path> {
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let held = self.leaf.held.is_some();
-        (released && !held && self.leaf.loads.tip_moment == DVec3::ZERO).then_some(Path::Released)
+        let moved = self.leaf.held.is_some() || self.leaf.loads.tip_moment != DVec3::ZERO;
+        (released && !moved).then_some(Path::Released)
     }
 
     /// Whether it may come to rest without being loaded in steps: its rods need not be softened.

@@ -10,20 +10,18 @@ const GIVEN: f64 = 10.0;
 /// Increments without symmetry, from which inverse iteration leads to the unstable mode, with the
 /// sign that has most in common with them; of several modes of one eigenvalue, as of veins that
 /// buckle alike, to that sum of them. They move the leaf along `leaning`, down, to the left
-/// (along e2) and forward, in this order of importance, more so away from the base and to the
-/// left, and turn its veins about themselves.
+/// (along e2) and forward, in this order of importance, more so away from the base and, with
+/// other weights, to the left. A straight rod along e1 is bent in a plane by them: one that is round
+/// would turn out of any other on its way.
 pub fn preference(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> Field {
     let (down, left, forward) = (-DVec3::Z, DVec3::Y, DVec3::X);
     let given = GIVEN * leaning.normalize_or_zero();
     let everywhere = given + down + 0.5 * left + 0.25 * forward;
     let leftwards = 0.31 * down + 0.17 * left + 0.11 * forward;
-    let outwards = 0.13 * down + 0.23 * left + 0.07 * forward;
     let node = |j: usize, i: usize| {
-        let k = state.base(j) + i;
-        let x = state.x[k];
-        let shift = everywhere + x.y * leftwards + x.x * outwards;
-        let turn = 0.01 * (state.q[k] * DVec3::X);
-        [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
+        let x = state.x[state.base(j) + i];
+        let shift = (1.0 + 0.2 * x.x) * everywhere + x.y * leftwards;
+        [0.0, 0.0, 0.0, shift.x, shift.y, shift.z]
     };
     let rod = |j: usize| (1..=leaf.segments()).map(|i| node(j, i)).collect();
     (0..leaf.rods()).map(rod).collect()
