@@ -76,10 +76,12 @@ fn a_pitchfork_is_drawn_as_it_is() {
     ];
     contains(&svg, &parts);
     assert!(!svg.contains(">fold<"));
+    assert!(groups(&svg, "law").is_empty(), "forces are no law here");
+    let linear = figure("scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-0.1");
     let ([panel], [leaves], [law]) = (
         &groups(&svg, "branches")[..],
         &groups(&svg, "leaves")[..],
-        &groups(&svg, "law")[..],
+        &groups(&linear, "law")[..],
     ) else {
         panic!("one of each")
     };

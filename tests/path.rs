@@ -7,7 +7,7 @@ mod common;
 
 use common::real;
 use common::*;
-use leafdyn::relax::{Event, Happening, Path, Route, Stage, relax};
+use leafdyn::relax::{Event, Path, Route, relax};
 
 /// Tips nearer to each other than this part of the length are one, on fixed grids and at loose
 /// tolerances.
@@ -98,8 +98,7 @@ fn threads_do_not_matter() {
     }
 }
 
-/// Newton's method from arcs is tried first by the semi-implicit method, never by the explicit
-/// one: both end in the same equilibrium.
+/// By explicit motion a leaf ends in the same equilibrium.
 #[test]
 fn methods_agree() {
     let explicit = Options {
@@ -119,39 +118,11 @@ fn methods_agree() {
     }
 }
 
-/// Two upright columns buckle at Greenhill's weight, 7.837 A/L^3, alike, to one of two equal
-/// sides (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+/// A leaf of a laboratory that is released from arcs says so, and is the same leaf where it has
+/// one equilibrium.
 #[test]
-fn columns_turn_aside_at_their_critical_load() {
-    let weight = 12.0;
-    let columns = parse(&format!(
-        r#"
-        name = "columns"
-        leaf = {{ rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false }}
-        stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 2.0, axial = inf, shear_2 = inf, shear_3 = inf }}
-        load = {{ gravity = [{:?}, 0.0, 0.0] }}
-        "#,
-        -weight
-    ));
-    let found = columns.relax().unwrap();
-    let event = only(events(&found));
-    assert_eq!(event.stage, Stage::Loading);
-    assert_eq!(event.happening, Happening::Branched { equally_open: true });
-    close("part", event.part, 7.83734744 / weight, 0.01);
-    assert!(
-        found.tips.iter().all(|tip| tip.z < -0.1),
-        "{:?}",
-        found.tips
-    );
-    assert_eq!(found.stability.negative_eigenvalues, Some(0));
-    assert_eq!(found.path.unwrap().word(), "branched");
-}
-
-/// Of the paper's Fig. 10 two equilibria are nearly mirror images. Slowly loaded the leaf sags;
-/// released from its flat arcs it ends above them, with more energy.
-#[test]
-fn a_released_leaf_may_end_elsewhere() {
-    let leaf = scenario("paper/fig10", "leaf.rods=5");
+fn a_released_leaf_says_so() {
+    let leaf = parse(&real::leaf(3));
     let released = Options {
         route: Route::Release,
         ..Options::default()
@@ -160,8 +131,9 @@ fn a_released_leaf_may_end_elsewhere() {
         [Options::default(), released].map(|options| relax(&leaf, &options, &mut |_| {}).unwrap());
     assert_eq!(events(&slow), []);
     assert_eq!(released.path, Some(Path::Released));
-    assert!(tip(&slow).z < -0.1 && tip(&released).z > 0.1);
-    assert!(slow.energy < released.energy);
+    let apart = tip(&slow).distance(tip(&released));
+    assert!(apart < SAME * slow.shape.longest(), "{apart}");
+    assert!(slow.work.factorizations < 100, "{:?}", slow.work);
 }
 
 /// Work of typical leaves: Newton's method at once, and a walk.

@@ -144,44 +144,36 @@ pub(crate) fn relax_on_grids(
     run.shape_alone = shape_alone;
     let slowly = run.loads_slowly();
     run.path = slowly.then_some(Path::STABLE).or_else(|| run.released());
-    if let Some(half) = &half {
-        if !slowly || run.may_settle_at_once() {
-            run = run.of(half, Some(&leaf));
-            let end = run.solve(grid.clone());
-            if run.is_answer(&end) && (!slowly || run.is_in_first_valley()) {
-                return Ok(finished(run.completed(&leaf), end, clock));
-            }
-            // The reduced model fails, as the leaf leaves its valley or breaks the mirror
-            // symmetry: solve the full leaf.
-            run = run.of(&leaf, None);
-        }
-    }
-    if !slowly {
-        let end = run.solve(grid);
-        if end.is_ok() || !run.may_be_loaded_instead() {
-            return Ok(finished(run, end, clock));
-        }
-        // A single vein that does not come to rest from its rest shape.
-        let (run, end) = run.of(&leaf, None).load_slowly(None);
+    if slowly {
+        let (run, end) = run.load_slowly(half.as_ref());
         return Ok(finished(run, end, clock));
     }
-    if half.is_none() && run.may_settle_at_once() {
-        run.stays_in_valley = true;
+    if let Some(half) = &half {
+        run = run.of(half, Some(&leaf));
         let end = run.solve(grid.clone());
-        run.stays_in_valley = false;
-        if run.is_answer(&end) && run.is_in_first_valley() {
-            return Ok(finished(run, end, clock));
+        if run.is_answer(&end) {
+            return Ok(finished(run.completed(&leaf), end, clock));
         }
+        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
+        // solve the full leaf.
         run = run.of(&leaf, None);
     }
-    let (run, end) = run.load_slowly(half.as_ref());
+    let end = run.solve(grid);
+    if end.is_ok() || !run.may_be_loaded_instead() {
+        return Ok(finished(run, end, clock));
+    }
+    let (run, end) = run.of(&leaf, None).load_slowly(None);
     Ok(finished(run, end, clock))
 }
 
 /// Rest from the start, on this grid and finer ones.
 fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
     if !run.loads_slowly() {
-        return run.solve(grid);
+        let end = run.solve(grid.clone());
+        if end.is_ok() || !run.may_be_loaded_instead() {
+            return end;
+        }
+        run.restart();
     }
     let arrived = run.arrive(grid)?;
     let guess = run.guess(arrived);
@@ -209,9 +201,11 @@ fn finished(
     let (outcome, remark) = result::outcome(&run, end);
     let mut found = result::equilibrium(&run, outcome, remark, wall);
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    found
-        .doubts
-        .extend(found.path.as_ref().and_then(Path::doubt));
+    let doubt = found
+        .path
+        .as_ref()
+        .and_then(|path| path.doubt(run.options.route));
+    found.doubts.extend(doubt);
     found.decide(verdict);
     let modes = modes.or_else(|| {
         let list = List::requested(&run);

@@ -45,7 +45,7 @@ impl<'a> Run<'a, '_> {
         loop {
             let arrived = match self.arrive(grid) {
                 Ok(arrived) => arrived,
-                Err(stop) => return (self, Err(stop)),
+                Err(stop) => return self.release_instead(stop),
             };
             grid = arrived.leaf.grid.refined();
             let (on, state) = self.guess(arrived);
@@ -67,11 +67,38 @@ impl<'a> Run<'a, '_> {
             // Further grids may show that it has to leave the valley.
             self.stays_in_valley = false;
             self.path = path;
-            if end.is_ok() || last || self.out_of_time() {
-                return (self, end);
+            match end {
+                Ok(false) | Err(_) if last && self.segments().is_none() => {
+                    let stop = end.err().unwrap_or(Stop::StepLimit);
+                    return self.release_instead(stop);
+                }
+                Err(_) if !last && !self.out_of_time() => self = self.of(leaf, None),
+                Ok(false) if !self.out_of_time() && !self.path_is_stable() => {
+                    return self.release_instead(Stop::StepLimit);
+                }
+                _ => return (self, end),
             }
-            self = self.of(leaf, None);
         }
+    }
+
+    /// Whether nothing happened on its path.
+    fn path_is_stable(&self) -> bool {
+        (self.path.as_ref()).is_some_and(|path| path.events().is_empty())
+    }
+
+    /// A leaf whose path could not be followed is released from arcs.
+    fn release_instead(self, stop: Stop) -> (Self, Result<bool, Stop>) {
+        // Others were released before.
+        if self.out_of_time() || !self.loads_slowly() {
+            return (self, Err(stop));
+        }
+        let leaf = self.leaf;
+        let segments = self.segments().unwrap_or(COARSEST);
+        let grid = Grid::new(segments.max(leaf.kinks().len() + 1), leaf.kinks());
+        let mut released = self.of(leaf, None);
+        let end = released.solve(grid);
+        released.path = Some(Path::Released);
+        (released, end)
     }
 
     /// Walks on this grid, and on finer ones where it does not resolve the leaf or where

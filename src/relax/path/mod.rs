@@ -1,7 +1,8 @@
 //! The path on which a leaf is loaded, and which defines the equilibrium that a relaxation finds.
 //!
 //! The veins of the natural leaf are in their rest shapes, apart and unloaded. Slowly, so that the
-//! leaf is at rest all the time, first the loads are put on in proportion, then the tips are moved
+//! leaf is at rest all the time, first the loads are put on in proportion, the tips keeping their
+//! distances from each other, then the tips are moved
 //! together while the tissue between the veins is put on. As long as this
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
 //! method. Where stability is lost the leaf moves on, down its energy ([`snap`]).
@@ -16,7 +17,6 @@ mod snap;
 mod walk;
 
 pub use choice::preference;
-pub use walk::distance;
 
 use crate::words::words;
 use serde::Serialize;
@@ -103,16 +103,15 @@ impl Path {
         }
     }
 
-    /// What is not certain about it.
-    pub fn doubt(&self) -> Option<String> {
-        let unconfirmed = matches!(
-            self,
+    /// What is not certain about it, where this route was meant.
+    pub(super) fn doubt(&self, meant: Route) -> Option<String> {
+        match self {
             Path::Loaded {
-                confirmed: false,
-                ..
-            }
-        );
-        unconfirmed.then(|| UNCONFIRMED.to_owned())
+                confirmed: false, ..
+            } => Some(UNCONFIRMED.into()),
+            Path::Released if meant == Route::Loading => Some(INSTEAD.into()),
+            _ => None,
+        }
     }
 
     /// The word for it in files.
@@ -130,6 +129,10 @@ impl Path {
 /// Remark on a path whose events lead elsewhere on another grid.
 const UNCONFIRMED: &str = "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
      different grids: this is one in which it can rest; relax with --all looks for the others";
+
+/// Remark on a leaf whose path could not be followed.
+const INSTEAD: &str = "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
+     loads instead, and may rest elsewhere than slow loading leads";
 
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
