@@ -224,7 +224,12 @@ fn a_flat_leaf_waves_where_its_eigenvalues_say_so() {
         for modes in [0, 2] {
             let leaf = flat(bending, torsion, modes);
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-            assert_eq!(leaf.path.as_ref().unwrap().word(), "branched");
+            // It turned aside on its way, or it was pushed off a saddle.
+            let aside = leaf
+                .path
+                .as_ref()
+                .is_some_and(|path| !path.events().is_empty());
+            assert!(aside || leaf.stability.saddle.is_some());
             assert!(leaf.doubts.is_empty(), "{:?}", leaf.doubts);
             assert!(leaf.tips[0].z.abs() > 1e-4, "{}", leaf.tips[0]);
         }
@@ -293,11 +298,8 @@ fn what_rounding_hides_is_not_stable() {
     for segments in [10_000, 30_000] {
         let leaf = settled(&column, &on(segments));
         let upright = tip(&leaf).y.abs() < 1e-3;
-        let index = leaf.stability.negative_eigenvalues;
-        assert!(
-            index.is_none() || (!upright && index == Some(0)),
-            "{index:?}"
-        );
+        let wanted = (!upright).then_some(0);
+        assert_eq!(leaf.stability.negative_eigenvalues, wanted);
     }
 }
 

@@ -58,7 +58,7 @@ impl Case {
             let scenario = self.at(critical, part);
             let (leaf, own) = (settle(&scenario, 1e-8), kept(&scenario, 1e-8));
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-            let apart = apart(&scenario, &eighths(&leaf), &eighths(&own)).position;
+            let apart = apart(&scenario, &leaf.shape.rods, &own.shape.rods).position;
             let what = format!("{}: {part} of {critical}, {apart:e}", self.entries);
             match part < 1.0 {
                 true => assert!(apart < 1e-8 && leaf.stability.saddle.is_none(), "{what}"),
@@ -66,19 +66,6 @@ impl Case {
             }
         }
     }
-}
-
-/// The rods at the ends of eight equal parts, whatever the grid.
-fn eighths(leaf: &Equilibrium) -> Vec<RodShape> {
-    let rod = |rod: &RodShape| {
-        let stride = (rod.nodes.len() - 1) / 8;
-        let nodes = rod.nodes.iter().step_by(stride).copied().collect();
-        RodShape {
-            nodes,
-            ..rod.clone()
-        }
-    };
-    leaf.shape.rods.iter().map(rod).collect()
 }
 
 /// A rod along e1 that bends sideways easily, loaded from zero on.
