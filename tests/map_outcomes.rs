@@ -117,8 +117,9 @@ fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
     expect(&rows, &[Right, Diverged, Right, Right, Right]);
     let rows = cell("fig04", set, &[(H, "1e10")], &[EXPLICIT], SHORT);
     expect(&rows, &[OutOfTime]);
+    // It begins where slow loading leads.
     let rows = cell("fig04", set, &[(H, "1e4")], &[EXPLICIT], LONG);
-    expect(&rows, &[OtherEquilibrium]);
+    expect(&rows, &[Right]);
     let rigid = format!("{set}; stiffness.axial=inf");
     let values = [("stiffness.shear_2", "100")];
     let rows = cell("fig04", &rigid, &values, &[SEMI_IMPLICIT, EXPLICIT], LONG);

@@ -62,9 +62,7 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
         let moment = matches!(name, "rollup" | "helical_rollup");
         let stable = if moment { Value::Null } else { true.into() };
         assert_eq!(summary["stable"], stable, "{name}");
-        // So is what softening may have decided.
-        let remark = moment || run.err.contains("softened");
-        assert_eq!(run.err.is_empty(), !remark, "{name}: {}", run.err);
+        assert_eq!(run.err.is_empty(), !moment, "{name}: {}", run.err);
 
         let number = |key: &str| summary[key].number();
         let longest = largest(read(&file, "").rods.iter().map(|rod| rod.length));
@@ -72,7 +70,8 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
         assert!(number("error_estimate") <= allowed, "{name}");
         assert!(number("residual") < 1e-5, "{name}: {}", number("residual"));
         let work = &summary["work"];
-        assert!(work["force_evaluations"].count() < 1000, "{name}: {work}");
+        // Slow loading of the softest leaf snaps several times.
+        assert!(work["force_evaluations"].count() < 4000, "{name}: {work}");
         for file in "summary.json centerlines.csv figure.svg figure.png".split(' ') {
             let file = place.path("out").join(name).join(file);
             assert!(fs::metadata(&file).unwrap().len() > 500, "{file:?}");

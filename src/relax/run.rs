@@ -1,7 +1,7 @@
 //! A run over nested grids: its options, the grids on which the leaf has settled, and the
 //! error estimate of their extrapolation.
 
-use crate::leaf::{DiscreteLeaf, Leaf, System, whole_fields};
+use crate::leaf::{DiscreteLeaf, Leaf, Loads, System, whole_fields};
 use crate::newton::{Contraction, Stop, Work};
 use crate::relax::defect::{self, Estimate, Linear};
 use crate::relax::level::{Level, complete, positions};
@@ -182,6 +182,7 @@ impl<'a, 'o> Run<'a, 'o> {
             && !released
             && self.leaf.held.is_none()
             && self.leaf.scenario().rods.len() > 1
+            && self.leaf.loads != Loads::default()
             && softens(self.leaf)
             && self.leaf.loads.tip_moment == DVec3::ZERO
     }
