@@ -62,7 +62,6 @@ fn both_axes_are_looked_along() {
 #[test]
 fn what_is_continuous_does_not_jump() {
     let table = "
-        classic/lens_midrib; => leaf.length[1]=0.9..1.0:6
         classic/cantilever_heavy; => scale:load.gravity=0.5..2.0:5
         paper/fig04; leaf.rods=3 => load.gravity[2]=-0.1..-2:5
         paper/fig05; leaf.rods=3 => scale:stiffness.bending_2=1..2:4
