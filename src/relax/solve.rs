@@ -145,7 +145,20 @@ pub(crate) fn relax_on_grids(
     let slowly = run.loads_slowly();
     run.path = slowly.then_some(Path::STABLE).or_else(|| run.released());
     if slowly {
-        let (run, end) = run.load_slowly(half.as_ref());
+        // Where Newton's method alone leads from arcs to rest, through convex states only, the
+        // path need not be walked.
+        let leaf_to_solve = half.as_ref().unwrap_or(&leaf);
+        run = run.of(leaf_to_solve, half.as_ref().map(|_| &leaf));
+        run.stays_in_valley = true;
+        let end = run.solve(grid.clone());
+        run.stays_in_valley = false;
+        if run.is_answer(&end) && half.is_some() {
+            return Ok(finished(run.completed(&leaf), end, clock));
+        }
+        if run.is_answer(&end) {
+            return Ok(finished(run, end, clock));
+        }
+        let (run, end) = run.of(&leaf, None).load_slowly(half.as_ref());
         return Ok(finished(run, end, clock));
     }
     if let Some(half) = &half {
