@@ -24,18 +24,14 @@ use std::fmt;
 
 words! {
     /// Which equilibrium a relaxation finds, where there are several.
+    #[derive(Default)]
     pub enum Route {
         /// That of a leaf which is loaded slowly: see [`Path`].
+        #[default]
         Loading = "loading",
         /// That in which a leaf comes to rest which is released under all of its loads, with
         /// its tips together and its veins bent to circular arcs.
         Release = "release",
-    }
-}
-
-impl Default for Route {
-    fn default() -> Self {
-        Route::Loading
     }
 }
 
