@@ -235,6 +235,9 @@ impl Newton<'_> {
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         for step in 0..self.iterations {
             let turn = leaf.assemble(state, system).turn;
+            if !linear.moves() {
+                leaf.hold_turn(state, system);
+            }
             self.work.force_evaluations += 1;
             if turn > RESOLVED_TURN {
                 return Err(Stop::Unresolved);
@@ -293,6 +296,11 @@ impl Newton<'_> {
 }
 
 impl Linear<'_> {
+    /// Whether springs hold the nodes, so that a step depends on where it starts.
+    fn moves(&self) -> bool {
+        matches!(self.equations, Equations::Proximal { rate, .. } if rate > 0.0)
+    }
+
     /// Solves the assembled equations; returns the relative accuracy of the solution.
     fn solve(
         &mut self,

@@ -202,10 +202,12 @@ impl Equations<'_> {
         self.factorizations += 1;
         system.set_coupling(leaf);
         leaf.assemble(&solution.state, system);
+        leaf.hold_turn(&solution.state, system);
         if system.stable_without_coupling(shift) {
             return Ok(0);
         }
         leaf.assemble(&solution.state, system);
+        leaf.hold_turn(&solution.state, system);
         self.factorizations += 1;
         let pattern = self.pattern(0)?;
         Ok(factorized(&pattern, &self.system, shift)?.negative())

@@ -174,6 +174,7 @@ impl<'a, const N: usize> Equations<'a, N> {
         clamp(leaf, &mut solution.state);
         self.system.set_coupling(leaf);
         let turn = leaf.assemble(&solution.state, &mut self.system).turn;
+        leaf.hold_turn(&solution.state, &mut self.system);
         if !turn.is_finite() || turn > RESOLVED_TURN {
             return Err(Stuck::Unresolved);
         }

@@ -15,6 +15,7 @@ mod rate;
 mod sparse;
 mod state;
 mod system;
+mod turning;
 mod unknowns;
 
 pub use crate::scenario::Scale;

@@ -98,6 +98,8 @@ struct Vibration<'a> {
     wanted: Wanted<'a>,
     /// [`Wanted::near`] as vectors.
     near: Vec<Vec<f64>>,
+    /// The turn of a leaf without resistance, if it can turn.
+    turn: Option<Vec<f64>>,
 }
 
 /// The lowest eigenvalues, ascending (all if there are fewer than wanted), with
@@ -127,15 +129,21 @@ fn of_softened(
         pattern,
         wanted,
         near: Vec::new(),
+        turn: None,
     };
     let near = wanted.near.iter().map(|near| vibration.vector(near));
     vibration.near = near.collect();
+    vibration.turn = soft.turn(state).map(|turn| vibration.vector(&turn));
     let found = vibration.lowest(&mut system)?;
-    let pair = |vector: &Vec<f64>| {
-        let shape = vibration.shape(vector);
+    let pair = |mode: &Mode| {
+        let shape = vibration.shape(&mode.vector);
         let forces = forces(soft, state, &shape);
         Eigenpair {
-            eigenvalue: quotient(soft, state, &shape, &forces),
+            // Zero is that of a turn alone.
+            eigenvalue: match mode.eigenvalue == 0.0 {
+                true => 0.0,
+                false => quotient(soft, state, &shape, &forces),
+            },
             shape,
             forces,
         }
@@ -184,18 +192,30 @@ impl Vibration<'_> {
         }
     }
 
+    /// The turn as an eigenvector of unit mass, whose eigenvalue is zero.
+    fn turning(&self) -> Option<Mode> {
+        let mut vector = self.turn.clone()?;
+        let mass: f64 = (vector.iter().zip(self.masses.times(&vector))).map(|(v, m)| v * m).sum();
+        vector.iter_mut().for_each(|v| *v /= mass.sqrt());
+        let eigenvalue = 0.0;
+        Some(Mode { eigenvalue, vector })
+    }
+
     /// Eigenvectors of unit mass, eigenvalues ascending.
-    fn lowest(&self, system: &mut System) -> Option<Vec<Vec<f64>>> {
+    fn lowest(&self, system: &mut System) -> Option<Vec<Mode>> {
         if self.wanted.count == 0 {
             return Some(Vec::new());
         }
-        let mut found: Vec<Mode> = Vec::new();
+        let mut found: Vec<Mode> = self.turning().into_iter().collect();
+        let wanted = self.wanted.count;
         let (lowest, mut factor) = self.below_all(system)?;
         let below = factor.negative();
         // Some of the others may be above the shift.
         let others = self.wanted.above.map_or(0, |(others, _)| others - below);
-        let count = (others + self.wanted.count).min(self.pattern.size() - below);
-        let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count);
+        // Beside a turn one more, so that the last one is not zero: the eigenvalues below it are
+        // counted.
+        let count = (others + wanted + found.len()).min(self.pattern.size() - below);
+        let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count - found.len());
         for search in 0..SEARCHES + count {
             if self.wanted.time.reached() {
                 return None;
@@ -212,8 +232,8 @@ impl Vibration<'_> {
             }
             let (missing, under) = self.missing(system, &found, count, (lowest, below))?;
             if missing == 0 {
-                let wanted = found.into_iter().take(count).skip(others);
-                return Some(wanted.map(|found| found.vector).collect());
+                let wanted = found.into_iter().take(count).skip(others).take(wanted);
+                return Some(wanted.collect());
             }
             (sought, limit) = (missing.min(count), under);
             if shift != lowest {

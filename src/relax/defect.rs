@@ -198,6 +198,7 @@ fn factorized(level: &Level, spare: Option<System>, work: &mut Work) -> Option<S
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
+    level.leaf.hold_turn(&level.state, &mut system);
     let regular = match level.leaf.rods() {
         1 => system.factorize_indefinite(),
         _ => system.factorize(0.0),

@@ -77,6 +77,7 @@ fn count(
 /// The matrix, minus `excess` times the excess stiffness of the elements.
 fn assemble(leaf: &DiscreteLeaf, state: &State, system: &mut System, excess: f64, work: &mut Work) {
     leaf.assemble(state, system);
+    leaf.hold_turn(state, system);
     if excess > 0.0 {
         leaf.subtract_excess_stiffness(state, system, excess);
     }
@@ -202,6 +203,7 @@ pub fn find_unstable_mode(
     work: &mut Work,
 ) -> bool {
     leaf.assemble(state, system);
+    leaf.hold_turn(state, system);
     work.force_evaluations += 1;
     let momentum = system.momentum(&preference(leaf, state, leaning));
     system.set_rhs(&momentum);

@@ -96,7 +96,11 @@ impl Series {
             let unit = self.unit(number);
             Extrapolated {
                 value: value * unit,
-                error: error.map(|error| bound(error) * unit + self.rounding),
+                // Zero on all grids is that of a turn without resistance, and exact.
+                error: error.map(|error| match *value == 0.0 {
+                    true => 0.0,
+                    false => bound(error) * unit + self.rounding,
+                }),
                 number,
             }
         };
@@ -121,7 +125,7 @@ impl Series {
         let values = self.values();
         let alone = |k: usize| NOISE * self.rounding + UNFINISHED * self.tolerance * self.unit(k);
         let certain = |(k, it): (usize, &Extrapolated)| match it.error {
-            Some(error) => it.value.abs() > error,
+            Some(error) => it.value.abs() > error || error == 0.0,
             None => self.single && it.value.abs() > alone(k),
         };
         let all = values.iter().enumerate().all(certain);

@@ -213,6 +213,7 @@ fn descend(
 /// Distance to equilibrium, measured by a Newton step that is not taken.
 fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> f64 {
     leaf.assemble(state, system);
+    leaf.hold_turn(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
     let Ok(pattern) = SparsePattern::new(system) else {

@@ -42,6 +42,7 @@ impl Linearized {
         let (leaf, state) = (&level.leaf, &level.state);
         let mut system = System::new(leaf);
         leaf.assemble(state, &mut system);
+        leaf.hold_turn(state, &mut system);
         let factorized = match leaf.tip_moment() == DVec3::ZERO {
             true => system.factorize(0.0),
             false => system.factorize_indefinite(),
@@ -94,6 +95,7 @@ impl Linearized {
             self.factorized = false;
         }
         leaf.assemble(&level.state, &mut self.system);
+        leaf.hold_turn(&level.state, &mut self.system);
         self.factorizations += 1;
         let pattern = SparsePattern::new(&self.system).ok()?;
         let mut factor: SparseFactor = pattern.factorize(&self.system, 0.0).ok()?;
