@@ -11,7 +11,7 @@
 use super::discrete::DiscreteLeaf;
 use super::state::{Increment, State};
 use super::system::System;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// Stiffness of the spring, A/L^3.
 const SPRING: f64 = 100.0;
@@ -113,11 +113,39 @@ impl DiscreteLeaf {
         }
     }
 
+    /// Turns a leaf that can turn without resistance until it leans down (towards -e3), so that
+    /// of its circle of equilibria it is always the same one, on all grids.
+    pub fn lean_down(&self, state: &mut State) {
+        let Some(axis) = self.turning_axis().filter(|_| self.turns(state)) else {
+            return;
+        };
+        let mut lean = DVec3::ZERO;
+        for (rod, node) in self.each(1..self.segments() + 1) {
+            let x = state.x[state.base(rod) + node];
+            lean += self.grid.weight(node) * self.grid.sigma()[node] * x;
+        }
+        // The base is in the e1-e2 plane: down is normal to the axis.
+        let (down, aside) = (-DVec3::Z, axis.cross(-DVec3::Z));
+        let angle = -lean.dot(aside).atan2(lean.dot(down));
+        let (turn, back) = (DQuat::from_axis_angle(axis, angle), DQuat::from_rotation_x(-angle));
+        let [turns, shifts] = self.moves(self.segments());
+        for (rod, node) in self.each(1..self.segments() + 1) {
+            let k = state.base(rod) + node;
+            if shifts || node < self.segments() {
+                state.x[k] = turn * state.x[k];
+            }
+            if turns || node < self.segments() {
+                state.q[k] = (turn * state.q[k] * back).normalize();
+            }
+        }
+        state.n.iter_mut().for_each(|force| *force = turn * *force);
+    }
+
     /// The turn at unit rate: increments of all nodes, rod after rod, base to tip. `None` if the
     /// leaf cannot turn or is straight.
     pub fn turn(&self, state: &State) -> Option<Vec<Increment>> {
         let axis = self.turning_axis().filter(|_| self.turns(state))?;
-        let node = |(x, q): (&DVec3, &glam::DQuat)| {
+        let node = |(x, q): (&DVec3, &DQuat)| {
             let (spin, velocity) = (axis - *q * DVec3::X, axis.cross(*x));
             [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z]
         };

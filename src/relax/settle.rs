@@ -59,8 +59,16 @@ pub struct Settled {
 }
 
 impl Run<'_, '_> {
-    /// Settles on one grid; leaves saddles unless they are accepted.
+    /// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
+    /// resistance leans down.
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
+        let mut settled = self.settle_from(grid, guess);
+        let Level { leaf, state } = &mut settled.level;
+        leaf.lean_down(state);
+        settled
+    }
+
+    fn settle_from(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
         let from_start = matches!(guess, InitialGuess::Start);

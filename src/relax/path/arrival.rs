@@ -201,6 +201,7 @@ impl<'a> Run<'a, '_> {
         if leaf.tips_move_together() {
             state.join_tips();
         }
+        leaf.lean_down(&mut state);
         self.reached = end.is_err().then_some(reached);
         (Level { leaf, state }, events, end)
     }
