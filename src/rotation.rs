@@ -7,6 +7,12 @@ use crate::lanes::{Lanes, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
+/// The angle about a unit `axis` by which a vector turns until its part normal to the axis has the
+/// direction of `to`, which is normal to it; zero if it has no such part.
+pub fn angle_about(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
+    -from.dot(axis.cross(to)).atan2(from.dot(to))
+}
+
 /// The vector and the scalar part of unit quaternions.
 pub type Quaternions<S> = (Vectors<S>, Lanes<S>);
 

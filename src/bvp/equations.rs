@@ -40,6 +40,8 @@ pub struct Equations<'a> {
     pub softest: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
     coupled_rate: Vec<f64>,
+    /// The axis about which the leaf can turn without resistance.
+    turning: Option<DVec3>,
     arcs: Vec<Arc>,
     /// Fractions of the length where a profile has a kink, ascending.
     kinks: Vec<f64>,
@@ -152,6 +154,7 @@ impl<'a> Equations<'a> {
                 })
                 .collect(),
             softest,
+            turning: scenario.turning_axis(),
             arcs: arcs::arcs(scenario, &lengths),
             kinks: kinks(scenario),
             lengths,
@@ -207,6 +210,12 @@ impl<'a> Equations<'a> {
             n,
             m,
         }
+    }
+
+    /// The axis about which the leaf can turn without resistance, if it has its own shape at rest.
+    pub fn turning_axis(&self) -> Option<DVec3> {
+        let own = self.part == 1.0 && self.softened == 1.0;
+        self.turning.filter(|_| own)
     }
 
     /// A flat state at the base without stress.

@@ -16,6 +16,9 @@ use super::state::TANGENT;
 /// of the largest count as undetermined.
 const SINGULAR: f64 = 1e-10;
 
+/// Cosine from which on that direction is the turn of a leaf without resistance.
+const ALONG_TURN: f64 = 0.9;
+
 /// The condensed equations, factorised.
 pub struct March {
     maps: Vec<Mat<f64>>,
@@ -27,13 +30,23 @@ pub struct March {
     left: Mat<f64>,
     singular_values: Vec<f64>,
     right: Mat<f64>,
+    /// How many directions the conditions determine: all, or all but the turn of a leaf that can
+    /// turn without resistance.
+    determined: usize,
     tip: Tip,
     units: Units,
 }
 
 impl March {
-    /// Propagates the sensitivities to the tip. `None` if they are not finite.
-    pub fn new(equations: &Equations, units: &Units, maps: Vec<Mat<f64>>) -> Option<Self> {
+    /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turn` of a leaf
+    /// that can turn without resistance, at its base, is left undetermined where it is what the
+    /// conditions determine least.
+    pub fn new(
+        equations: &Equations,
+        units: &Units,
+        maps: Vec<Mat<f64>>,
+        turn: Option<Vec<f64>>,
+    ) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
         for map in &maps[1..] {
@@ -52,16 +65,25 @@ impl March {
             return None;
         }
         let svd = conditions.svd().ok()?;
-        Some(March {
+        let determined = svd.S().column_vector().nrows();
+        let mut march = March {
             maps,
             bases,
             growths,
             left: svd.U().to_owned(),
             singular_values: svd.S().column_vector().iter().copied().collect(),
             right: svd.V().to_owned(),
+            determined,
             tip,
             units: units.clone(),
-        })
+        };
+        if let Some(turn) = turn {
+            let least = &march.null()[0];
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let cosine = dot(least, &turn) / (dot(least, least) * dot(&turn, &turn)).sqrt();
+            march.determined -= usize::from(cosine.abs() > ALONG_TURN);
+        }
+        Some(march)
     }
 
     /// The tip conditions of a state, in the same units.
@@ -78,7 +100,7 @@ impl March {
 
     /// Smallest singular value of the tip's conditions over the largest.
     pub fn condition(&self) -> f64 {
-        match self.singular_values.as_slice() {
+        match &self.singular_values[..self.determined] {
             [largest, .., smallest] => smallest / largest,
             _ => 1.0,
         }
@@ -112,20 +134,22 @@ impl March {
             }
         }
         let mut amounts = self.left.transpose() * &missed;
-        for (amount, value) in amounts.iter_mut().zip(&self.singular_values) {
-            let undetermined = *value <= SINGULAR * self.singular_values[0];
+        let values = self.singular_values.iter().enumerate();
+        for (amount, (k, value)) in amounts.iter_mut().zip(values) {
+            let singular = *value <= SINGULAR * self.singular_values[0];
+            let undetermined = singular || k >= self.determined;
             *amount = if undetermined { 0.0 } else { *amount / value };
         }
         self.back(&self.right * &amounts, &offsets, &shifts)
     }
 
-    /// The direction least determined by the tip's conditions, at the beginnings
-    /// of all intervals.
+    /// The direction that the tip's conditions determine least, at the beginnings of all
+    /// intervals; not the turn of a leaf that can turn without resistance.
     pub fn null(&self) -> Vec<Vec<f64>> {
         let none = |matrix: &Mat<f64>| Col::zeros(matrix.nrows());
         let offsets: Vec<Col<f64>> = self.bases.iter().map(none).collect();
         let shifts: Vec<Col<f64>> = self.growths.iter().map(none).collect();
-        let last = self.right.col(self.right.ncols() - 1).to_owned();
+        let last = self.right.col(self.determined - 1).to_owned();
         self.back(last, &offsets, &shifts)
     }
 
@@ -203,7 +227,7 @@ mod tests {
         let scenario = scenario(joined);
         let equations = Equations::new(&scenario);
         let units = Units::new(&equations, &Trajectory::straight(&equations));
-        March::new(&equations, &units, maps)
+        March::new(&equations, &units, maps, None)
     }
 
     /// Pseudo-random numbers in -1..1.

@@ -13,12 +13,20 @@ use super::intervals::{
 };
 use super::march::March;
 use super::solution::{Correction, Log, Neutral, Reason};
-use super::state::RodState;
+use super::state::{RodState, TANGENT};
 use super::trajectory::{Nodes, Trajectory};
 use crate::largest::largest;
 use crate::memory;
+use crate::rotation::angle_about;
 use crate::shape::equally_spaced;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
+
+/// A leaf that turned by less than this (radians) keeps its linearisation.
+const SAME_LINEARIZATION: f64 = 1e-3;
+
+/// Changes of a base's force and moment, in their units, below which a leaf does not turn: it is
+/// straight.
+const NO_TURN: f64 = 1e-6;
 
 const MAX_ITERATIONS: usize = 60;
 
@@ -130,7 +138,9 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     /// Solves to the accuracy of an integration with `tolerance`.
     pub fn solve(&mut self, tolerance: f64) -> Result<(), Reason> {
         self.iterate(tolerance)
-            .map_err(|reason| self.explained(reason))
+            .map_err(|reason| self.explained(reason))?;
+        self.lean_down();
+        Ok(())
     }
 
     fn iterate(&mut self, tolerance: f64) -> Result<(), Reason> {
@@ -219,10 +229,59 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.condensed = March::new(self.equations, &self.units, maps);
+        self.condensed = March::new(self.equations, &self.units, maps, self.turn());
         match self.condensed {
             Some(_) => Ok(residuals),
             None => Err(no_progress(f64::INFINITY)),
+        }
+    }
+
+    /// The changes of forces and moments at the base as a leaf turns that can without resistance,
+    /// in the units; `None` if it cannot or carries none.
+    fn turn(&self) -> Option<Vec<f64>> {
+        let axis = self.equations.turning_axis()?;
+        let base = &self.nodes.states[0];
+        let mut turn = Vec::with_capacity(TANGENT * self.equations.rods());
+        for j in 0..self.equations.rods() {
+            let rod = RodState::read(base, j);
+            let unit = |k: usize| self.units.of(TANGENT * j + k);
+            let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
+            turn.extend([0.0; 6]);
+            turn.extend(force.to_array());
+            turn.extend(moment.to_array());
+        }
+        (turn.iter().any(|value| value.abs() > NO_TURN)).then_some(turn)
+    }
+
+    /// Turns a leaf that can turn without resistance until its moment at the base bends it down
+    /// (towards -e3), as that of a relaxed leaf does.
+    fn lean_down(&mut self) {
+        let Some(axis) = self.equations.turning_axis() else {
+            return;
+        };
+        let rods = self.equations.rods();
+        let moments = (0..rods).map(|j| RodState::read(&self.nodes.states[0], j).m);
+        let angle = angle_about(axis, moments.sum(), axis.cross(-DVec3::Z));
+        let turn = DQuat::from_axis_angle(axis, angle);
+        let back = DQuat::from_rotation_x(-angle);
+        for (k, state) in self.nodes.states.iter_mut().enumerate() {
+            for j in 0..rods {
+                let rod = RodState::read(state, j);
+                let turned = RodState {
+                    r: turn * rod.r,
+                    q: turn * rod.q * back,
+                    n: turn * rod.n,
+                    m: turn * rod.m,
+                };
+                let turned = match k {
+                    0 => self.equations.base(j, turned.n, turned.m),
+                    _ => turned,
+                };
+                turned.write(state, j);
+            }
+        }
+        if angle.abs() > SAME_LINEARIZATION {
+            self.condensed = None;
         }
     }
 

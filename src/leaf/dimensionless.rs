@@ -27,6 +27,8 @@ pub struct Leaf {
     pub loads: Loads,
     /// The tip, if it is held.
     pub held: Option<Held>,
+    /// The axis about which it can turn without resistance.
+    pub(super) turning: Option<DVec3>,
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest: f64,
@@ -116,6 +118,7 @@ impl Leaf {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
+            turning: scenario.turning_axis(),
             kinks,
             softest: softest / scale.stiffness,
             scenario,

@@ -153,11 +153,6 @@ impl DiscreteLeaf {
         self.coupling[g]
     }
 
-    /// Number of gaps with a coupling, that between a rod and its image included.
-    pub(super) fn gaps(&self) -> usize {
-        self.coupling.len()
-    }
-
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
     /// joint tip, which all rods share.
     pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {

@@ -21,6 +21,7 @@ mod schema;
 mod section;
 mod source;
 mod tip;
+mod turning;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
