@@ -146,6 +146,7 @@ impl Equations<'_> {
             if let Some(held) = self.held_rate(&now.state, now.params[0])? {
                 add(&mut rate, 1.0, &held);
             }
+            self.exclude_turn(&now, &mut rate)?;
             let step = plane.map_or(0.0, |plane| {
                 let off = plane.distance(&now.state) + dot(&plane.dual, &forces);
                 -off / (dot(&plane.dual, &rate) + plane.own)
@@ -183,6 +184,16 @@ impl Equations<'_> {
             previous = size;
         }
         Err(Stuck::NotConverged)
+    }
+
+    /// Subtracts the turn of a leaf that can turn without resistance, so that a tangent does not
+    /// depend on where the turn is held.
+    fn exclude_turn(&mut self, at: &Solution, increments: &mut Field) -> Result<(), OutOfRange> {
+        if let Some(turn) = self.leaves.at(at.params)?.turn(&at.state) {
+            let amount = self.product(&turn, increments) / self.product(&turn, &turn);
+            add(increments, -amount, &turn);
+        }
+        Ok(())
     }
 
     /// Morse index of an equilibrium, without neutral modes.

@@ -8,7 +8,7 @@
 //! matrix has one negative eigenvalue for each of those of the leaf, and none for the turn.
 
 use super::discrete::DiscreteLeaf;
-use super::state::{Increment, State};
+use super::state::{Field, State};
 use super::system::System;
 use crate::rotation::angle_about;
 use glam::{DMat3, DQuat, DVec3};
@@ -101,15 +101,16 @@ impl DiscreteLeaf {
         state.n.iter_mut().for_each(|force| *force = turn * *force);
     }
 
-    /// The turn at unit rate: increments of all nodes, rod after rod, base to tip. `None` if the
-    /// leaf cannot turn or is straight.
-    pub fn turn(&self, state: &State) -> Option<Vec<Increment>> {
+    /// The turn at unit rate: increments of the nodes 1 to n of all rods. `None` if the leaf cannot
+    /// turn or is straight.
+    pub fn turn(&self, state: &State) -> Option<Field> {
         self.farthest_from_axis(state)?;
         let axis = self.turning_axis()?;
-        let node = |(x, q): (&DVec3, &DQuat)| {
-            let (spin, velocity) = (axis - *q * DVec3::X, axis.cross(*x));
+        let node = |k: usize| {
+            let (spin, velocity) = (axis - state.q[k] * DVec3::X, axis.cross(state.x[k]));
             [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z]
         };
-        Some(state.x.iter().zip(&state.q).map(node).collect())
+        let rod = |j: usize| (1..=self.segments()).map(|i| node(state.base(j) + i)).collect();
+        Some((0..self.rods()).map(rod).collect())
     }
 }

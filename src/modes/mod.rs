@@ -133,7 +133,12 @@ fn of_softened(
     };
     let near = wanted.near.iter().map(|near| vibration.vector(near));
     vibration.near = near.collect();
-    vibration.turn = soft.turn(state).map(|turn| vibration.vector(&turn));
+    let turn = soft.turn(state);
+    vibration.turn = turn.map(|turn| {
+        let base = [[0.0; 6]];
+        let all: Vec<_> = turn.iter().flat_map(|rod| base.iter().chain(rod)).copied().collect();
+        vibration.vector(&all)
+    });
     let found = vibration.lowest(&mut system)?;
     let pair = |mode: &Mode| {
         let shape = vibration.shape(&mode.vector);
