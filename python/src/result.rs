@@ -210,6 +210,8 @@ impl Leaf {
         all.set_item(intern!(py, "energy"), found.energy)?;
         let negative = found.stability.negative_eigenvalues;
         all.set_item(intern!(py, "negative_eigenvalues"), negative)?;
+        let neutral = found.stability.neutral_directions;
+        all.set_item(intern!(py, "neutral_directions"), neutral)?;
         all.set_item(intern!(py, "wall_seconds"), found.wall_seconds)?;
         Ok(all)
     }

@@ -55,12 +55,6 @@ impl DiscreteLeaf {
         farthest
     }
 
-    /// Number of directions in which a leaf at rest can move without resistance: one if it can
-    /// turn and is not straight.
-    pub fn neutral_directions(&self, state: &State) -> usize {
-        usize::from(self.farthest_from_axis(state).is_some())
-    }
-
     /// Adds the phase condition to an assembled matrix, if the leaf can turn.
     pub fn hold_turn(&self, state: &State, system: &mut System) {
         if let Some(at) = self.farthest_from_axis(state) {
@@ -110,7 +104,11 @@ impl DiscreteLeaf {
             let (spin, velocity) = (axis - state.q[k] * DVec3::X, axis.cross(state.x[k]));
             [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z]
         };
-        let rod = |j: usize| (1..=self.segments()).map(|i| node(state.base(j) + i)).collect();
+        let rod = |j: usize| {
+            (1..=self.segments())
+                .map(|i| node(state.base(j) + i))
+                .collect()
+        };
         Some((0..self.rods()).map(rod).collect())
     }
 }

@@ -136,7 +136,11 @@ fn of_softened(
     let turn = soft.turn(state);
     vibration.turn = turn.map(|turn| {
         let base = [[0.0; 6]];
-        let all: Vec<_> = turn.iter().flat_map(|rod| base.iter().chain(rod)).copied().collect();
+        let all: Vec<_> = turn
+            .iter()
+            .flat_map(|rod| base.iter().chain(rod))
+            .copied()
+            .collect();
         vibration.vector(&all)
     });
     let found = vibration.lowest(&mut system)?;
@@ -200,7 +204,9 @@ impl Vibration<'_> {
     /// The turn as an eigenvector of unit mass, whose eigenvalue is zero.
     fn turning(&self) -> Option<Mode> {
         let mut vector = self.turn.clone()?;
-        let mass: f64 = (vector.iter().zip(self.masses.times(&vector))).map(|(v, m)| v * m).sum();
+        let mass: f64 = (vector.iter().zip(self.masses.times(&vector)))
+            .map(|(v, m)| v * m)
+            .sum();
         vector.iter_mut().for_each(|v| *v /= mass.sqrt());
         let eigenvalue = 0.0;
         Some(Mode { eigenvalue, vector })

@@ -13,6 +13,7 @@ use crate::relax::plausible;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
 use crate::relax::shape;
+use crate::scenario::Scenario;
 use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
 use glam::DVec3;
@@ -54,6 +55,7 @@ pub fn equilibrium(
         reaction: reaction(&run.levels, columns),
         stability: Stability {
             negative_eigenvalues: run.index,
+            neutral_directions: neutral_directions(scenario, &rods),
             modes: None,
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
@@ -90,6 +92,12 @@ pub fn equilibrium(
             curve_stations: grid.sigma().to_vec(),
         },
     }
+}
+
+/// Directions in which a leaf of this shape can move without resistance.
+pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
+    let nodes = rods.iter().flat_map(|rod| &rod.nodes);
+    scenario.neutral_directions(nodes.map(|node| node.position))
 }
 
 /// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end

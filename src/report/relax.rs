@@ -70,7 +70,17 @@ pub fn found(equilibrium: &Equilibrium) -> String {
         (Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular, Some(residual)) => {
             format!("{verdict} (residual {residual:.1e})")
         }
-        _ => verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues),
+        _ => {
+            verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues) + turns(equilibrium)
+        }
+    }
+}
+
+/// That it is one of a circle of equilibria, if it is.
+fn turns(equilibrium: &Equilibrium) -> &'static str {
+    match equilibrium.stability.neutral_directions {
+        0 => "",
+        _ => ", one of a circle: it turns about its base without resistance",
     }
 }
 
@@ -151,8 +161,8 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
         .collect();
     let one_grid = modes.iter().any(|mode| mode.error.is_none());
     let note = if one_grid { " (on one grid)" } else { "" };
-    let neutral = modes.iter().any(Mode::is_neutral);
-    let neutral = match neutral {
+    let neutral = modes.iter().filter(|mode| mode.is_neutral()).count();
+    let neutral = match neutral > equilibrium.stability.neutral_directions {
         true => {
             "; zero within its error: the leaf can move without resistance, or is at a bifurcation"
         }

@@ -45,6 +45,23 @@ impl Scenario {
     }
 }
 
+/// A leaf whose points are all nearer to the axis than this part of its length is straight, and
+/// does not move when it turns.
+const ON_AXIS: f64 = 1e-6;
+
+impl Scenario {
+    /// Number of directions in which the leaf can move without resistance in the equilibrium
+    /// through these points: one if it can turn and is bent. Each has an eigenvalue that is zero.
+    pub fn neutral_directions(&self, points: impl IntoIterator<Item = DVec3>) -> usize {
+        let near = ON_AXIS * super::longest(&self.rods);
+        let bent = |axis: DVec3| {
+            let mut points = points.into_iter();
+            points.any(|point| point.reject_from_normalized(axis).length() > near)
+        };
+        usize::from(self.turning_axis().is_some_and(bent))
+    }
+}
+
 fn same(a: f64, b: f64) -> bool {
     a == b || (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
@@ -54,7 +71,8 @@ fn is_round(rod: &Rod) -> bool {
     let alike = |a: &Profile, b: &Profile| {
         let even = (0..=COMPARED).map(|i| i as f64 / COMPARED as f64);
         let kinks = a.kinks().iter().chain(b.kinks()).copied();
-        even.chain(kinks).all(|sigma| same(a.at(sigma), b.at(sigma)))
+        even.chain(kinks)
+            .all(|sigma| same(a.at(sigma), b.at(sigma)))
     };
     let [_, bending_2, bending_3] = &rod.couple_stiffness;
     let [_, shear_2, shear_3] = &rod.force_stiffness;
@@ -78,7 +96,9 @@ mod tests {
             "#
         );
         let table: toml::Table = text.parse().unwrap();
-        Scenario::from_toml(&toml::to_string(&table).unwrap()).unwrap().turning_axis()
+        Scenario::from_toml(&toml::to_string(&table).unwrap())
+            .unwrap()
+            .turning_axis()
     }
 
     #[test]

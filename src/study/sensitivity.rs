@@ -42,9 +42,29 @@ pub fn relax_with_sensitivities(
         .collect();
     let (mut leaf, levels) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
+    let turns = leaf.stability.neutral_directions > 0;
+    let (none, known): (Vec<_>, Vec<_>) = (numbers.into_iter())
+        .partition(|(_, number)| at_rest && turns && decides_where_it_turns(number));
+    leaf.doubts
+        .extend(none.iter().map(|(key, _)| no_derivative(key)));
     leaf.sensitivities = Some(match at_rest {
-        true => sensitivities(&levels, &numbers, leaf.accuracy.tolerance, options.modes),
+        true => sensitivities(&levels, &known, leaf.accuracy.tolerance, options.modes),
         false => Vec::new(),
     });
     Ok(leaf)
+}
+
+/// Whether a leaf that turns about its base without resistance no longer does after a change of
+/// this number: then the smallest change decides where it turns to.
+fn decides_where_it_turns(number: &Number) -> bool {
+    let near = number.rate().unwrap_or_default();
+    near.iter()
+        .any(|(_, scenario)| scenario.turning_axis().is_none())
+}
+
+fn no_derivative(key: &str) -> String {
+    format!(
+        "{key} has no derivative: the leaf turns about its base without resistance, and the smallest \
+         change of this number decides where it turns to"
+    )
 }

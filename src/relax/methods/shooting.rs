@@ -9,6 +9,7 @@ use crate::relax::equilibrium::{
 };
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, Progress, RelaxError};
+use crate::relax::result::neutral_directions;
 use crate::relax::segments::coarsest;
 use crate::relax::stations::SAME;
 use crate::scenario::{Scenario, longest};
@@ -175,6 +176,7 @@ pub fn shoot(
         }),
         stability: Stability {
             negative_eigenvalues: index,
+            neutral_directions: neutral_directions(scenario, &rods),
             mode_shapes: options.mode_shapes,
             ..Stability::default()
         },

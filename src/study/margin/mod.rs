@@ -69,6 +69,10 @@ const MOST_NODES: usize = 5_000;
 /// Why there is no margin if no grid satisfies it.
 const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any grid tried";
 
+/// Remark on pushes that are not tried.
+const TURNS: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
+     pushes along it are tried";
+
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
 pub fn relax_with_margin(
@@ -197,7 +201,8 @@ fn margin(
     let held = scenario.held_tip.is_some();
     let remark = match options.limit.reached() {
         true => Some("the time allowed was over before all was tried".into()),
-        false => held.then(|| "the tip is held: a force on it moves nothing".into()),
+        false if held => Some("the tip is held: a force on it moves nothing".into()),
+        false => (rest.stability.neutral_directions > 0).then(|| TURNS.into()),
     };
     Ok(Margin {
         units: scenario.units.clone(),
@@ -272,13 +277,21 @@ fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
     if scenario.held_tip.is_some() {
         return Vec::new();
     }
+    // A leaf that turns without resistance turns towards any push across its axis.
+    let axis = match rest.stability.neutral_directions {
+        0 => None,
+        _ => scenario.turning_axis(),
+    };
+    let along = |direction: &Direction| {
+        axis.is_none_or(|axis| axis.to_array()[direction.axis].abs() == 1.0)
+    };
     let mirrored = [
         false,
         rest.model.rods < scenario.rods.len(),
         rest.model.planar,
     ];
     let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
-    Direction::all().filter(own).collect()
+    Direction::all().filter(own).filter(along).collect()
 }
 
 /// Adds the mirror images of pushes whose mirror image was not computed.
