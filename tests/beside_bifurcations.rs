@@ -224,12 +224,7 @@ fn a_flat_leaf_waves_where_its_eigenvalues_say_so() {
         for modes in [0, 2] {
             let leaf = flat(bending, torsion, modes);
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-            // It turned aside on its way, or it was pushed off a saddle.
-            let aside = leaf
-                .path
-                .as_ref()
-                .is_some_and(|path| !path.events().is_empty());
-            assert!(aside || leaf.stability.saddle.is_some());
+            assert_eq!(leaf.path.as_ref().unwrap().word(), "branched");
             assert!(leaf.doubts.is_empty(), "{:?}", leaf.doubts);
             assert!(leaf.tips[0].z.abs() > 1e-4, "{}", leaf.tips[0]);
         }
@@ -282,13 +277,12 @@ fn flat_strip(beyond: f64) -> Scenario {
 }
 
 /// The first grid finer than those of its shape is stuck where these are: the strip starts again
-/// there, and buckles, or it is said that its stability is not certain.
+/// there, and buckles.
 #[test]
 fn a_leaf_starts_again_on_the_grid_that_decides() {
     let leaf = settled(&flat_strip(3e-3), &with_modes(3, to(1e-6)));
     assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-    let uncertain = leaf.doubts.iter().any(|it| it.contains("not certain"));
-    assert!(tip(&leaf).y.abs() > 0.04 || uncertain, "{}", tip(&leaf));
+    assert!(tip(&leaf).y.abs() > 0.04, "{}", tip(&leaf));
 }
 
 /// On 30,000 segments rounding is larger than the eigenvalue of a column 15 % beyond its load.
@@ -298,8 +292,11 @@ fn what_rounding_hides_is_not_stable() {
     for segments in [10_000, 30_000] {
         let leaf = settled(&column, &on(segments));
         let upright = tip(&leaf).y.abs() < 1e-3;
-        let wanted = (!upright).then_some(0);
-        assert_eq!(leaf.stability.negative_eigenvalues, wanted);
+        let index = leaf.stability.negative_eigenvalues;
+        assert!(
+            index.is_none() || (!upright && index == Some(0)),
+            "{index:?}"
+        );
     }
 }
 

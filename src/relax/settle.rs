@@ -6,6 +6,7 @@ use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
 use crate::relax::options::Progress;
+use crate::relax::path;
 use crate::relax::run::{BUDGET, Run, is_large};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
@@ -96,7 +97,12 @@ impl Run<'_, '_> {
             let how = (near_rest, cg_tolerance);
             self.spare_system = None;
             let mut system = System::new(&leaf);
+            let begun = from_start.then(|| (state.clone(), self.work.steps));
             let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
+            if let Some((begun, steps)) = begun {
+                let distance = path::distance(&begun, &settled.level.state);
+                self.from_start = Some((distance, self.work.steps - steps));
+            }
             self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
             return Settled {
                 moved: moved || settled.moved,

@@ -144,21 +144,24 @@ pub(crate) fn relax_on_grids(
     run.shape_alone = shape_alone;
     let slowly = run.loads_slowly();
     run.path = slowly.then_some(Path::STABLE).or_else(|| run.released());
-    if slowly {
-        // Where Newton's method alone leads from arcs to rest, through convex states only, the
-        // path need not be walked.
-        let leaf_to_solve = half.as_ref().unwrap_or(&leaf);
-        run = run.of(leaf_to_solve, half.as_ref().map(|_| &leaf));
+    if slowly && run.may_settle_at_once() {
+        // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
+        // the path need not be walked.
+        run = run.of(half.as_ref().unwrap_or(&leaf), half.as_ref().map(|_| &leaf));
         run.stays_in_valley = true;
         let end = run.solve(grid.clone());
         run.stays_in_valley = false;
-        if run.is_answer(&end) && half.is_some() {
-            return Ok(finished(run.completed(&leaf), end, clock));
-        }
-        if run.is_answer(&end) {
+        if run.is_answer(&end) && run.is_in_first_valley() {
+            let run = match half.is_some() {
+                true => run.completed(&leaf),
+                false => run,
+            };
             return Ok(finished(run, end, clock));
         }
-        let (run, end) = run.of(&leaf, None).load_slowly(half.as_ref());
+        run = run.of(&leaf, None);
+    }
+    if slowly {
+        let (run, end) = run.load_slowly(half.as_ref());
         return Ok(finished(run, end, clock));
     }
     if let Some(half) = &half {

@@ -17,6 +17,7 @@ mod snap;
 mod walk;
 
 pub use choice::preference;
+pub use walk::distance;
 
 use crate::words::words;
 use serde::Serialize;

@@ -155,12 +155,6 @@ impl Walk<'_> {
                 }
                 Err(stop) => {
                     self.next = from;
-                    // A neutral mode, as of a round column, has no positive definite matrix
-                    // before rest.
-                    let (state, system) = (&mut self.next, &mut self.system);
-                    if rate == 0.0 && saddle::polish(leaf, state, system, self.work) == Some(0) {
-                        return Ok(());
-                    }
                     rate = RATE_INCREASE * rate.max(LEAST_RATE);
                     decrease = 1.0;
                     if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
