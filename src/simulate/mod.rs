@@ -22,6 +22,7 @@
 
 mod error;
 mod record;
+mod start;
 mod stills;
 
 pub use crate::motion::Stopped;
@@ -33,8 +34,8 @@ use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
-use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
-use crate::scenario::{Scenario, Start};
+use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE};
+use crate::scenario::Scenario;
 use crate::words::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
@@ -104,13 +105,7 @@ impl Simulation {
         let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
-        let state = match scenario.dynamics.start {
-            Start::Released if leaf.held.is_none() => {
-                start(&DiscreteLeaf::new(&leaf, grid.clone()))
-            }
-            // Held tips are moved to their positions by the relaxation.
-            Start::Released | Start::AtRest => at_rest(&leaf, &grid, tolerance)?,
-        };
+        let state = start::state(&leaf, &grid, tolerance)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let rigid = discrete.stiffest() == 0.0;
         let scheme = options.scheme.unwrap_or(match rigid {
@@ -333,39 +328,4 @@ fn explicit(
             },
         )),
     }
-}
-
-/// The equilibrium under the loads and with the rest shape at time 0.
-fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
-    let scenario = at_beginning(leaf.scenario());
-    let options = relax::Options {
-        method: relax::Method::default().on_grid(Some(grid.segments())),
-        tolerance: Some(tolerance),
-        ..relax::Options::default()
-    };
-    let found = relax::relax(&scenario, &options, &mut |_| {})?;
-    if !found.outcome.is_success() {
-        return Err(Refused::NoRest {
-            outcome: found.outcome.word(),
-        });
-    }
-    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    let x = nodes().map(|node| node.position / leaf.scale.length);
-    let q = nodes().map(|node| node.rotation);
-    Ok(State::new(grid.segments(), x.collect(), q.collect()))
-}
-
-/// The scenario with the loads and the rest shape at time 0.
-fn at_beginning(scenario: &Scenario) -> Scenario {
-    let mut scenario = scenario.clone();
-    let dynamics = &scenario.dynamics;
-    scenario.gravity = dynamics.gravity.at(0.0);
-    scenario.tip_force = dynamics.tip_force.at(0.0);
-    scenario.tip_moment = dynamics.tip_moment.at(0.0);
-    let factor = dynamics.rest.at(0.0);
-    let rods = scenario.rods.iter_mut();
-    for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {
-        *curvature = curvature.scaled(factor);
-    }
-    scenario
 }

@@ -16,7 +16,6 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
-mod curves;
 mod exchange;
 mod initial;
 mod step;
