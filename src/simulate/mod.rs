@@ -20,12 +20,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod choice;
+mod cost;
+mod doubt;
 mod error;
 mod record;
 mod start;
 mod stills;
 
 pub use crate::motion::Stopped;
+pub use choice::{Choice, Reason};
+pub use cost::Cost;
 pub use error::{MOST_SECONDS, Refused};
 pub use record::{Frame, Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
@@ -44,10 +49,6 @@ const SEGMENTS: usize = 16;
 /// No number of a motion is as large.
 const LARGEST_NUMBER: f64 = 1e100;
 
-/// Seconds per step and segment.
-const EXPLICIT_SECONDS: f64 = 2e-8;
-const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
-
 words! {
     /// The method of time integration.
     pub enum Scheme {
@@ -61,7 +62,7 @@ words! {
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method; `None`: explicit, unless a rod is rigid.
+    /// The method; `None`: the one that costs less, as [`Choice`] says.
     pub scheme: Option<Scheme>,
     /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
@@ -79,7 +80,8 @@ pub struct Simulation {
     leaf: Leaf,
     grid: Grid,
     physics: Physics,
-    scheme: Scheme,
+    choice: Choice,
+    doubts: Vec<String>,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn Method + Send>,
@@ -107,24 +109,35 @@ impl Simulation {
         let physics = Physics::new(&leaf);
         let state = start::state(&leaf, &grid, tolerance)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+        let doubt = doubt::unstable(&discrete, &physics, &state);
         let rigid = discrete.stiffest() == 0.0;
-        let scheme = options.scheme.unwrap_or(match rigid {
-            true => Scheme::SemiImplicit,
-            false => Scheme::Explicit,
-        });
-        if scheme == Scheme::SemiImplicit && !physics.clamped() {
+        let mut begun = None;
+        let choice = match Choice::without_costs(options, &physics, rigid) {
+            Some(choice) => choice,
+            None => {
+                let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
+                let cost = cost::explicit(&discrete, &physics, explicit);
+                let other =
+                    cost::semi_implicit(&discrete, &physics, &state, tolerance, cost.seconds);
+                Choice::by_costs(cost, other)
+            }
+        };
+        if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
             return Err(Refused::Held { rigid });
         }
-        if scheme == Scheme::SemiImplicit
+        if choice.scheme == Scheme::SemiImplicit
             && let Some(at) = physics.too_short_a_pulse()
         {
             return Err(Refused::Pulse { at, rigid });
         }
         let mut step = options.step;
         let mut stable = None;
-        let method: Box<dyn Method + Send> = match scheme {
+        let method: Box<dyn Method + Send> = match choice.scheme {
             Scheme::Explicit => {
-                let (explicit, bound) = explicit(discrete, &physics, &state, step)?;
+                let (explicit, bound) = match begun {
+                    Some(begun) => begun,
+                    None => explicit(&discrete, &physics, &state, step)?,
+                };
                 step = Some(explicit.longest_step() * physics.time);
                 stable = Some(bound);
                 Box::new(explicit)
@@ -139,7 +152,8 @@ impl Simulation {
         let (duration, interval) = physics.duration();
         let simulation = Simulation {
             leaf,
-            scheme,
+            choice,
+            doubts: doubt.into_iter().collect(),
             stable,
             step,
             method,
@@ -152,28 +166,35 @@ impl Simulation {
             grid,
             physics,
         };
-        match simulation.expected() {
-            Some((steps, seconds)) if seconds > MOST_SECONDS => Err(Refused::TooLong {
-                step: simulation.step.unwrap_or_default(),
-                steps,
-                seconds,
-                given: options.step.is_some(),
-            }),
+        match (simulation.step, simulation.expected()) {
+            (Some(step), Some((steps, seconds))) if seconds > MOST_SECONDS => {
+                Err(Refused::TooLong {
+                    step,
+                    steps,
+                    seconds,
+                    given: options.step.is_some(),
+                })
+            }
             _ => Ok(simulation),
         }
     }
 
     /// Steps from here to the end, and the approximate number of seconds they take on one core
-    /// of a machine of 2020; `None` if the error determines the steps.
+    /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
         let (duration, _) = self.physics.duration();
-        let steps = ((duration * self.physics.time - self.time()) / self.step?).max(0.0);
-        let each = match self.scheme {
-            Scheme::Explicit => EXPLICIT_SECONDS,
-            Scheme::SemiImplicit => SEMI_IMPLICIT_SECONDS,
+        let left = (duration * self.physics.time - self.time()).max(0.0);
+        let steps = match (self.step, self.choice.costs) {
+            (Some(step), _) => left / step,
+            (None, Some([_, estimated])) => estimated.steps * left / (duration * self.physics.time),
+            (None, None) => return None,
         };
-        let nodes = self.leaf.rods() * self.grid.segments();
-        Some((steps, steps * nodes as f64 * each))
+        let (rods, segments) = (self.leaf.rods(), self.grid.segments());
+        let each = match self.choice.scheme {
+            Scheme::Explicit => cost::explicit_step(rods, segments),
+            Scheme::SemiImplicit => cost::semi_implicit_step(rods, segments),
+        };
+        Some((steps, steps * each))
     }
 
     /// The moving leaf.
@@ -183,7 +204,17 @@ impl Simulation {
 
     /// The method of time integration.
     pub fn scheme(&self) -> Scheme {
-        self.scheme
+        self.choice.scheme
+    }
+
+    /// Why it is this method.
+    pub fn choice(&self) -> Choice {
+        self.choice
+    }
+
+    /// What makes the motion doubtful from its beginning: one sentence each.
+    pub fn doubts(&self) -> &[String] {
+        &self.doubts
     }
 
     /// Segments a rod.
@@ -304,14 +335,14 @@ impl Simulation {
 /// The explicit method, and its stable step in the scenario's unit of time, which `step`
 /// must not exceed.
 fn explicit(
-    leaf: DiscreteLeaf,
+    leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     step: Option<f64>,
 ) -> Result<(Explicit, StableStep), Refused> {
     let own = step.map(|step| step / physics.time);
     let explicit =
-        Explicit::new(leaf, physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
+        Explicit::new(leaf.clone(), physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
     let bound = explicit.stable_step();
     let stable = bound.step * physics.time;
     match step {

@@ -8,8 +8,9 @@ use crate::scenario::{Scenario, Start};
 use std::f64::consts::PI;
 
 /// Largest force in a segment of the arcs that a leaf is released from, in units of A/L^2 of its
-/// rod. A rod under a larger one buckles in waves shorter than half its length.
-const LARGEST_FORCE: f64 = 16.0 * PI * PI;
+/// rod. A rod under a larger one buckles in waves shorter than an eighth of its length, which few
+/// segments do not resolve.
+const LARGEST_FORCE: f64 = 256.0 * PI * PI;
 
 /// The positions and rotations at time 0.
 pub(super) fn state(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
