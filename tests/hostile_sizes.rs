@@ -154,7 +154,10 @@ fn a_simulation_of_weeks_is_refused_before_it_starts() {
     }
     let stiff = "--set stiffness.torsion=1e12 --set dynamics.section_radius=1e-6";
     let most = "at most 3 are allowed";
-    place.refuses(format!("simulate leaf.toml {stiff}"), most);
+    place.refuses(
+        format!("simulate leaf.toml --method explicit {stiff}"),
+        most,
+    );
 }
 
 /// A vein with a kink whose shooting takes several intervals: its grid is that of

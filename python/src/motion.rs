@@ -181,6 +181,12 @@ impl Motion {
         )
     }
 
+    /// What makes it doubtful from its beginning.
+    #[getter]
+    fn doubts(&self) -> Vec<String> {
+        self.state().simulation.doubts().to_vec()
+    }
+
     #[getter]
     fn method(&self) -> &'static str {
         self.state().simulation.scheme().word()

@@ -26,7 +26,7 @@ pub struct Simulate {
     #[command(flatten)]
     request: Request,
 
-    /// How the leaf is moved; left out: explicit, unless a rod is rigid
+    /// How the leaf is moved; left out: in the way that costs less, as the report says
     #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(Scheme::word)))]
     method: Option<Scheme>,
 
@@ -94,6 +94,9 @@ impl Simulate {
         let stopped = record(simulation, recording, job.progress())?;
         let record = recording.record(simulation, stopped)?;
         job.remark(record.remark());
+        for doubt in &record.doubts {
+            job.remark(Some(doubt));
+        }
         let written = recording.finish(&job.document(&record));
         if written.is_err() {
             // The motion so far need not be lost.

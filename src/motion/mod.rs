@@ -6,8 +6,10 @@ mod friction;
 mod method;
 mod physics;
 mod semi_implicit;
+mod unstrained;
 
 pub use explicit::{Explicit, Rigid, StableStep};
 pub use method::{Energy, Method, Snapshot, Stopped, Velocity};
 pub use physics::{Inertia, Physics};
 pub use semi_implicit::{SemiImplicit, Steps};
+pub use unstrained::unstrained;

@@ -62,7 +62,7 @@ pub use options::{
 pub use path::{Event, Happening, Path, Route, Stage};
 pub use request::Relaxation;
 pub use saddle::Saddle;
-pub(crate) use saddle::{NOISY, polish};
+pub(crate) use saddle::{ANY_SIGN, NOISY, polish};
 pub(crate) use segments::check_segments;
 pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};
 pub(crate) use shape::rods as shape_of;

@@ -1,7 +1,7 @@
 //! The text report of a simulation.
 
 use super::kit::*;
-use crate::simulate::Record;
+use crate::simulate::{Reason, Record};
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
@@ -18,6 +18,9 @@ impl Reported for Record {
             ("grid", format!("{} segments a vein", self.segments)),
             ("step", step(self)),
         ];
+        if self.choice.reason != Reason::Requested {
+            lines.push(("choice", self.choice.to_string()));
+        }
         lines.extend(energy(self));
         if let [tip] = self.tips.as_slice() {
             let decimals = (DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
@@ -28,7 +31,8 @@ impl Reported for Record {
     }
 
     fn remarks(&self) -> Lines {
-        labelled("remark", self.remark())
+        let remark = labelled("remark", self.remark());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
     }
 }
 

@@ -20,11 +20,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod choice;
+mod cost;
+mod doubt;
 mod error;
 mod record;
+mod start;
 mod stills;
 
 pub use crate::motion::Stopped;
+pub use choice::{Choice, Reason};
+pub use cost::Cost;
 pub use error::{MOST_SECONDS, Refused};
 pub use record::{Frame, Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
@@ -33,8 +39,8 @@ use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
-use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
-use crate::scenario::{Scenario, Start};
+use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE};
+use crate::scenario::Scenario;
 use crate::words::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
@@ -42,10 +48,6 @@ const SEGMENTS: usize = 16;
 
 /// No number of a motion is as large.
 const LARGEST_NUMBER: f64 = 1e100;
-
-/// Seconds per step and segment.
-const EXPLICIT_SECONDS: f64 = 2e-8;
-const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
 
 words! {
     /// The method of time integration.
@@ -60,7 +62,7 @@ words! {
 /// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The method; `None`: explicit, unless a rod is rigid.
+    /// The method; `None`: the one that costs less, as [`Choice`] says.
     pub scheme: Option<Scheme>,
     /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
@@ -78,7 +80,8 @@ pub struct Simulation {
     leaf: Leaf,
     grid: Grid,
     physics: Physics,
-    scheme: Scheme,
+    choice: Choice,
+    doubts: Vec<String>,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn Method + Send>,
@@ -104,32 +107,37 @@ impl Simulation {
         let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
-        let state = match scenario.dynamics.start {
-            Start::Released if leaf.held.is_none() => {
-                start(&DiscreteLeaf::new(&leaf, grid.clone()))
-            }
-            // Held tips are moved to their positions by the relaxation.
-            Start::Released | Start::AtRest => at_rest(&leaf, &grid, tolerance)?,
-        };
+        let state = start::state(&leaf, &grid, tolerance)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+        let doubt = doubt::unstable(&discrete, &physics, &state);
         let rigid = discrete.stiffest() == 0.0;
-        let scheme = options.scheme.unwrap_or(match rigid {
-            true => Scheme::SemiImplicit,
-            false => Scheme::Explicit,
-        });
-        if scheme == Scheme::SemiImplicit && !physics.clamped() {
+        let mut begun = None;
+        let choice = match Choice::without_costs(options, &physics, rigid) {
+            Some(choice) => choice,
+            None => {
+                let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
+                let cost = cost::explicit(&discrete, &physics, explicit);
+                let other =
+                    cost::semi_implicit(&discrete, &physics, &state, tolerance, cost.seconds);
+                Choice::by_costs(cost, other)
+            }
+        };
+        if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
             return Err(Refused::Held { rigid });
         }
-        if scheme == Scheme::SemiImplicit
+        if choice.scheme == Scheme::SemiImplicit
             && let Some(at) = physics.too_short_a_pulse()
         {
             return Err(Refused::Pulse { at, rigid });
         }
         let mut step = options.step;
         let mut stable = None;
-        let method: Box<dyn Method + Send> = match scheme {
+        let method: Box<dyn Method + Send> = match choice.scheme {
             Scheme::Explicit => {
-                let (explicit, bound) = explicit(discrete, &physics, &state, step)?;
+                let (explicit, bound) = match begun {
+                    Some(begun) => begun,
+                    None => explicit(&discrete, &physics, &state, step)?,
+                };
                 step = Some(explicit.longest_step() * physics.time);
                 stable = Some(bound);
                 Box::new(explicit)
@@ -144,7 +152,8 @@ impl Simulation {
         let (duration, interval) = physics.duration();
         let simulation = Simulation {
             leaf,
-            scheme,
+            choice,
+            doubts: doubt.into_iter().collect(),
             stable,
             step,
             method,
@@ -157,28 +166,35 @@ impl Simulation {
             grid,
             physics,
         };
-        match simulation.expected() {
-            Some((steps, seconds)) if seconds > MOST_SECONDS => Err(Refused::TooLong {
-                step: simulation.step.unwrap_or_default(),
-                steps,
-                seconds,
-                given: options.step.is_some(),
-            }),
+        match (simulation.step, simulation.expected()) {
+            (Some(step), Some((steps, seconds))) if seconds > MOST_SECONDS => {
+                Err(Refused::TooLong {
+                    step,
+                    steps,
+                    seconds,
+                    given: options.step.is_some(),
+                })
+            }
             _ => Ok(simulation),
         }
     }
 
     /// Steps from here to the end, and the approximate number of seconds they take on one core
-    /// of a machine of 2020; `None` if the error determines the steps.
+    /// of a machine of 2020; `None` if the error determines the steps and they were not estimated.
     pub fn expected(&self) -> Option<(f64, f64)> {
         let (duration, _) = self.physics.duration();
-        let steps = ((duration * self.physics.time - self.time()) / self.step?).max(0.0);
-        let each = match self.scheme {
-            Scheme::Explicit => EXPLICIT_SECONDS,
-            Scheme::SemiImplicit => SEMI_IMPLICIT_SECONDS,
+        let left = (duration * self.physics.time - self.time()).max(0.0);
+        let steps = match (self.step, self.choice.costs) {
+            (Some(step), _) => left / step,
+            (None, Some([_, estimated])) => estimated.steps * left / (duration * self.physics.time),
+            (None, None) => return None,
         };
-        let nodes = self.leaf.rods() * self.grid.segments();
-        Some((steps, steps * nodes as f64 * each))
+        let (rods, segments) = (self.leaf.rods(), self.grid.segments());
+        let each = match self.choice.scheme {
+            Scheme::Explicit => cost::explicit_step(rods, segments),
+            Scheme::SemiImplicit => cost::semi_implicit_step(rods, segments),
+        };
+        Some((steps, steps * each))
     }
 
     /// The moving leaf.
@@ -188,7 +204,17 @@ impl Simulation {
 
     /// The method of time integration.
     pub fn scheme(&self) -> Scheme {
-        self.scheme
+        self.choice.scheme
+    }
+
+    /// Why it is this method.
+    pub fn choice(&self) -> Choice {
+        self.choice
+    }
+
+    /// What makes the motion doubtful from its beginning: one sentence each.
+    pub fn doubts(&self) -> &[String] {
+        &self.doubts
     }
 
     /// Segments a rod.
@@ -309,14 +335,14 @@ impl Simulation {
 /// The explicit method, and its stable step in the scenario's unit of time, which `step`
 /// must not exceed.
 fn explicit(
-    leaf: DiscreteLeaf,
+    leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     step: Option<f64>,
 ) -> Result<(Explicit, StableStep), Refused> {
     let own = step.map(|step| step / physics.time);
     let explicit =
-        Explicit::new(leaf, physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
+        Explicit::new(leaf.clone(), physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
     let bound = explicit.stable_step();
     let stable = bound.step * physics.time;
     match step {
@@ -333,39 +359,4 @@ fn explicit(
             },
         )),
     }
-}
-
-/// The equilibrium under the loads and with the rest shape at time 0.
-fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
-    let scenario = at_beginning(leaf.scenario());
-    let options = relax::Options {
-        method: relax::Method::default().on_grid(Some(grid.segments())),
-        tolerance: Some(tolerance),
-        ..relax::Options::default()
-    };
-    let found = relax::relax(&scenario, &options, &mut |_| {})?;
-    if !found.outcome.is_success() {
-        return Err(Refused::NoRest {
-            outcome: found.outcome.word(),
-        });
-    }
-    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    let x = nodes().map(|node| node.position / leaf.scale.length);
-    let q = nodes().map(|node| node.rotation);
-    Ok(State::new(grid.segments(), x.collect(), q.collect()))
-}
-
-/// The scenario with the loads and the rest shape at time 0.
-fn at_beginning(scenario: &Scenario) -> Scenario {
-    let mut scenario = scenario.clone();
-    let dynamics = &scenario.dynamics;
-    scenario.gravity = dynamics.gravity.at(0.0);
-    scenario.tip_force = dynamics.tip_force.at(0.0);
-    scenario.tip_moment = dynamics.tip_moment.at(0.0);
-    let factor = dynamics.rest.at(0.0);
-    let rods = scenario.rods.iter_mut();
-    for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {
-        *curvature = curvature.scaled(factor);
-    }
-    scenario
 }

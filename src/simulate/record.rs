@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
-use super::{Scheme, Simulation, Stopped};
+use super::{Choice, Scheme, Simulation, Stopped};
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, StableStep, Velocity};
 use crate::scenario;
@@ -97,6 +97,11 @@ pub struct Record {
     /// per cent.
     #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
     pub imbalance: Option<Imbalance>,
+    /// What makes it doubtful from its beginning.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
+    /// Why it has this method.
+    pub choice: Choice,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -157,6 +162,8 @@ impl Record {
                 None => Imbalance::of(&moments, ROUNDING * scenario.scale().moment()),
                 Some(_) => None,
             },
+            doubts: simulation.doubts().to_vec(),
+            choice: simulation.choice(),
             rods: scenario.rods.len(),
             joined: scenario.joined,
             length: scenario::longest(&scenario.rods),

@@ -180,6 +180,22 @@ pub fn semi_implicit(leaf: &Leaf, state: &State, steps: Steps) -> SemiImplicit {
     SemiImplicit::new(grid, Physics::new(leaf), state, steps)
 }
 
+/// A leaf of five slender veins, in cm and N: 15 cm long and 1 mm thick, of 200 MPa.
+pub const SLENDER_VEINS: &str = r#"
+    name = "slender"
+    [leaf]
+    rods = 5
+    length = 15.0
+    fan = "symmetric"
+    [section]
+    shape = "circle"
+    diameter = 0.1
+    young = 2e4
+    mass_density = 1e-5
+    [load]
+    gravity = [0, 0, -1e-4]
+"#;
+
 /// The two methods.
 pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 

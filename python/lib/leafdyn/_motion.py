@@ -45,6 +45,8 @@ class Motion(Viewed):
     """``"completed"``, or why it ended early."""
     remark: str | None
     """The same in a sentence."""
+    doubts: list[str]
+    """What makes it doubtful from its beginning, such as a start at an unstable equilibrium."""
     method: str
     """The method."""
     stations: Array
@@ -67,6 +69,7 @@ class Motion(Viewed):
         self._core: _leafdyn.Motion | None = core
         self.name, self._joined = name, joined
         self.outcome, self.remark = core.outcome
+        self.doubts = core.doubts
         self.method = core.method
         self.stations = core.stations()
         outputs = core.outputs()

@@ -356,7 +356,8 @@ def simulate(
     Parameters
     ----------
     method
-        ``"explicit"`` or ``"semi-implicit"``; left out: explicit, unless a rod is rigid.
+        ``"explicit"`` or ``"semi-implicit"``; left out: the one that costs less;
+        ``to_dict()["choice"]`` says why.
     segments
         Segments a rod; left out: 16, or as many as the rest shape needs.
     step
@@ -381,7 +382,7 @@ def simulate(
     Warns
     -----
     LeafWarning
-        Why it ended early.
+        Why it ended early; that it starts at an unstable equilibrium.
 
     Examples
     --------
@@ -394,7 +395,7 @@ def simulate(
     with reporter(progress) as heard:
         core.follow(heard)
     found = Motion(core, leaf.name, leaf.joined)
-    warn(found.name, found.remark)
+    warn(found.name, found.remark, *found.doubts)
     return found
 
 
@@ -441,7 +442,7 @@ def frames(
     Warns
     -----
     LeafWarning
-        Behind the last output: why it ended early.
+        Before the first output: that it starts at an unstable equilibrium. Behind the last: why it ended early.
 
     Examples
     --------
@@ -453,6 +454,7 @@ def frames(
     True
     """
     leaf, core = _motion(scenario, set, method, segments, step, tolerance)
+    warn(leaf.name, *core.doubts)
     outputs: dict[str, Any] | None = core.frame()
     while outputs is not None:
         yield frame(outputs)

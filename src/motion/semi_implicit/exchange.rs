@@ -19,12 +19,12 @@ impl SemiImplicit {
         leaf.each(0..n).map(strains).collect()
     }
 
-    /// Accepts the attempted step of `h` and updates the energy balance, unless only the end of
-    /// the motion matters.
+    /// Accepts the attempted step of `h` and updates the energy balance, unless steps are only
+    /// counted.
     pub(super) fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
-        if !matches!(self.steps, Steps::ToRest { .. }) {
+        if !matches!(self.steps, Steps::ToCount(_)) {
             let exchange = self.exchange(h);
             self.balance.add(exchange);
         }

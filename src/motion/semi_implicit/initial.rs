@@ -1,11 +1,9 @@
 //! Consistent initial conditions of a leaf at rest: its forces and accelerations and, where rigid
 //! segments are strained, as those of arcs with different chords, positions without such strains.
 
-use super::curves::meeting;
 use super::step::add_inertia;
 use super::{Inertia, Moving, SemiImplicit};
-use crate::leaf::{DiscreteLeaf, State};
-use crate::newton::{Definite, Equations, Newton, Work};
+use crate::motion::unstrained::unstrained;
 use glam::{DMat3, DVec3};
 
 /// Inverse square of the length of a first step from rest, of implicit Euler, so short that the
@@ -22,21 +20,6 @@ const VIOLATION: f64 = 1e-12;
 
 /// Strain of a rigid segment, as a length, above which positions are not consistent.
 const STRAINED: f64 = 1e-8;
-
-/// Squared frequencies of the springs that hold the nodes while their positions are made
-/// consistent: stiff ones first; a straight vein that must buckle may need softer ones.
-const HOLDS: [f64; 3] = [1e3, 30.0, 1.0];
-
-/// Compliances (L^2/A) through which the leaf is made rigid: the first, the ratio of
-/// successive ones, and the last.
-const FIRST_COMPLIANCE: f64 = 0.1;
-const COMPLIANCE_RATIO: f64 = 0.3;
-const LAST_COMPLIANCE: f64 = 1e-9;
-
-/// Iterations at each of them, and their accuracy.
-const CONSISTENT_ITERATIONS: usize = 20;
-const NEARLY_CONSISTENT: f64 = 1e-4;
-const CONSISTENT: f64 = 1e-13;
 
 impl SemiImplicit {
     /// Initialises the forces of the segments and the accelerations of the nodes.
@@ -72,57 +55,13 @@ impl SemiImplicit {
         }
     }
 
-    /// Moves the nodes slightly to a state with unstrained rigid segments: the
-    /// leaf is made rigid in steps, without loads, while springs in proportion to
-    /// the masses hold its nodes. If that fails, since the side to which straight rods buckle is
-    /// undetermined, the rods become curves with a common tip. If there are none, the nodes are
-    /// not moved.
+    /// Moves the nodes slightly to a state with unstrained rigid segments, if there is one.
     fn make_consistent(&mut self) {
         let mut leaf = self.leaf.clone();
         leaf.sections.clone_from(&self.sections);
-        leaf.load_factor = 0.0;
-        let found = HOLDS.iter().find_map(|&rate| self.consistent(&leaf, rate));
-        let held = leaf.leaf.held.is_some();
-        let found = found.or_else(|| meeting(&leaf).filter(|_| !held));
-        if let Some(state) = found {
+        if let Some(state) = unstrained(&leaf, &self.state) {
             self.state = state;
         }
-    }
-
-    /// The equilibrium with springs of this `rate`, if there is one.
-    fn consistent(&mut self, leaf: &DiscreteLeaf, rate: f64) -> Option<State> {
-        let mut state = self.state.clone();
-        let mut floor = FIRST_COMPLIANCE;
-        leaf.softened(floor).strain_forces(&mut state);
-        while floor > LAST_COMPLIANCE {
-            self.hold(&leaf.softened(floor), &mut state, rate, NEARLY_CONSISTENT)?;
-            floor *= COMPLIANCE_RATIO;
-        }
-        self.hold(leaf, &mut state, rate, CONSISTENT)?;
-        Some(state)
-    }
-
-    /// Solves for the equilibrium of `leaf` with springs at the present positions of its nodes.
-    fn hold(
-        &mut self,
-        leaf: &DiscreteLeaf,
-        state: &mut State,
-        rate: f64,
-        accuracy: f64,
-    ) -> Option<f64> {
-        let newton = Newton {
-            accuracy,
-            iterations: CONSISTENT_ITERATIONS,
-            work: &mut Work::default(),
-            progress: &mut |_, _| {},
-        };
-        let held = Equations::Proximal {
-            solver: &mut Definite::default(),
-            at: &self.state,
-            rate,
-            largest: f64::INFINITY,
-        };
-        newton.solve(leaf, state, &mut self.system, held).ok()
     }
 
     /// A first step, into the trial; false if it failed.

@@ -16,7 +16,6 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
-mod curves;
 mod exchange;
 mod initial;
 mod step;
@@ -78,14 +77,9 @@ pub enum Steps {
     /// Such that the local error of positions (lengths) and rotations (radians)
     /// stays below this.
     Error(f64),
-    /// Bounded like [`Steps::Error`], if only the end of a motion matters: equations are solved
-    /// with lower accuracy, and the part `rho_inf` of unresolved motion remains after a step.
-    ToRest {
-        /// The local error.
-        error: f64,
-        /// Spectral radius at infinite frequency.
-        rho_inf: f64,
-    },
+    /// Bounded like [`Steps::Error`], if only their number matters: equations are solved with
+    /// just the accuracy that the local error is estimated with, and no energy balance is kept.
+    ToCount(f64),
 }
 
 impl Steps {
@@ -93,15 +87,7 @@ impl Steps {
     fn error(self) -> Option<f64> {
         match self {
             Steps::Fixed(_) => None,
-            Steps::Error(error) | Steps::ToRest { error, .. } => Some(error),
-        }
-    }
-
-    /// Spectral radius at infinite frequency.
-    fn rho_inf(self) -> f64 {
-        match self {
-            Steps::ToRest { rho_inf, .. } => rho_inf,
-            _ => RHO_INF,
+            Steps::Error(error) | Steps::ToCount(error) => Some(error),
         }
     }
 }
@@ -146,8 +132,6 @@ pub struct SemiImplicit {
     moving: Vec<Moving>,
     next_moving: Vec<Moving>,
     weights: Weights,
-    /// Last ratio of the size of an iteration to the square of the previous one.
-    contraction: f64,
     steps: Steps,
     step: f64,
     time: f64,
@@ -178,10 +162,9 @@ impl SemiImplicit {
             next_moving: vec![Moving::default(); state.x.len()],
             step: match steps {
                 Steps::Fixed(h) => h,
-                Steps::Error(error) | Steps::ToRest { error, .. } => 0.1 * error.cbrt(),
+                Steps::Error(error) | Steps::ToCount(error) => 0.1 * error.cbrt(),
             },
-            weights: Weights::of(steps.rho_inf()),
-            contraction: 1.0,
+            weights: Weights::of(RHO_INF),
             steps,
             time: 0.0,
             count: 0,

@@ -15,16 +15,13 @@ const LAST_ITERATION: f64 = 1e-3;
 const LARGEST_LAST: f64 = 1e-9;
 const FIXED_LAST: f64 = 1e-12;
 
-/// Iteration error if only the end of the motion matters, as a
-/// part of the permitted error.
-const LAST_TO_REST: f64 = 1e-2;
+/// Iteration error if steps are only counted, as a part of the permitted error.
+const LAST_TO_COUNT: f64 = 1e-2;
 
-/// Relative accuracy of the conjugate gradients, and the same if only the end matters.
+/// Relative accuracy of the conjugate gradients, and, if steps are only counted, as a part of the
+/// permitted error: increments are less than one, so that this is noise far below it.
 const CG_TOLERANCE: f64 = 1e-10;
-const CG_TO_REST: f64 = 1e-3;
-
-/// Least estimate of the next contraction as a part of the last one.
-const FORGETTING: f64 = 0.5;
+const CG_TO_COUNT: f64 = 1e-2;
 
 /// Largest rotation of a node in a step, radians.
 const LARGEST_TURN: f64 = 0.5;
@@ -40,7 +37,7 @@ impl SemiImplicit {
         self.factorizations += 1;
         let mut uncounted = Work::default();
         let accuracy = match self.steps {
-            Steps::ToRest { .. } => CG_TO_REST,
+            Steps::ToCount(error) => CG_TO_COUNT * error,
             _ => CG_TOLERANCE,
         };
         self.solver
@@ -100,7 +97,7 @@ impl SemiImplicit {
         self.predict(h);
         let last = match self.steps {
             Steps::Fixed(_) => FIXED_LAST,
-            Steps::ToRest { error, .. } => LAST_TO_REST * error,
+            Steps::ToCount(error) => LAST_TO_COUNT * error,
             Steps::Error(allowed) => (LAST_ITERATION * allowed).min(LARGEST_LAST),
         };
         let mut before = f64::INFINITY;
@@ -125,7 +122,8 @@ impl SemiImplicit {
             }
             self.advance_trial();
             let remaining = match self.steps {
-                Steps::ToRest { .. } => self.after_iteration(size, before),
+                // Two iterations show how fast they converge: the size of the next one.
+                Steps::ToCount(_) if before.is_finite() => size * size / before,
                 _ => size,
             };
             if remaining <= last || (size < 1e-11 && size > 0.3 * before) {
@@ -135,16 +133,6 @@ impl SemiImplicit {
             before = size;
         }
         None
-    }
-
-    /// Estimated size of the next iteration: convergence is quadratic.
-    fn after_iteration(&mut self, size: f64, before: f64) -> f64 {
-        if !before.is_finite() {
-            return self.contraction * size * size;
-        }
-        let seen = size / (before * before);
-        self.contraction = seen.max(FORGETTING * self.contraction);
-        size * size / before
     }
 
     fn local_error(&self, h: f64) -> f64 {
