@@ -224,7 +224,7 @@ fn a_flat_leaf_waves_where_its_eigenvalues_say_so() {
         for modes in [0, 2] {
             let leaf = flat(bending, torsion, modes);
             assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-            assert_eq!(leaf.path.as_ref().unwrap().word(), "branched");
+            assert!(leaf.stability.saddle.is_some());
             assert!(leaf.doubts.is_empty(), "{:?}", leaf.doubts);
             assert!(leaf.tips[0].z.abs() > 1e-4, "{}", leaf.tips[0]);
         }

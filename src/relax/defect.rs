@@ -47,6 +47,13 @@ pub struct Linear {
     pub system: System,
 }
 
+impl Linear {
+    /// The number of the grid.
+    pub fn grid(&self) -> usize {
+        self.grid
+    }
+}
+
 /// A leaf on one grid or several, with its error estimated from the equilibrium equations.
 pub struct Estimate {
     /// The largest error of a position at the nodes from which the leaf was integrated.

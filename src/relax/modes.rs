@@ -64,6 +64,9 @@ pub struct Lowest {
     pub undecided: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
+    /// The ratio of the softest eigenvalue and that on the grid whose linear equations tell the
+    /// error, at least one: beside a bifurcation their response is wrong by so much.
+    pub softening: f64,
 }
 
 /// A list of eigenvalues.
@@ -127,6 +130,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         },
         finest: None,
         coarser: None,
+        segments: Vec::new(),
     };
     let sharp = requested && options.mode_shapes;
     let low = run.tolerance >= LOW_TOLERANCE && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
@@ -152,6 +156,12 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     if options.method.segments().is_none() {
         refine(run, &mut nested, (on, enough));
     }
+    let on = run.segments_of_estimate();
+    let softening = (nested
+        .segments
+        .iter()
+        .position(|segments| Some(*segments) == on))
+    .map_or(1.0, |grid| nested.series.softening(grid));
     let Nested { series, finest, .. } = nested;
     let shapes = match options.mode_shapes {
         true => finest?.shapes(&run.levels.last()?.leaf),
@@ -171,6 +181,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         modes: series.values().into_iter().map(mode).collect(),
         undecided: series.undecided(),
         negative: series.negative().map(|negative| left_out + negative),
+        softening,
     })
 }
 
@@ -180,6 +191,8 @@ struct Nested<'a> {
     finest: Option<OnGrid<'a>>,
     /// The grid before that.
     coarser: Option<Cow<'a, Level>>,
+    /// Segments of each grid of the series.
+    segments: Vec<usize>,
 }
 
 /// The lowest modes on one grid: their number and their nodes are those of this grid alone.
@@ -201,6 +214,7 @@ impl<'a> Nested<'a> {
             return false;
         };
         self.series.push(&pairs);
+        self.segments.push(level.leaf.segments());
         self.series.rounding = modes::rounding(&level.leaf);
         let before = self.finest.replace(OnGrid { level, pairs });
         self.coarser = before.map(|before| before.level);
@@ -209,6 +223,7 @@ impl<'a> Nested<'a> {
 
     fn clear(&mut self) {
         self.series.grids.clear();
+        self.segments.clear();
         (self.finest, self.coarser) = (None, None);
     }
 }

@@ -50,8 +50,9 @@ const CORRECTED: f64 = 1e-2;
 const MANY_NODES: usize = 50_000;
 
 /// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
-/// steps of Newton's method, rests where slow loading leads: so did all of 5000 random leaves.
-/// Those of up to 3 lengths that ended elsewhere had taken 20 steps and more.
+/// steps of Newton's method without softened rods, rests where slow loading leads: so did all of
+/// 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
+/// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
 const FIRST_VALLEY: (f64, usize) = (2.0, 8);
 
 /// Rounding error per segment.
@@ -92,6 +93,9 @@ pub struct Run<'a, 'o> {
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly_stable: bool,
+    /// Factor on the error estimate of a leaf that is beside a bifurcation: see
+    /// [`Lowest::softening`](crate::relax::modes::Lowest::softening).
+    pub softening: f64,
     /// Largest remaining iteration error on any grid.
     pub remaining: f64,
     /// Convergence of Newton's method on the grids so far.
@@ -110,6 +114,8 @@ pub struct Run<'a, 'o> {
     /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
     /// led there.
     pub from_start: Option<(f64, usize)>,
+    /// Force evaluations of all walks.
+    pub walked: usize,
 }
 
 /// What a run found on its grids: see its fields of the same names.
@@ -152,6 +158,7 @@ impl<'a, 'o> Run<'a, 'o> {
             added_for_nodes: false,
             index: None,
             clearly_stable: false,
+            softening: 1.0,
             remaining: 0.0,
             contraction: Contraction::default(),
             spent: 0,
@@ -160,6 +167,7 @@ impl<'a, 'o> Run<'a, 'o> {
             path: None,
             reached: None,
             from_start: None,
+            walked: 0,
         }
     }
 
@@ -235,6 +243,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.tabulate();
         self.effects = [None; 2];
         self.index = None;
+        self.softening = 1.0;
         self.remaining = 0.0;
         self.contraction = Contraction::default();
         self.pushes = 0;
@@ -298,8 +307,22 @@ impl<'a, 'o> Run<'a, 'o> {
         self.options.limit.reached()
     }
 
+    /// Segments of the grid whose linear equations tell the error; of the finest if none do.
+    pub fn segments_of_estimate(&self) -> Option<usize> {
+        let level = match (&self.estimate, &self.linear) {
+            (Some(_), Some(linear)) => self.levels.get(linear.grid()),
+            _ => self.levels.last(),
+        };
+        level.map(|level| level.leaf.segments())
+    }
+
     /// Error estimate relative to the leaf's length: grids, unfinished iterations and rounding.
     pub fn error(&self) -> Option<f64> {
+        self.error_of_linear().map(|error| self.softening * error)
+    }
+
+    /// The error estimate as the linear equations of a grid tell it.
+    fn error_of_linear(&self) -> Option<f64> {
         let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
         let best = self.table.best().map(|best| best.error);
         let most = best.map_or(f64::INFINITY, |best| LARGEST * best);

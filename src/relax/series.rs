@@ -1,5 +1,6 @@
 //! Eigenvalues on nested grids, and what their extrapolation tells.
 
+use crate::largest::larger;
 use crate::modes::Eigenpair;
 use crate::relax::richardson::{Best, Richardson};
 
@@ -130,6 +131,21 @@ impl Series {
         };
         let all = values.iter().enumerate().all(certain);
         all.then(|| values.iter().filter(|it| it.value < 0.0).count())
+    }
+
+    /// The largest ratio of a positive eigenvalue on a grid and what it is at least without errors
+    /// of grids, either way, of those that are larger than their errors; at least one.
+    pub fn softening(&self, grid: usize) -> f64 {
+        let ratio = |it: Extrapolated| {
+            let on_grid = *self.grids[grid].get(it.number)?;
+            let least = it.value - it.error?;
+            let smallest = least.min(on_grid.abs());
+            (least > 0.0).then(|| larger(on_grid, it.value) / smallest)
+        };
+        self.values()
+            .into_iter()
+            .filter_map(ratio)
+            .fold(1.0, f64::max)
     }
 
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the

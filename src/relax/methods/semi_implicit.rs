@@ -216,6 +216,9 @@ impl Relaxation<'_> {
         motion: &mut Motion,
         tolerance: f64,
     ) -> Result<(), Stop> {
+        if motion.inertia().is_none() {
+            leaf.hold_turn(&self.state, system);
+        }
         loop {
             let (shift, inertia) = match motion.inertia() {
                 Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),

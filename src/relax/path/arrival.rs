@@ -30,9 +30,9 @@ const SAME_ENERGY: f64 = 1e-5;
 /// The finest requested grid, in segments of the grid from which it is interpolated.
 const FARTHEST_GRID: usize = 8;
 
-/// Limits on the force evaluations of a walk, and on nodes times these: typical walks take a
-/// dozen, and a few hundred for each loss of stability.
-const MOST_EVALUATIONS: usize = 8000;
+/// Limits on the force evaluations of all walks, and on nodes times those of one: typical walks
+/// take a dozen, and a few hundred for each loss of stability.
+const MOST_EVALUATIONS: usize = 3000;
 const BUDGET_OF_WALK: usize = BUDGET / 2;
 
 impl<'a> Run<'a, '_> {
@@ -109,7 +109,8 @@ impl<'a> Run<'a, '_> {
         loop {
             let (level, events, end) = self.walk(grid.clone());
             let finer = grid.refined();
-            let last = finer.segments() > FINEST || self.out_of_time();
+            let spent = self.walked >= MOST_EVALUATIONS || self.out_of_time();
+            let last = finer.segments() > FINEST || spent;
             match end {
                 Ok(()) if events.is_empty() => {
                     self.path = Some(Path::STABLE);
@@ -133,7 +134,7 @@ impl<'a> Run<'a, '_> {
                 }
                 Err(stop) => {
                     let resolved = stop != Stop::Unresolved || finer.segments() > FINEST_RESOLVING;
-                    if (resolved && last) || self.out_of_time() {
+                    if (resolved && last) || spent {
                         self.push(level);
                         return Err(stop);
                     }
@@ -186,8 +187,9 @@ impl<'a> Run<'a, '_> {
                 residual,
             });
         };
-        let allowed = (BUDGET_OF_WALK / (leaf.rods() * segments)).min(MOST_EVALUATIONS);
-        let most = self.work.force_evaluations + allowed;
+        let left = MOST_EVALUATIONS.saturating_sub(self.walked);
+        let before = self.work.force_evaluations;
+        let most = before + left.min(BUDGET_OF_WALK / (leaf.rods() * segments));
         let mut walk = Walk::new(
             &leaf,
             (&mut self.work, &mut progress),
@@ -197,6 +199,7 @@ impl<'a> Run<'a, '_> {
         let end = walk.run();
         let events = std::mem::take(&mut walk.events);
         let reached = (walk.stage, walk.part);
+        self.walked += walk.work.force_evaluations - before;
         let mut state = walk.last();
         if leaf.tips_move_together() {
             state.join_tips();

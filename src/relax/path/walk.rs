@@ -137,7 +137,8 @@ impl<'w> Walk<'w> {
                 part if part < 1.0 - 0.5 * SHORTEST_STEP => part,
                 _ => 1.0,
             };
-            let shortest = part - at <= 1.01 * SHORTEST_STEP;
+            // A last step may be longer by a half.
+            let shortest = step <= 1.01 * SHORTEST_STEP;
             match self.step_to(part, part - at <= SUSPICIOUS_STEP) {
                 Step::Stable(drift) => {
                     self.accept(part);
