@@ -121,7 +121,7 @@ fn of_softened(
     wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
     let mut system = System::new(soft);
-    let pattern = SparsePattern::new(&system).ok()?;
+    let pattern = SparsePattern::of_coupling(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,
@@ -349,12 +349,9 @@ impl Vibration<'_> {
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
             let sigma = self.leaf.grid.sigma()[i];
             let wave = (7.0 * search as f64 * sigma).sin();
-            for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
-                for c in 0..3 {
-                    let k = 18 * (j + 97 * search) + 3 * kind + c;
-                    load[first + c] +=
-                        golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
-                }
+            for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                let k = 18 * (j + 97 * search) + c;
+                load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
             }
         }
         self.masses.times(&load)
@@ -364,10 +361,7 @@ impl Vibration<'_> {
     fn shape(&self, vector: &[f64]) -> Vec<Increment> {
         let mut shape = vec![[0.0; 6]; self.state.x.len()];
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
-            let [turn, shift] = self.pattern.unknowns(j, i);
-            let node = &mut shape[self.state.base(j) + i];
-            node[..3].copy_from_slice(&vector[turn..turn + 3]);
-            node[3..].copy_from_slice(&vector[shift..shift + 3]);
+            shape[self.state.base(j) + i] = self.pattern.unknowns(j, i).map(|at| vector[at]);
         }
         shape
     }
@@ -376,10 +370,10 @@ impl Vibration<'_> {
     fn vector(&self, shape: &[Increment]) -> Vec<f64> {
         let mut vector = vec![0.0; self.pattern.size()];
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
-            let [turn, shift] = self.pattern.unknowns(j, i);
             let node = &shape[self.state.base(j) + i];
-            vector[turn..turn + 3].copy_from_slice(&node[..3]);
-            vector[shift..shift + 3].copy_from_slice(&node[3..]);
+            for (at, part) in self.pattern.unknowns(j, i).into_iter().zip(node) {
+                vector[at] = *part;
+            }
         }
         vector
     }
