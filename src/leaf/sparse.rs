@@ -113,6 +113,11 @@ impl SparsePattern {
         })
     }
 
+    /// Number of stored entries of a factor.
+    pub fn fill(&self) -> usize {
+        self.supernodes().len_val()
+    }
+
     /// Number of unknowns.
     pub fn size(&self) -> usize {
         self.size

@@ -23,7 +23,7 @@ use crate::leaf::{DiscreteLeaf, Increment, SparseFactor, SparsePattern, State, S
 use crate::limit::Limit;
 use crate::motion::Physics;
 use glam::DVec3;
-use lanczos::{Lanczos, Mode};
+use lanczos::{Bound, Lanczos, Mode};
 pub use loaded::{eigenvalue, loaded};
 use masses::Masses;
 pub use quotient::rounding;
@@ -51,8 +51,10 @@ const ERRORS_BELOW: f64 = 40.0;
 const NEXT_BELOW: f64 = 4.0;
 
 /// Shifts closer to clustered eigenvalues: the distance from them as a part of that to
-/// the last shift, and its factor for the next attempt.
+/// the last shift, at least so many times the error of the bound on them, and its factor for the
+/// next attempt.
 const FIRST_PART: f64 = 2e-3;
+const OF_ERROR: f64 = 0.5;
 const NEXT_PART: f64 = 6.0;
 
 /// Number of searches that start with approximate modes.
@@ -286,12 +288,12 @@ impl Vibration<'_> {
         &self,
         system: &mut System,
         shift: f64,
-        bound: f64,
+        bound: Bound,
         found: usize,
     ) -> Option<Option<(f64, SparseFactor<'_>)>> {
-        let mut part = FIRST_PART;
+        let mut part = FIRST_PART.max(OF_ERROR * bound.error);
         while part < 1.0 {
-            let closer = bound - part * (bound - shift);
+            let closer = bound.eigenvalue - part * (bound.eigenvalue - shift);
             let factor = self.factorize(system, closer)?;
             if factor.negative() <= found {
                 return Some(Some((closer, factor)));
@@ -311,7 +313,7 @@ impl Vibration<'_> {
         limit: f64,
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Option<f64> {
+    ) -> Option<Bound> {
         let from_near = search < FROM_NEAR && found.len() < self.near.len();
         let (start, check_every) = match from_near {
             true => (self.near_start(found.len()), 2),
