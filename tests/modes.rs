@@ -253,12 +253,12 @@ fn eigenvalues_are_those_of_a_dense_method() {
 #[test]
 fn factors_are_as_small_as_the_coupling_allows() {
     let leaf = Leaf::new(&fig04(21));
-    for (segments, along_all, along_two) in [(8, 31_000, 25_000), (16, 95_000, 70_000)] {
+    for (segments, most) in [(8, 25_000), (16, 70_000)] {
         let system = System::new(&discrete(&leaf, segments));
         let any = SparsePattern::new(&system).unwrap().fill();
         let own = SparsePattern::of_coupling(&system).unwrap().fill();
-        assert!(any <= along_all, "{any} on {segments} segments");
-        assert!(own <= along_two, "{own} on {segments} segments");
+        assert!(own <= most, "{own} on {segments} segments");
+        assert!(own < any, "{own} for {any}");
     }
 }
 
