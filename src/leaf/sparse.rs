@@ -62,9 +62,20 @@ impl SparsePattern {
         SparsePattern::bordered(system, 0)
     }
 
+    /// The pattern of this matrix, and of others of the same leaf with the same coupling: axes
+    /// along which it is zero separate the rods.
+    pub fn of_coupling(system: &System) -> Result<Self, SparseError> {
+        SparsePattern::along(system, system.coupled_axes(), 0)
+    }
+
     /// The pattern of a leaf's matrix bordered by `rows` dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
-        let unknowns = Unknowns::new(system);
+        SparsePattern::along(system, [system.coupled(); 3], rows)
+    }
+
+    /// The pattern of rods that are coupled along these axes, with border rows.
+    fn along(system: &System, axes: [bool; 3], rows: usize) -> Result<Self, SparseError> {
+        let unknowns = Unknowns::new(system, axes);
         let border = unknowns.count;
         let size = border + rows;
         let (rods, n) = (system.rods(), system.segments);
@@ -102,15 +113,20 @@ impl SparsePattern {
         })
     }
 
+    /// Number of stored entries of a factor.
+    pub fn fill(&self) -> usize {
+        self.supernodes().len_val()
+    }
+
     /// Number of unknowns.
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// First unknown of the rotation and of the displacement of node `i` (from 1) of rod `j`.
+    /// The unknowns of the rotation and of the displacement of node `i` (from 1) of rod `j`.
     /// A joint tip has one displacement for all rods.
-    pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
-        [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
+    pub fn unknowns(&self, j: usize, i: usize) -> [usize; 6] {
+        self.unknowns.of(j, i - 1)
     }
 
     /// The matrix assembled in `system` times increments: forces, those on a joint tip all

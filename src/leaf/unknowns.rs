@@ -9,50 +9,65 @@ use faer::sparse::SymbolicSparseColMat;
 /// Blocks of the grid of rods and nodes no larger than this are not dissected.
 const DISSECTION_LEAF: usize = 4;
 
+/// Of a block this many times wider than it is long, in unknowns, the rods are eliminated one
+/// after the other.
+const WIDE: f64 = 2.5;
+
 /// The numbering of the unknowns of the nodes.
 pub struct Unknowns {
-    /// First unknown of node i (from 0) of rod j, at j n + i.
-    first: Vec<usize>,
+    /// The unknowns of node i (from 0) of rod j, at j n + i.
+    numbers: Vec<[usize; 6]>,
     /// First unknown of the joint tip.
     pub tip: Option<usize>,
     pub segments: usize,
     /// Number of unknowns.
     pub count: usize,
+    /// Axes along which rods are coupled.
+    coupled: [bool; 3],
 }
 
 impl Unknowns {
-    /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last.
-    pub fn new(system: &System) -> Self {
+    /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
+    /// that are coupled along these axes only.
+    pub fn new(system: &System, coupled: [bool; 3]) -> Self {
         let (rods, n) = (system.rods(), system.segments);
-        let mut nodes = Vec::with_capacity(rods * n);
-        dissect((0, rods), (0, n), &mut nodes);
-        let mut first = vec![0; rods * n];
-        let mut count = 0;
-        for (j, i) in nodes {
-            first[j * n + i] = count;
-            count += if system.joined && i + 1 == n { 3 } else { 6 };
-        }
+        let mut order = Order {
+            numbers: vec![[0; 6]; rods * n],
+            count: 0,
+            segments: n,
+            joined: system.joined,
+            coupled,
+        };
+        order.dissect((0, rods), (0, n));
+        let Order {
+            mut numbers,
+            mut count,
+            ..
+        } = order;
         let tip = system.joined.then_some(count);
-        count += if system.joined { 3 } else { 0 };
+        if let Some(tip) = tip {
+            for last in numbers.iter_mut().skip(n - 1).step_by(n) {
+                last[3..].copy_from_slice(&[tip, tip + 1, tip + 2]);
+            }
+            count += 3;
+        }
         Unknowns {
-            first,
+            numbers,
             tip,
             segments: n,
             count,
+            coupled,
         }
     }
 
     /// Component `c` of node `i` (from 0) of rod `j`.
     pub fn at(&self, j: usize, i: usize, c: usize) -> usize {
-        match self.tip {
-            Some(tip) if i + 1 == self.segments && c >= 3 => tip + c - 3,
-            _ => self.first[j * self.segments + i] + c,
-        }
+        self.of(j, i)[c]
     }
 
-    /// All six unknowns of a node.
-    fn of(&self, j: usize, i: usize) -> [usize; 6] {
-        std::array::from_fn(|c| self.at(j, i, c))
+    /// All six unknowns of node `i` (from 0) of rod `j`.
+    pub fn of(&self, j: usize, i: usize) -> [usize; 6] {
+        self.numbers[j * self.segments + i]
     }
 
     /// Adds the forces on a node to a vector of all unknowns.
@@ -65,31 +80,80 @@ impl Unknowns {
     /// The values at all nodes, from a vector of all unknowns.
     pub fn field(&self, all: &[f64]) -> Field {
         let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
-        let rods = self.first.chunks_exact(self.segments).enumerate();
+        let rods = self.numbers.chunks_exact(self.segments).enumerate();
         rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
             .collect()
     }
 }
 
-/// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
-/// first, then the line between them.
-fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, usize)>) {
-    let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
-    if width == 0 || length == 0 {
-        return;
+/// The numbering, as far as it has come.
+struct Order {
+    numbers: Vec<[usize; 6]>,
+    count: usize,
+    segments: usize,
+    joined: bool,
+    coupled: [bool; 3],
+}
+
+impl Order {
+    /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
+    /// first, then the line between them. A rod is separated from its neighbours by the
+    /// displacements that are coupled to theirs alone: its other unknowns precede these.
+    fn dissect(&mut self, rods: (usize, usize), nodes: (usize, usize)) {
+        let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
+        let axes = self.coupled.iter().filter(|&&coupled| coupled).count();
+        let (across, along) = (6 * width, axes * length);
+        if width == 0 || length == 0 {
+        } else if width == 1 {
+            self.bisect(rods.0, nodes, |_| true);
+        } else if width * length <= DISSECTION_LEAF {
+            for j in rods.0..rods.1 {
+                (nodes.0..nodes.1).for_each(|i| self.number(j, i, |_| true));
+            }
+        } else if across as f64 >= WIDE * along as f64 {
+            (rods.0..rods.1).for_each(|j| self.separate(j, nodes));
+        } else if across > along {
+            let middle = rods.0 + width / 2;
+            self.dissect((rods.0, middle), nodes);
+            self.dissect((middle + 1, rods.1), nodes);
+            self.separate(middle, nodes);
+        } else {
+            let middle = nodes.0 + length / 2;
+            self.dissect(rods, (nodes.0, middle));
+            self.dissect(rods, (middle + 1, nodes.1));
+            (rods.0..rods.1).for_each(|j| self.number(j, middle, |_| true));
+        }
     }
-    if width * length <= DISSECTION_LEAF {
-        order.extend((rods.0..rods.1).flat_map(|j| (nodes.0..nodes.1).map(move |i| (j, i))));
-    } else if width > length {
-        let middle = rods.0 + width / 2;
-        dissect((rods.0, middle), nodes, order);
-        dissect((middle + 1, rods.1), nodes, order);
-        order.extend((nodes.0..nodes.1).map(|i| (middle, i)));
-    } else {
-        let middle = nodes.0 + length / 2;
-        dissect(rods, (nodes.0, middle), order);
-        dissect(rods, (middle + 1, nodes.1), order);
-        order.extend((rods.0..rods.1).map(|j| (j, middle)));
+
+    /// A rod's own unknowns, then those that are coupled.
+    fn separate(&mut self, j: usize, nodes: (usize, usize)) {
+        let coupled = self.coupled;
+        let is_coupled = |c: usize| c >= 3 && coupled[c - 3];
+        self.bisect(j, nodes, |c| !is_coupled(c));
+        (nodes.0..nodes.1).for_each(|i| self.number(j, i, is_coupled));
+    }
+
+    /// Nested dissection of the nodes of a rod, some components of each.
+    fn bisect(&mut self, j: usize, nodes: (usize, usize), some: impl Fn(usize) -> bool + Copy) {
+        if nodes.0 == nodes.1 {
+            return;
+        }
+        let middle = nodes.0 + (nodes.1 - nodes.0) / 2;
+        self.bisect(j, (nodes.0, middle), some);
+        self.bisect(j, (middle + 1, nodes.1), some);
+        self.number(j, middle, some);
+    }
+
+    /// Some components of a node; not those of the joint tip, which follows.
+    fn number(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
+        let own = match self.joined && i + 1 == self.segments {
+            true => 3,
+            false => 6,
+        };
+        for c in (0..own).filter(|&c| some(c)) {
+            self.numbers[j * self.segments + i][c] = self.count;
+            self.count += 1;
+        }
     }
 }
 
@@ -123,8 +187,9 @@ pub fn entries(
             if let Some(spring) = system.spring(j, i)
                 && (unknowns.tip.is_none() || i + 1 < n)
             {
-                for c in 0..3 {
-                    add(here[3 + c], unknowns.at(j + 1, i, 3 + c), -spring[c]);
+                let other = unknowns.of(j + 1, i);
+                for c in (0..3).filter(|&c| unknowns.coupled[c]) {
+                    add(here[3 + c], other[3 + c], -spring[c]);
                 }
             }
         }
@@ -147,13 +212,22 @@ pub fn lower_triangle(
     size: usize,
     entries: &[[usize; 2]],
 ) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
-    let mut columns = vec![Vec::new(); size];
-    for (k, [column, row]) in entries.iter().enumerate() {
-        columns[*column].push((*row, k));
+    let mut ends = vec![0; size + 1];
+    entries.iter().for_each(|[column, _]| ends[column + 1] += 1);
+    for column in 0..size {
+        ends[column + 1] += ends[column];
+    }
+    let mut sorted = vec![(0, 0); entries.len()];
+    for (k, &[column, row]) in entries.iter().enumerate() {
+        sorted[ends[column]] = (row, k);
+        ends[column] += 1;
     }
     let (mut starts, mut rows) = (vec![0], Vec::<usize>::new());
     let mut places = vec![0; entries.len()];
-    for column in &mut columns {
+    let mut begin = 0;
+    for &end in &ends[..size] {
+        let column = &mut sorted[begin..end];
+        begin = end;
         column.sort_unstable();
         let start = rows.len();
         for &(row, k) in &*column {

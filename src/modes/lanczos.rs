@@ -27,6 +27,12 @@ pub struct Mode {
     pub vector: Vec<f64>,
 }
 
+/// A Ritz value that eigenvalues do not exceed, and its relative error as seen from the shift.
+pub struct Bound {
+    pub eigenvalue: f64,
+    pub error: f64,
+}
+
 pub struct Lanczos<'a> {
     pub masses: &'a Masses,
     /// Sigma.
@@ -63,8 +69,13 @@ fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
 impl Lanczos<'_> {
     /// The eigenvalues next above sigma, from the load `start`: `wanted` or
     /// more of them, fewer if there are no more below `limit` or the run becomes
-    /// too long. Also a value that the wanted ones do not exceed.
-    pub fn run(&mut self, start: Vec<f64>, wanted: usize, limit: f64) -> (Vec<Mode>, Option<f64>) {
+    /// too long. Also a value that the wanted ones do not exceed, if some are not found.
+    pub fn run(
+        &mut self,
+        start: Vec<f64>,
+        wanted: usize,
+        limit: f64,
+    ) -> (Vec<Mode>, Option<Bound>) {
         let mut next = start;
         (self.solve)(&mut next);
         let most = (MOST + MOST_A_PAIR * wanted).min(next.len() - self.known.len());
@@ -114,7 +125,11 @@ impl Lanczos<'_> {
                     let positive = values.iter().take_while(|&&value| value > 0.0).count();
                     let found = (0..done.min(positive)).map(pair).collect();
                     let short = done < wanted && wanted <= positive;
-                    return (found, short.then(|| eigenvalue(wanted - 1)));
+                    let bound = |k: usize| Bound {
+                        eigenvalue: eigenvalue(k),
+                        error: error(k) / values[k],
+                    };
+                    return (found, short.then(|| bound(wanted - 1)));
                 }
             }
             off.push(length);

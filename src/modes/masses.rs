@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 struct Node {
     /// Rod, and number of the node from 1.
     index: (usize, usize),
-    unknowns: [usize; 2],
+    unknowns: [usize; 6],
     tensor: DMat3,
     mass: f64,
 }
@@ -47,11 +47,13 @@ impl Masses {
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; v.len()];
         for node in &self.nodes {
-            let [turn, shift] = node.unknowns;
-            let turned = node.tensor * DVec3::from_slice(&v[turn..turn + 3]);
-            for c in 0..3 {
-                product[turn + c] += turned[c];
-                product[shift + c] += node.mass * v[shift + c];
+            let [a, b, c, shifts @ ..] = node.unknowns;
+            let turned = node.tensor * DVec3::new(v[a], v[b], v[c]);
+            for (at, turned) in [a, b, c].into_iter().zip(turned.to_array()) {
+                product[at] += turned;
+            }
+            for at in shifts {
+                product[at] += node.mass * v[at];
             }
         }
         product

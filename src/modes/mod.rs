@@ -23,7 +23,7 @@ use crate::leaf::{DiscreteLeaf, Increment, SparseFactor, SparsePattern, State, S
 use crate::limit::Limit;
 use crate::motion::Physics;
 use glam::DVec3;
-use lanczos::{Lanczos, Mode};
+use lanczos::{Bound, Lanczos, Mode};
 pub use loaded::{eigenvalue, loaded};
 use masses::Masses;
 pub use quotient::rounding;
@@ -51,8 +51,10 @@ const ERRORS_BELOW: f64 = 40.0;
 const NEXT_BELOW: f64 = 4.0;
 
 /// Shifts closer to clustered eigenvalues: the distance from them as a part of that to
-/// the last shift, and its factor for the next attempt.
+/// the last shift, at least so many times the error of the bound on them, and its factor for the
+/// next attempt.
 const FIRST_PART: f64 = 2e-3;
+const OF_ERROR: f64 = 0.5;
 const NEXT_PART: f64 = 6.0;
 
 /// Number of searches that start with approximate modes.
@@ -121,7 +123,7 @@ fn of_softened(
     wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
     let mut system = System::new(soft);
-    let pattern = SparsePattern::new(&system).ok()?;
+    let pattern = SparsePattern::of_coupling(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,
@@ -286,12 +288,12 @@ impl Vibration<'_> {
         &self,
         system: &mut System,
         shift: f64,
-        bound: f64,
+        bound: Bound,
         found: usize,
     ) -> Option<Option<(f64, SparseFactor<'_>)>> {
-        let mut part = FIRST_PART;
+        let mut part = FIRST_PART.max(OF_ERROR * bound.error);
         while part < 1.0 {
-            let closer = bound - part * (bound - shift);
+            let closer = bound.eigenvalue - part * (bound.eigenvalue - shift);
             let factor = self.factorize(system, closer)?;
             if factor.negative() <= found {
                 return Some(Some((closer, factor)));
@@ -311,7 +313,7 @@ impl Vibration<'_> {
         limit: f64,
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Option<f64> {
+    ) -> Option<Bound> {
         let from_near = search < FROM_NEAR && found.len() < self.near.len();
         let (start, check_every) = match from_near {
             true => (self.near_start(found.len()), 2),
@@ -349,12 +351,9 @@ impl Vibration<'_> {
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
             let sigma = self.leaf.grid.sigma()[i];
             let wave = (7.0 * search as f64 * sigma).sin();
-            for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
-                for c in 0..3 {
-                    let k = 18 * (j + 97 * search) + 3 * kind + c;
-                    load[first + c] +=
-                        golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
-                }
+            for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                let k = 18 * (j + 97 * search) + c;
+                load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
             }
         }
         self.masses.times(&load)
@@ -364,10 +363,7 @@ impl Vibration<'_> {
     fn shape(&self, vector: &[f64]) -> Vec<Increment> {
         let mut shape = vec![[0.0; 6]; self.state.x.len()];
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
-            let [turn, shift] = self.pattern.unknowns(j, i);
-            let node = &mut shape[self.state.base(j) + i];
-            node[..3].copy_from_slice(&vector[turn..turn + 3]);
-            node[3..].copy_from_slice(&vector[shift..shift + 3]);
+            shape[self.state.base(j) + i] = self.pattern.unknowns(j, i).map(|at| vector[at]);
         }
         shape
     }
@@ -376,10 +372,10 @@ impl Vibration<'_> {
     fn vector(&self, shape: &[Increment]) -> Vec<f64> {
         let mut vector = vec![0.0; self.pattern.size()];
         for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
-            let [turn, shift] = self.pattern.unknowns(j, i);
             let node = &shape[self.state.base(j) + i];
-            vector[turn..turn + 3].copy_from_slice(&node[..3]);
-            vector[shift..shift + 3].copy_from_slice(&node[3..]);
+            for (at, part) in self.pattern.unknowns(j, i).into_iter().zip(node) {
+                vector[at] = *part;
+            }
         }
         vector
     }

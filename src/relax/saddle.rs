@@ -94,7 +94,7 @@ fn count_coupled(
     work: &mut Work,
 ) -> Option<usize> {
     assemble(leaf, state, system, excess, work);
-    let pattern = SparsePattern::new(system).ok()?;
+    let pattern = SparsePattern::of_coupling(system).ok()?;
     Some(pattern.factorize(system, shift).ok()?.negative())
 }
 

@@ -38,9 +38,8 @@ impl Linear {
         };
         for k in 0..linear.numbers.size() {
             let node = |j: usize, i: usize| {
-                let [turn, shift] = linear.numbers.unknowns(j, i);
-                let unit = |c: usize| if c < 3 { turn + c } else { shift + c - 3 } == k;
-                [0, 1, 2, 3, 4, 5].map(|c| f64::from(u8::from(unit(c))))
+                let numbers = linear.numbers.unknowns(j, i);
+                numbers.map(|number| f64::from(u8::from(number == k)))
             };
             let rod = |j: usize| (1..=linear.segments).map(|i| node(j, i)).collect();
             let field = (0..linear.rods).map(rod).collect();
@@ -56,7 +55,7 @@ impl Linear {
         let mut masses = vec![0.0; self.numbers.size()];
         for (j, i) in leaf.each(1..=self.segments) {
             let node = state.base(j) + i;
-            let [turn, shift] = self.numbers.unknowns(j, i);
+            let [turn, _, _, shift, ..] = self.numbers.unknowns(j, i);
             let inertia = physics.inertia(leaf, j, i);
             let d1 = state.q[node] * DVec3::X;
             let own = (inertia.transverse / inertia.polar()).sqrt() - 1.0;
@@ -84,9 +83,8 @@ impl Linear {
         let mut all = DVector::zeros(self.numbers.size());
         for j in (0..self.rods).rev() {
             for i in 1..=self.segments {
-                let of = node(j, i);
-                for (at, part) in self.numbers.unknowns(j, i).into_iter().zip(of.chunks(3)) {
-                    all.rows_mut(at, 3).copy_from_slice(part);
+                for (at, part) in self.numbers.unknowns(j, i).into_iter().zip(node(j, i)) {
+                    all[at] = part;
                 }
             }
         }

@@ -165,6 +165,11 @@ impl System {
         self.coupled
     }
 
+    /// The axes along which neighbours are coupled.
+    pub(super) fn coupled_axes(&self) -> [bool; 3] {
+        std::array::from_fn(|c| self.gaps.iter().any(|gap| gap[c] != 0.0))
+    }
+
     /// Coupling of gap `g` at node `i` (from 0), if there is one.
     pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
         Some(*self.gaps.get(g)? * self.coupling_weights[i])
