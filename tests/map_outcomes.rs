@@ -93,9 +93,7 @@ fn shooting_from_arcs_stays_on_the_flat_branch_of_a_softer_leaf() {
     assert_eq!(rows[1].index, Some(2));
     assert_eq!(rows[2].index, Some(2));
     let rows = soft("0.056234132519", "-1e-2", &methods, LONG);
-    expect(&rows, &[Right, OtherEquilibrium, Saddle, Right]);
-    // What shooting chanced upon has less energy than what the default found.
-    assert!(rows[1].energy.unwrap() < rows[0].energy.unwrap());
+    expect(&rows, &[Right, Right, Saddle, Right]);
 }
 
 #[test]
@@ -138,7 +136,6 @@ fn shooting_from_arcs_takes_saddles_for_answers_around_fig_10() {
     expect(&rows, &[Right, Saddle, Saddle, Right]);
     assert_eq!(rows[2].index, Some(18));
     let rows = around("0.158489319246", "-0.2", &[SEMI_IMPLICIT, EXPLICIT]);
-    expect(&rows, &[Right, OtherEquilibrium]);
-    // The default is not at the least energy there.
-    assert!(rows[1].energy.unwrap() < rows[0].energy.unwrap() - 0.1);
+    // Explicit motion begins where slow loading leads.
+    expect(&rows, &[Right, Right]);
 }

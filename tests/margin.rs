@@ -254,12 +254,17 @@ fn beyond_its_load_the_barrier_of_a_strip_is_that_of_the_elastica() {
     }
 }
 
-/// A round one can be turned without a force.
+/// A round one turns towards any push across its axis, without a force.
 #[test]
-fn a_buckled_round_column_has_no_margin() {
+fn a_buckled_round_column_is_pushed_along_its_axis_alone() {
     let found = margin(&column(1.02 * EULER, true));
-    assert!(found.barrier.is_none() && found.pushes.is_empty());
-    assert!(found.remark.unwrap().contains("cannot be told from zero"));
+    assert!(
+        found.barrier.is_none(),
+        "its other shapes are on the same circle"
+    );
+    let axes = found.pushes.iter().map(|push| push.direction.axis);
+    assert!(found.pushes.len() == 2 && axes.eq([0, 0]));
+    assert!(found.remark.unwrap().contains("turns about its base"));
 }
 
 /// Axial stiffness, and the load under which a column that is clamped at both ends buckles:

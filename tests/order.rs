@@ -56,7 +56,7 @@ fn every_extrapolation_gains_two_orders() {
     let mut rod = paper_leaf(1, [0.9, 1.2, 0.7], [80.0, 60.0, 40.0], 0.3);
     rod.rods[0].rest_curvature = [1.0, 2.0, 0.5].map(Profile::Constant);
     rod.tip_force = [1.5, -2.1, 3.0];
-    assert_orders("rod", &rod, 8);
+    assert_orders("rod", &rod, 6);
     assert_orders("fig. 4", &fig04(5), 4);
     let mut leaf = fig04(5);
     for rod in &mut leaf.rods {

@@ -74,7 +74,7 @@ fn off_eulers_load_nothing_is_reported() {
     }
 }
 
-/// A buckled round column may buckle to any side: it can turn about e1.
+/// A round column may buckle to any side: its turn about e1 is no singularity.
 #[test]
 fn a_round_column_can_turn_about_its_axis() {
     for load in [2.5, 3.0, 5.0, 10.0] {
@@ -86,15 +86,7 @@ fn a_round_column_can_turn_about_its_axis() {
         assert!(bulge.y.hypot(bulge.z) > 0.1);
         let shot = shot_near(&column, &leaf);
         agree(&format!("P = {load}"), &column, &leaf, &shot, 1e-9);
-        let places = nodes(&shot.rods).map(|node| node.position);
-        let turning: Vec<DVec3> = places.map(|r| DVec3::X.cross(r)).collect();
-        let neutral = neutral(shot);
-        let largest = largest(turning.iter().map(|v| v.length()));
-        let side = turning[1].dot(neutral.displacement[0][1]).signum();
-        for (moved, turning) in neutral.displacement[0].iter().zip(&turning) {
-            let off = *moved - side * *turning / largest;
-            assert!(off.length() < MOTION, "P = {load}: {off}");
-        }
+        assert!(shot.neutral.is_none(), "the turn is known and left out");
     }
 }
 

@@ -114,7 +114,7 @@ pub struct Run<'a, 'o> {
     /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
     /// led there.
     pub from_start: Option<(f64, usize)>,
-    /// Force evaluations of all walks.
+    /// Nodes times force evaluations of all walks.
     pub walked: usize,
 }
 

@@ -104,9 +104,9 @@ mod tests {
     #[test]
     fn only_what_has_no_preferred_direction_turns() {
         assert_eq!(axis(""), Some(DVec3::X));
-        assert_eq!(axis("[curvature]\ntwist = 0.4"), Some(DVec3::X));
+        assert_eq!(axis("[rest]\ntwist = 0.4"), Some(DVec3::X));
         for change in [
-            "[curvature]\nbend_2 = 0.1",
+            "[rest]\nbend_2 = 0.1",
             "[tip]\nheld = \"pinned\"\nposition = [0.7, 0.1, 0.0]",
         ] {
             assert_eq!(axis(change), None, "{change}");

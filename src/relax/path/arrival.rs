@@ -30,10 +30,14 @@ const SAME_ENERGY: f64 = 1e-5;
 /// The finest requested grid, in segments of the grid from which it is interpolated.
 const FARTHEST_GRID: usize = 8;
 
-/// Limits on the force evaluations of all walks, and on nodes times those of one: typical walks
-/// take a dozen, and a few hundred for each loss of stability.
+/// Limits on the force evaluations of all walks, and on nodes times these: typical walks take a
+/// dozen, and a few hundred for each loss of stability.
 const MOST_EVALUATIONS: usize = 3000;
-const BUDGET_OF_WALK: usize = BUDGET / 2;
+const BUDGET_OF_WALKS: usize = BUDGET / 8;
+
+/// The least compliance (L^2/A) on a walk: a stiffer leaf differs from it by its strains of some
+/// millionths, while the signs of the eigenvalues of its matrix would be lost to rounding.
+const WALKING_COMPLIANCE: f64 = 1e-6;
 
 impl<'a> Run<'a, '_> {
     /// Loads the leaf slowly, and brings it to rest on nested grids from where that leads; the
@@ -109,7 +113,7 @@ impl<'a> Run<'a, '_> {
         loop {
             let (level, events, end) = self.walk(grid.clone());
             let finer = grid.refined();
-            let spent = self.walked >= MOST_EVALUATIONS || self.out_of_time();
+            let spent = self.walks_left() == 0 || self.out_of_time();
             let last = finer.segments() > FINEST || spent;
             match end {
                 Ok(()) if events.is_empty() => {
@@ -174,10 +178,15 @@ impl<'a> Run<'a, '_> {
         (grid, state)
     }
 
+    /// Nodes times force evaluations that are left for walks.
+    fn walks_left(&self) -> usize {
+        BUDGET_OF_WALKS.saturating_sub(self.walked)
+    }
+
     /// Walks on one grid.
     fn walk(&mut self, grid: Grid) -> (Level, Vec<Event>, Result<(), Stop>) {
-        let leaf = DiscreteLeaf::new(self.leaf, grid);
-        let segments = leaf.segments();
+        let leaf = DiscreteLeaf::new(self.leaf, grid).softened(WALKING_COMPLIANCE);
+        let (segments, left) = (leaf.segments(), self.walks_left());
         let report = &mut *self.progress;
         let mut progress = |step: usize, residual: f64| {
             let grid = segments;
@@ -187,9 +196,8 @@ impl<'a> Run<'a, '_> {
                 residual,
             });
         };
-        let left = MOST_EVALUATIONS.saturating_sub(self.walked);
-        let before = self.work.force_evaluations;
-        let most = before + left.min(BUDGET_OF_WALK / (leaf.rods() * segments));
+        let (before, nodes) = (self.work.force_evaluations, leaf.rods() * segments);
+        let most = before + (left / nodes).min(MOST_EVALUATIONS);
         let mut walk = Walk::new(
             &leaf,
             (&mut self.work, &mut progress),
@@ -199,7 +207,9 @@ impl<'a> Run<'a, '_> {
         let end = walk.run();
         let events = std::mem::take(&mut walk.events);
         let reached = (walk.stage, walk.part);
-        self.walked += walk.work.force_evaluations - before;
+        let evaluations = walk.work.force_evaluations - before;
+        // Walks on coarse grids are cheap, and yet not many.
+        self.walked += evaluations * nodes.max(BUDGET_OF_WALKS / MOST_EVALUATIONS);
         let mut state = walk.last();
         if leaf.tips_move_together() {
             state.join_tips();

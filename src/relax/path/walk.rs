@@ -232,19 +232,21 @@ impl<'w> Walk<'w> {
         self.predict(part);
         let predicted = self.next.clone();
         let accuracy = if part < 1.0 { ON_THE_WAY } else { AT_THE_END };
-        let definite = |solver| Equations::Definite {
-            solver,
-            largest: LARGEST_INCREMENT,
-            shifted: false,
-            cg_tolerance: CG_TOLERANCE,
-        };
         let stable =
             (self.correct(accuracy, ITERATIONS, definite)).and_then(|_| self.check(&predicted));
         match stable {
             Ok((0, drift)) => return Step::Stable(drift),
             Err(stop) if !any_sign => return Step::Lost(stop),
-            Ok(_) if !any_sign => return Step::Unstable,
-            _ => {}
+            Err(_) => {}
+            Ok(_) => {
+                // Forces of stiff rods that are not converged may be compressive.
+                let again = self.correct(EXACT, ITERATIONS, definite);
+                match again.and_then(|_| self.check(&predicted)) {
+                    Ok((0, drift)) => return Step::Stable(drift),
+                    _ if !any_sign => return Step::Unstable,
+                    _ => {}
+                }
+            }
         }
         self.next.clone_from(&predicted);
         let found = self.correct(EXACT, 2 * ITERATIONS, |_| saddle::ANY_SIGN);
@@ -298,6 +300,16 @@ impl<'w> Walk<'w> {
             part,
             happening,
         });
+    }
+}
+
+/// Newton's equations in a convex valley.
+fn definite(solver: &mut Definite) -> Equations<'_> {
+    Equations::Definite {
+        solver,
+        largest: LARGEST_INCREMENT,
+        shifted: false,
+        cg_tolerance: CG_TOLERANCE,
     }
 }
 
