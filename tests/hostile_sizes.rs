@@ -59,10 +59,10 @@ fn as_much_as_is_allowed_is_used_and_no_more() {
 #[test]
 fn a_matrix_that_does_not_fit_is_named() {
     let place = Workplace::new();
-    place.write("wide.toml", leaf("wide", 100));
+    place.write("wide.toml", leaf("wide", 200));
     let stiff = "--set coupling.y=1e7 --set coupling.z=1e7 --full-model --segments 100";
     let run = place.run(format!(
-        "relax wide.toml {stiff} --memory 62MB --write none"
+        "relax wide.toml {stiff} --memory 123MB --write none"
     ));
     let run = run
         .ends(1)

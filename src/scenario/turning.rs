@@ -95,21 +95,13 @@ mod tests {
             {change}
             "#
         );
-        let table: toml::Table = text.parse().unwrap();
-        Scenario::from_toml(&toml::to_string(&table).unwrap())
-            .unwrap()
-            .turning_axis()
+        Scenario::from_toml(&text).unwrap().turning_axis()
     }
 
     #[test]
     fn only_what_has_no_preferred_direction_turns() {
         assert_eq!(axis(""), Some(DVec3::X));
         assert_eq!(axis("[rest]\ntwist = 0.4"), Some(DVec3::X));
-        for change in [
-            "[rest]\nbend_2 = 0.1",
-            "[tip]\nheld = \"pinned\"\nposition = [0.7, 0.1, 0.0]",
-        ] {
-            assert_eq!(axis(change), None, "{change}");
-        }
+        assert_eq!(axis("[rest]\nbend_2 = 0.1"), None);
     }
 }
