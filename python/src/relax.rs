@@ -89,12 +89,14 @@ impl Asked {
 
     fn options(&self) -> PyResult<Options> {
         check_stations(self.stations)?;
+        let method = self.method()?;
         Ok(Options {
-            method: self.method()?,
+            method,
             route: self.route()?,
             tolerance: self.tolerance,
             modes: self.modes,
-            mode_shapes: self.mode_shapes,
+            // Any number of modes is a request here: shooting refuses it.
+            mode_shapes: self.mode_shapes || (self.modes > 0 && method.is_shooting()),
             every_node: true,
             stations: self.stations,
             ..Options::default()
