@@ -33,9 +33,9 @@ LONG: dict[str, Callable[[], Any]] = {
     "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
     "check": lambda: leafdyn.check(fan(120), tolerance=1e-10),
     "all_shapes": lambda: leafdyn.all_shapes(FIG10, tolerance=1e-7),
-    "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 9}, switch=True),
+    "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 41}, tolerance=1e-9),
     "boundary": lambda: leafdyn.trace(
-        FIG10, ["load.gravity[2]=-0.01..-3", "stiffness.bending_3=0.5..2"], set={"leaf.rods": 9}
+        FIG10, ["load.gravity[2]=-0.01..-3", "stiffness.bending_3=0.5..2"], set={"leaf.rods": 41}, tolerance=1e-9
     ),
     "frames": lambda: sum(
         1 for _ in leafdyn.frames(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0})
