@@ -52,7 +52,8 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
         && opposite(&a.rest_curvature[2], &b.rest_curvature[2])
 }
 
-/// The state of half of a leaf that is in the state `whole`.
+/// The state of half of a leaf that is in the state `whole`. What the mirror's plane cuts is put
+/// into it: no force of the half leaf would bring it back.
 pub fn half_of(half: &Leaf, whole: &State) -> State {
     if !half.mirrored {
         return whole.clone();
@@ -63,6 +64,19 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
     for j in 0..rods {
         for k in j * n..(j + 1) * n {
             state.n[k] = half.share(j) * whole.n[k];
+        }
+        if half.in_plane(j) {
+            for k in state.base(j)..=state.base(j) + n {
+                state.x[k].y = 0.0;
+                state.q[k] = about_normal(state.q[k]);
+            }
+            for force in &mut state.n[j * n..(j + 1) * n] {
+                force.y = 0.0;
+            }
+        }
+        if half.joined() {
+            let tip = state.base(j) + n;
+            state.x[tip].y = 0.0;
         }
     }
     state
@@ -116,6 +130,11 @@ fn turned(q: DQuat, image: bool) -> DQuat {
         true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
         false => q,
     }
+}
+
+/// The part of a rotation about the plane's normal.
+fn about_normal(q: DQuat) -> DQuat {
+    DQuat::from_xyzw(0.0, q.y, 0.0, q.w).normalize()
 }
 
 fn reflect(v: DVec3, image: bool) -> DVec3 {

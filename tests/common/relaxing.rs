@@ -1,6 +1,6 @@
 //! Options of relaxations, and leaves brought to rest with them.
 
-use leafdyn::relax::{Equilibrium, Method, Options, Route, SemiImplicit, relax};
+use leafdyn::relax::{Equilibrium, Method, Options, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 
 use super::{TIGHT, scenario};
@@ -104,12 +104,9 @@ pub fn kept(scenario: &Scenario, tolerance: f64) -> Equilibrium {
     settled(scenario, &keeping(to(tolerance)))
 }
 
-/// An equilibrium in which a leaf comes to rest from arcs, and the same by the full model.
+/// An equilibrium in which a leaf comes to rest, and the same by the full model.
 pub fn reduced_and_full(scenario: &Scenario, segments: Option<usize>) -> [Equilibrium; 2] {
-    let options = || Options {
-        route: Route::Release,
-        ..segments.map_or(Options::default(), on)
-    };
+    let options = || segments.map_or(Options::default(), on);
     [options(), in_full(options())].map(|options| relaxed(scenario, &options))
 }
 
