@@ -307,10 +307,10 @@ pub fn scale(scenario: &Scenario) -> Scale {
 pub fn same(scenario: &Scenario, found: &Equilibrium, full: &Equilibrium) {
     let off = apart(scenario, &found.shape.rods, &full.shape.rods);
     // Ends that differ by so much turn a segment of a twentieth by so much more.
-    let rotated = off.rotation < 20.0 * 1e-9;
-    assert!(off.position < 1e-9 && rotated, "{off:?}");
-    // So do forces, with stiffnesses of 1e5 in stretch and shear.
-    assert!(off.force < 1e5 * 1e-10 && off.moment < 1e-6, "{off:?}");
+    // Iterations of 1e-12 in the energy norm leave soft modes so much.
+    let rotated = off.rotation < 20.0 * 1e-10;
+    assert!(off.position < 5e-10 && rotated, "{off:?}");
+    assert!(off.force < 1e-8 && off.moment < 1e-8, "{off:?}");
     let [found, full] = [found, full].map(|leaf| leaf.energy.unwrap());
     let unit = scale(scenario).moment() * (1.0 + full.abs());
     let energy = found - full;
