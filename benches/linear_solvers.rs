@@ -4,7 +4,7 @@
 
 mod shared;
 
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, Solved, SparsePattern, State, System};
+use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, Solved, State, System};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::{Equilibrium, Progress, relax};
 use leafdyn::scenario::Scenario;
@@ -118,7 +118,7 @@ fn compare_solvers(rods: usize) {
     for _ in 0..ROUNDS {
         parts.round(&leaf, &state, &mut next, &mut system);
         let pattern = symbolic
-            .time(|| SparsePattern::new(&system))
+            .time(|| DirectSolver::new(&system))
             .expect("fits into memory");
         let mut factor = numeric
             .time(|| pattern.factorize(&system, 0.0))

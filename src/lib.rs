@@ -152,7 +152,7 @@ pub mod internals {
     }
     pub mod leaf {
         pub use crate::leaf::{
-            DiscreteLeaf, Grid, Leaf, Scale, Solved, SparsePattern, State, System, shift, turn,
+            DirectSolver, DiscreteLeaf, Grid, Leaf, Scale, Solved, State, System, shift, turn,
         };
     }
     pub mod modes {

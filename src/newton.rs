@@ -8,7 +8,7 @@ pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_leng
 
 use crate::largest::larger;
 use crate::leaf::{
-    DiscreteLeaf, Field, Increment, Solved, SparseError, SparsePattern, State, System,
+    DirectError, DirectSolver, DiscreteLeaf, Field, Increment, Solved, State, System,
 };
 use crate::rod::RESOLVED_TURN;
 use serde::Serialize;
@@ -76,20 +76,20 @@ pub enum Unsolved {
 }
 
 /// A matrix with pivots that have no sign is not positive definite.
-impl From<SparseError> for Unsolved {
-    fn from(error: SparseError) -> Self {
+impl From<DirectError> for Unsolved {
+    fn from(error: DirectError) -> Self {
         match error {
-            SparseError::Memory => Unsolved::Memory,
-            SparseError::NotFinite => Unsolved::Indefinite,
+            DirectError::Memory => Unsolved::Memory,
+            DirectError::NotFinite => Unsolved::Indefinite,
         }
     }
 }
 
-impl From<SparseError> for Stop {
-    fn from(error: SparseError) -> Self {
+impl From<DirectError> for Stop {
+    fn from(error: DirectError) -> Self {
         match error {
-            SparseError::Memory => Stop::Memory,
-            SparseError::NotFinite => Stop::Stuck,
+            DirectError::Memory => Stop::Memory,
+            DirectError::NotFinite => Stop::Stuck,
         }
     }
 }
@@ -107,7 +107,7 @@ pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
 pub struct Definite {
     /// The observed convergence of Newton's method so far.
     pub contraction: Contraction,
-    pub direct: Option<SparsePattern>,
+    pub direct: Option<DirectSolver>,
 }
 
 impl Definite {
@@ -136,7 +136,7 @@ impl Definite {
         }
         let pattern = match self.direct.take() {
             Some(pattern) => pattern,
-            None => SparsePattern::new(system)?,
+            None => DirectSolver::new(system)?,
         };
         let pattern = self.direct.insert(pattern);
         let mut factor = pattern.factorize(system, shift)?;
@@ -203,7 +203,7 @@ pub struct Newton<'a> {
 /// The data kept from one linear solution to the next.
 struct Linear<'s> {
     equations: Equations<'s>,
-    pattern: Option<SparsePattern>,
+    pattern: Option<DirectSolver>,
     /// The shift that keeps neutral modes from moving.
     neutral: f64,
     /// The additional shift that makes the matrix positive definite.
@@ -313,7 +313,7 @@ impl Linear<'_> {
             Equations::AnySign { .. } => {
                 let pattern = match self.pattern.take() {
                     Some(pattern) => pattern,
-                    None => SparsePattern::new(system)?,
+                    None => DirectSolver::new(system)?,
                 };
                 let pattern = self.pattern.insert(pattern);
                 let mut factor = pattern.factorize(system, self.neutral)?;

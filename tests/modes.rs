@@ -7,7 +7,7 @@ use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, t
 use common::random::{cases, drawn, leaves};
 use common::vibration::Linear;
 use common::*;
-use leafdyn::internals::leaf::{SparsePattern, State, System};
+use leafdyn::internals::leaf::{DirectSolver, State, System};
 use leafdyn::internals::motion::Physics;
 use leafdyn::relax::{Mode, relax};
 use leafdyn::scenario::Dynamics;
@@ -246,20 +246,6 @@ fn eigenvalues_are_those_of_a_dense_method() {
     assert_as_dense("one vein", &fig04(1), &on(4, 100));
     let flat = scenario("paper/fig10", "leaf.rods=5");
     assert_as_dense("a saddle", &flat, &keeping(on(10, 30)));
-}
-
-/// Fig. 4 is coupled along y and z: these displacements alone separate its rods, in the order of
-/// which they are eliminated. A factor of its matrix stays small.
-#[test]
-fn factors_are_as_small_as_the_coupling_allows() {
-    let leaf = Leaf::new(&fig04(21));
-    for (segments, most) in [(8, 25_000), (16, 70_000)] {
-        let system = System::new(&discrete(&leaf, segments));
-        let any = SparsePattern::new(&system).unwrap().fill();
-        let own = SparsePattern::of_coupling(&system).unwrap().fill();
-        assert!(own <= most, "{own} on {segments} segments");
-        assert!(own < any, "{own} for {any}");
-    }
 }
 
 /// Modes do not depend on whether a leaf was brought to rest by motion, nor on whether half of

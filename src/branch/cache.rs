@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::leaf::{SparsePattern, System};
+use crate::leaf::{DirectSolver, System};
 
 /// At most `MOST` values by key, the most recently used first.
 pub struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
@@ -40,7 +40,7 @@ const CACHED: usize = 10;
 /// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
 /// equally many segments, and ordering it takes as long as factorising a matrix.
 #[derive(Default)]
-pub struct Patterns(Mutex<LruCache<Shape, Arc<SparsePattern>, CACHED>>);
+pub struct Patterns(Mutex<LruCache<Shape, Arc<DirectSolver>, CACHED>>);
 
 /// What determines the pattern of a system: its segments, whether its rods are coupled, and
 /// the number of border rows.
@@ -48,10 +48,10 @@ type Shape = (usize, bool, usize);
 
 impl Patterns {
     /// The pattern of a system with `border` border rows; `None` if memory is short.
-    pub fn of(&self, system: &System, border: usize) -> Option<Arc<SparsePattern>> {
+    pub fn of(&self, system: &System, border: usize) -> Option<Arc<DirectSolver>> {
         let shape = (system.segments(), system.coupled(), border);
         let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = || SparsePattern::bordered(system, border).map(Arc::new);
+        let made = || DirectSolver::bordered(system, border).map(Arc::new);
         cache.at(shape, made).ok().cloned()
     }
 }

@@ -7,7 +7,7 @@ use super::field::{dot, prolong, times};
 use super::states::{advanced, forces_on, rate, stiffest_condensed};
 pub use super::stuck::Stuck;
 use super::{Direction, Solution};
-use crate::leaf::{Field, Grid, SparseFactor, SparsePattern, State, System};
+use crate::leaf::{DirectSolver, Factors, Field, Grid, State, System};
 use crate::newton::{Contraction, converged};
 use crate::rod::RESOLVED_TURN;
 
@@ -213,7 +213,7 @@ impl<'a, const N: usize> Equations<'a, N> {
     }
 
     /// The sparsity pattern of the matrix with so many border rows.
-    pub(super) fn pattern(&self, border: usize) -> Result<Arc<SparsePattern>, Stuck> {
+    pub(super) fn pattern(&self, border: usize) -> Result<Arc<DirectSolver>, Stuck> {
         let pattern = self.leaves.family.patterns.of(&self.system, border);
         pattern.ok_or(Stuck::TooLarge)
     }
@@ -233,10 +233,10 @@ fn chosen<'l, 'a, const N: usize>(
 
 /// A direct factorisation of the assembled matrix K + `shift` M.
 pub(super) fn factorized<'p>(
-    pattern: &'p SparsePattern,
+    pattern: &'p DirectSolver,
     system: &System,
     shift: f64,
-) -> Result<SparseFactor<'p>, Stuck> {
+) -> Result<Factors<'p>, Stuck> {
     Ok(pattern.factorize(system, shift)?)
 }
 

@@ -1,7 +1,7 @@
 //! Why a branch ends, or does not begin.
 
 use super::family::OutOfRange;
-use crate::leaf::SparseError;
+use crate::leaf::DirectError;
 
 /// Why no point is found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,11 +34,11 @@ pub enum Stuck {
     Unfolded,
 }
 
-impl From<SparseError> for Stuck {
-    fn from(error: SparseError) -> Self {
+impl From<DirectError> for Stuck {
+    fn from(error: DirectError) -> Self {
         match error {
-            SparseError::Memory => Stuck::TooLarge,
-            SparseError::NotFinite => Stuck::NotConverged,
+            DirectError::Memory => Stuck::TooLarge,
+            DirectError::NotFinite => Stuck::NotConverged,
         }
     }
 }

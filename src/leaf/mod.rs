@@ -4,6 +4,7 @@
 mod assembly;
 mod chain;
 mod dimensionless;
+mod direct;
 mod discrete;
 mod flow;
 mod grid;
@@ -12,20 +13,18 @@ mod mirror;
 #[cfg(test)]
 mod not_a_number;
 mod rate;
-mod sparse;
 mod state;
 mod system;
 mod turning;
-mod unknowns;
 
 pub use crate::scenario::Scale;
 pub use assembly::{Jump, Tangent};
 pub use dimensionless::{Leaf, Loads};
+pub use direct::{Bordered, DirectError, DirectSolver, Factors};
 pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
 pub use mirror::{half_of, whole_fields, whole_of};
 pub use rate::{Forces, LeafRate, Response, at_constant_force};
-pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, Sums, System};

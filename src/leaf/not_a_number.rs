@@ -56,12 +56,12 @@ fn in_a_matrix_it_makes_pivots_without_sign() {
     let (leaf, state) = on(4);
     let mut system = System::new(&leaf);
     leaf.assemble(&state, &mut system);
-    let pattern = SparsePattern::new(&system).unwrap();
+    let pattern = DirectSolver::new(&system).unwrap();
     assert_eq!(pattern.factorize(&system, 0.0).unwrap().negative(), 0);
     let nothing = (DMat3::ZERO, f64::NAN);
     system.add(1, 2, nothing, (DVec3::ZERO, DVec3::ZERO));
     let failed = pattern.factorize(&system, 0.0).err();
-    assert_eq!(failed, Some(SparseError::NotFinite));
+    assert_eq!(failed, Some(DirectError::NotFinite));
 }
 
 /// One segment of unit stiffness in twist and bending, but for -1 about one axis, and a moment of

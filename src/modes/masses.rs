@@ -1,6 +1,6 @@
 //! The mass matrix: for every node an inertia tensor and a mass.
 
-use crate::leaf::{DiscreteLeaf, Increment, SparsePattern, State, System, shift, turn};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Increment, State, System, shift, turn};
 use crate::motion::Physics;
 use glam::{DMat3, DVec3};
 
@@ -25,7 +25,7 @@ impl Masses {
         leaf: &DiscreteLeaf,
         physics: &Physics,
         state: &State,
-        pattern: &SparsePattern,
+        pattern: &DirectSolver,
     ) -> Self {
         let node = |(j, i)| {
             let inertia = physics.inertia(leaf, j, i);

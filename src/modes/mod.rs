@@ -19,7 +19,7 @@ mod loaded;
 mod masses;
 mod quotient;
 
-use crate::leaf::{DiscreteLeaf, Increment, SparseFactor, SparsePattern, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Increment, State, System};
 use crate::limit::Limit;
 use crate::motion::Physics;
 use glam::DVec3;
@@ -95,7 +95,7 @@ pub struct Wanted<'a> {
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
-    pattern: SparsePattern,
+    pattern: DirectSolver,
     masses: Masses,
     wanted: Wanted<'a>,
     /// [`Wanted::near`] as vectors.
@@ -123,7 +123,7 @@ fn of_softened(
     wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
     let mut system = System::new(soft);
-    let pattern = SparsePattern::of_coupling(&system).ok()?;
+    let pattern = DirectSolver::of_coupling(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,
@@ -179,14 +179,14 @@ fn softened(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
 
 impl Vibration<'_> {
     /// K - shift M.
-    fn factorize(&self, system: &mut System, shift: f64) -> Option<SparseFactor<'_>> {
+    fn factorize(&self, system: &mut System, shift: f64) -> Option<Factors<'_>> {
         self.leaf.assemble(self.state, system);
         self.masses.add(system, -shift);
         self.pattern.factorize(system, 0.0).ok()
     }
 
     /// A shift below all eigenvalues that are wanted, as close to them as necessary.
-    fn below_all(&self, system: &mut System) -> Option<(f64, SparseFactor<'_>)> {
+    fn below_all(&self, system: &mut System) -> Option<(f64, Factors<'_>)> {
         let (others, mut shift, next) = match self.wanted.above {
             Some((others, shift)) => (others, shift, NEXT_BELOW),
             None => (0, -self.leaf.neutral_shift(), NEXT_SHIFT),
@@ -290,7 +290,7 @@ impl Vibration<'_> {
         shift: f64,
         bound: Bound,
         found: usize,
-    ) -> Option<Option<(f64, SparseFactor<'_>)>> {
+    ) -> Option<Option<(f64, Factors<'_>)>> {
         let mut part = FIRST_PART.max(OF_ERROR * bound.error);
         while part < 1.0 {
             let closer = bound.eigenvalue - part * (bound.eigenvalue - shift);
@@ -308,7 +308,7 @@ impl Vibration<'_> {
     fn search(
         &self,
         shift: f64,
-        factor: &mut SparseFactor,
+        factor: &mut Factors,
         sought: usize,
         limit: f64,
         search: usize,

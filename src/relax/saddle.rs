@@ -1,7 +1,7 @@
 //! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
 
 use crate::largest::larger;
-use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Solved, State, System};
 use crate::newton::{Equations, Newton, Work};
 use crate::relax::path::preference;
 use glam::DVec3;
@@ -94,8 +94,8 @@ fn count_coupled(
     work: &mut Work,
 ) -> Option<usize> {
     assemble(leaf, state, system, excess, work);
-    let pattern = SparsePattern::of_coupling(system).ok()?;
-    Some(pattern.factorize(system, shift).ok()?.negative())
+    let pattern = DirectSolver::of_coupling(system).ok()?;
+    pattern.count_negative(system, shift).ok()
 }
 
 /// How many eigenvalues of an equilibrium are negative beyond doubt, how many may be on this

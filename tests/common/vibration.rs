@@ -1,7 +1,7 @@
 //! Small vibrations of a leaf at rest: its stiffness and mass matrices, dense, and its modes.
 
 use glam::{DMat3, DVec3};
-use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
+use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use leafdyn::internals::modes::{Eigenpair, Wanted, lowest};
 use leafdyn::internals::motion::Physics;
 use leafdyn::internals::rotation::outer;
@@ -13,7 +13,7 @@ use crate::common::motion::discrete;
 /// A leaf in a state, whose segments bear what their strains say, with its unknowns numbered:
 /// turns about and shifts along the lab axes. Bases are held; a joint tip is one point.
 pub struct Linear {
-    numbers: SparsePattern,
+    numbers: DirectSolver,
     rods: usize,
     segments: usize,
     stiffness: DMatrix<f64>,
@@ -27,7 +27,7 @@ impl Linear {
         leaf.strain_forces(&mut state);
         let mut system = System::new(leaf);
         leaf.assemble(&state, &mut system);
-        let numbers = SparsePattern::new(&system).unwrap();
+        let numbers = DirectSolver::new(&system).unwrap();
         let zeros = DMatrix::zeros(numbers.size(), numbers.size());
         let mut linear = Linear {
             rods: leaf.rods(),

@@ -23,7 +23,7 @@ mod step;
 use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Method, Snapshot, Stopped, Velocity, pass_count};
 use super::physics::{Inertia, Physics};
-use crate::leaf::{DiscreteLeaf, Loads, SparsePattern, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Loads, State, System};
 use crate::newton::Definite;
 use crate::rod::Section;
 use glam::{DQuat, DVec3};
@@ -295,7 +295,7 @@ impl Method for SemiImplicit {
             self.solver.direct = None;
         } else if self.solver.direct.is_none() {
             self.leaf.assemble(&self.state, &mut self.system);
-            self.solver.direct = SparsePattern::new(&self.system).ok();
+            self.solver.direct = DirectSolver::new(&self.system).ok();
         }
     }
 }

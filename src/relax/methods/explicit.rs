@@ -11,7 +11,7 @@
 //! takes fewer steps than kinetic damping, up to six times fewer, and as many as constant
 //! damping when that was chosen best.
 
-use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Snapshot, Stopped};
 use crate::newton::{Stop, Work};
@@ -216,7 +216,7 @@ fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut
     leaf.hold_turn(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
-    let Ok(pattern) = SparsePattern::new(system) else {
+    let Ok(pattern) = DirectSolver::new(system) else {
         return f64::INFINITY;
     };
     let Ok(mut factor) = pattern.factorize(system, leaf.neutral_shift()) else {

@@ -44,6 +44,11 @@ const EXACT: f64 = 1e-10;
 /// Newton iterations of a step.
 const ITERATIONS: usize = 8;
 
+/// Towards an equilibrium of any index so many iterations at a time are made, in which the leaf moves
+/// by less than this part of what it moved in those before, or none is near.
+const ITERATIONS_AT_A_TIME: usize = 4;
+const APPROACHING: f64 = 0.25;
+
 /// Relative accuracy of the first solutions with conjugate gradients.
 const CG_TOLERANCE: f64 = 1e-3;
 
@@ -249,8 +254,7 @@ impl<'w> Walk<'w> {
             }
         }
         self.next.clone_from(&predicted);
-        let found = self.correct(EXACT, 2 * ITERATIONS, |_| saddle::ANY_SIGN);
-        match found.and_then(|_| self.check(&predicted)) {
+        match (self.correct_to_any(&predicted)).and_then(|_| self.check(&predicted)) {
             Ok((0, drift)) => Step::Stable(drift),
             Ok(_) => Step::Unstable,
             Err(stop) => Step::Lost(stop),
@@ -268,6 +272,26 @@ impl<'w> Walk<'w> {
         let shift = leaf.neutral_shift();
         let index = saddle::index(leaf, &self.next, &mut self.system, shift, self.work);
         Ok((index.ok_or(Stop::Stuck)?, drift))
+    }
+
+    /// Newton's method from the predicted state to an equilibrium of any index nearby: beyond a fold
+    /// there is none, and the iteration would wander.
+    fn correct_to_any(&mut self, predicted: &State) -> Result<f64, Stop> {
+        let mut moved = f64::INFINITY;
+        for _ in 0..2 * ITERATIONS / ITERATIONS_AT_A_TIME {
+            let from = self.next.clone();
+            match self.correct(EXACT, ITERATIONS_AT_A_TIME, |_| saddle::ANY_SIGN) {
+                Err(Stop::StepLimit) => {}
+                end => return end,
+            }
+            let moves = distance(&from, &self.next);
+            let approaches = moves <= APPROACHING * moved;
+            if !approaches || distance(&self.next, predicted) > LARGEST_DRIFT {
+                return Err(Stop::Stuck);
+            }
+            moved = moves;
+        }
+        Err(Stop::StepLimit)
     }
 
     /// Newton's method from the next state.

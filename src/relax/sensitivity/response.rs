@@ -2,8 +2,7 @@
 
 use crate::largest::largest;
 use crate::leaf::{
-    DiscreteLeaf, Field, Forces, LeafRate, Response, Solved, SparseFactor, SparsePattern, State,
-    System,
+    DirectSolver, DiscreteLeaf, Factors, Field, Forces, LeafRate, Response, Solved, State, System,
 };
 use crate::relax::level::Level;
 use crate::rod::Segment;
@@ -97,8 +96,8 @@ impl Linearized {
         leaf.assemble(&level.state, &mut self.system);
         leaf.hold_turn(&level.state, &mut self.system);
         self.factorizations += 1;
-        let pattern = SparsePattern::new(&self.system).ok()?;
-        let mut factor: SparseFactor = pattern.factorize(&self.system, 0.0).ok()?;
+        let pattern = DirectSolver::new(&self.system).ok()?;
+        let mut factor: Factors = pattern.factorize(&self.system, 0.0).ok()?;
         let mut direct = |rhs: &Field| {
             *solves += 1;
             Some(factor.solve_bordered(rhs, &[]).increments)

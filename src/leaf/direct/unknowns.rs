@@ -1,9 +1,9 @@
 //! Numbering of the unknowns, and positions of the matrix entries, in the sparse
 //! factorisation.
 
-use super::chain::group_and_lane;
-use super::state::{Field, Increment};
-use super::system::System;
+use crate::leaf::chain::group_and_lane;
+use crate::leaf::state::{Field, Increment};
+use crate::leaf::system::System;
 use faer::sparse::SymbolicSparseColMat;
 
 /// Blocks of the grid of rods and nodes no larger than this are not dissected.

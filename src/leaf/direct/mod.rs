@@ -1,0 +1,239 @@
+//! The whole matrix of the leaf factorised directly, whatever the signs of its eigenvalues: for the
+//! Morse index, for modes, and for Newton's method at a saddle.
+
+mod condensed;
+mod sparse;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod unknowns;
+mod vein;
+
+use super::state::{Field, Increment};
+use super::system::System;
+use crate::memory;
+use condensed::Condensed;
+use sparse::{Sparse, Symbolic};
+use std::sync::OnceLock;
+use unknowns::{Unknowns, entries};
+
+/// Up to so many segments the matrix is factorised vein after vein. Measured: the sparse
+/// factorisation takes 1 to 3 times as long on 32 segments, 3 to 5 times on fewer, and twice that
+/// with its symbolic part.
+const MOST_CONDENSED: usize = 32;
+
+/// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
+/// symbolic factorisation where one is needed.
+pub struct DirectSolver {
+    unknowns: Unknowns,
+    /// Whether the matrix is factorised vein after vein, if its pivots allow it.
+    condenses: bool,
+    symbolic: OnceLock<Result<Symbolic, DirectError>>,
+    /// Number of border rows, which follow all unknowns.
+    border: usize,
+}
+
+/// The solution of a bordered system.
+#[derive(Clone, Debug)]
+pub struct Bordered {
+    /// The increments.
+    pub increments: Field,
+    /// The multipliers of the border.
+    pub multipliers: Vec<f64>,
+}
+
+/// The factors of a leaf's matrix.
+pub struct Factors<'a> {
+    solver: &'a DirectSolver,
+    kind: Kind<'a>,
+}
+
+enum Kind<'a> {
+    Condensed(Condensed),
+    Sparse(Sparse<'a>),
+}
+
+/// Why a matrix could not be factorised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DirectError {
+    /// It is too large for the memory that is allowed.
+    Memory,
+    /// A pivot is not a finite number: it has no sign.
+    NotFinite,
+}
+
+impl DirectSolver {
+    /// For the matrix of this leaf.
+    pub fn new(system: &System) -> Result<Self, DirectError> {
+        DirectSolver::bordered(system, 0)
+    }
+
+    /// For this matrix, and others of the same leaf with the same coupling: axes along which it is
+    /// zero separate the rods.
+    pub fn of_coupling(system: &System) -> Result<Self, DirectError> {
+        DirectSolver::along(system, system.coupled_axes(), 0)
+    }
+
+    /// For the matrix bordered by `rows` dense rows and columns at the end.
+    pub fn bordered(system: &System, rows: usize) -> Result<Self, DirectError> {
+        DirectSolver::along(system, [system.coupled(); 3], rows)
+    }
+
+    /// For rods that are coupled along these axes, with border rows.
+    fn along(system: &System, axes: [bool; 3], border: usize) -> Result<Self, DirectError> {
+        let (rods, n) = (system.rods(), system.segments);
+        let solver = DirectSolver {
+            unknowns: Unknowns::new(system, axes),
+            condenses: border == 0
+                && axes != [false; 3]
+                && n <= MOST_CONDENSED
+                && memory::factor(rods * (3 * n).pow(2)).is_ok(),
+            symbolic: OnceLock::new(),
+            border,
+        };
+        if !solver.condenses {
+            solver.symbolic(system)?;
+        }
+        Ok(solver)
+    }
+
+    fn symbolic(&self, system: &System) -> Result<&Symbolic, DirectError> {
+        let symbolic = || Symbolic::new(system, &self.unknowns, self.border);
+        self.symbolic
+            .get_or_init(symbolic)
+            .as_ref()
+            .map_err(|&error| error)
+    }
+
+    /// Number of unknowns, with those of the border.
+    pub fn size(&self) -> usize {
+        self.unknowns.count + self.border
+    }
+
+    /// The unknowns of the rotation and of the displacement of node `i` (from 1) of rod `j`.
+    /// A joint tip has one displacement for all rods.
+    pub fn unknowns(&self, j: usize, i: usize) -> [usize; 6] {
+        self.unknowns.of(j, i - 1)
+    }
+
+    /// The matrix assembled in `system` times increments: forces, those on a joint tip all
+    /// on the first rod's.
+    pub fn product(&self, system: &System, increments: &Field) -> Field {
+        let unknowns = &self.unknowns;
+        let mut x = vec![0.0; self.size()];
+        for (j, rod) in increments.iter().enumerate() {
+            for (i, node) in rod.iter().enumerate() {
+                for (c, part) in node.iter().enumerate() {
+                    x[unknowns.at(j, i, c)] = *part;
+                }
+            }
+        }
+        let mut y = vec![0.0; self.size()];
+        entries(system, unknowns, &[], self.size(), 0.0, |a, b, k| {
+            y[a] += k * x[b];
+            if a != b {
+                y[b] += k * x[a];
+            }
+        });
+        let mut forces = self.unknowns.field(&y);
+        if unknowns.tip.is_some() {
+            let others = forces.iter_mut().skip(1);
+            others.for_each(|rod| rod[unknowns.segments - 1][3..].fill(0.0));
+        }
+        forces
+    }
+
+    /// Factorises the matrix assembled in `system`, of the same leaf, plus
+    /// `shift` times its mass matrix.
+    pub fn factorize(&self, system: &System, shift: f64) -> Result<Factors<'_>, DirectError> {
+        self.factorize_bordered(system, shift, &[])
+    }
+
+    /// Number of negative eigenvalues of the matrix assembled in `system` plus `shift` times its
+    /// mass matrix.
+    pub fn count_negative(&self, system: &System, shift: f64) -> Result<usize, DirectError> {
+        let condensed = match self.condenses {
+            true => Condensed::count(system, shift),
+            false => None,
+        };
+        match condensed {
+            Some(negative) => Ok(negative),
+            None => Ok(self.factorize(system, shift)?.negative()),
+        }
+    }
+
+    /// Factorises the matrix plus `shift` times the mass matrix, bordered by as many rows as the
+    /// solver is for, with a zero corner block.
+    pub fn factorize_bordered(
+        &self,
+        system: &System,
+        shift: f64,
+        border: &[Field],
+    ) -> Result<Factors<'_>, DirectError> {
+        let condensed = match self.condenses {
+            true => Condensed::new(system, shift),
+            false => None,
+        };
+        let kind = match condensed {
+            Some(condensed) => Kind::Condensed(condensed),
+            None => {
+                let symbolic = self.symbolic(system)?;
+                Kind::Sparse(symbolic.factorize(system, &self.unknowns, shift, border)?)
+            }
+        };
+        Ok(Factors { solver: self, kind })
+    }
+}
+
+impl Factors<'_> {
+    /// Number of negative eigenvalues, by Sylvester's law of inertia.
+    pub fn negative(&self) -> usize {
+        match &self.kind {
+            Kind::Condensed(condensed) => condensed.negative(),
+            Kind::Sparse(sparse) => sparse.negative(),
+        }
+    }
+
+    /// Solves in place, with unknowns numbered as by [`DirectSolver::unknowns`].
+    pub fn solve_vector(&mut self, b: &mut [f64]) {
+        match &mut self.kind {
+            Kind::Condensed(condensed) => condensed.solve(&self.solver.unknowns, b),
+            Kind::Sparse(sparse) => sparse.solve(b),
+        }
+    }
+
+    /// Solves for the right-hand side assembled in `system` plus `inertia` (see
+    /// [`System::solve`]); the solution is stored in `system`.
+    pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
+        let mut rhs = system.rhs();
+        if let Some((velocity, per_step)) = inertia {
+            for (j, rod) in rhs.iter_mut().enumerate() {
+                for (i, rhs) in rod.iter_mut().enumerate() {
+                    let mass = system.mass(j, i);
+                    for c in 0..6 {
+                        rhs[c] += mass[c / 3] * velocity[j][i][c] * per_step;
+                    }
+                }
+            }
+        }
+        system.set_solution(&self.solve_bordered(&rhs, &[]).increments);
+    }
+
+    /// Solves the bordered system for forces `rhs`, and `below` in the rows of
+    /// the border.
+    pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
+        let unknowns = &self.solver.unknowns;
+        let mut b = vec![0.0; self.solver.size()];
+        for (j, rod) in rhs.iter().enumerate() {
+            for (i, rhs) in rod.iter().enumerate() {
+                unknowns.gather(j, i, rhs, &mut b);
+            }
+        }
+        b[unknowns.count..].copy_from_slice(below);
+        self.solve_vector(&mut b);
+        Bordered {
+            increments: unknowns.field(&b),
+            multipliers: b[unknowns.count..].to_vec(),
+        }
+    }
+}

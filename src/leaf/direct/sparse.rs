@@ -1,0 +1,199 @@
+//! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
+
+use super::DirectError;
+use super::unknowns::{Unknowns, entries, lower_triangle};
+use crate::leaf::state::Field;
+use crate::leaf::system::System;
+use crate::memory;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky, supernodal,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+
+/// The symbolic factorisation of a leaf's matrix, bordered or not.
+pub struct Symbolic {
+    factors: SymbolicCholesky<usize>,
+    /// Pattern of the lower triangle, and the position in it of each of the [`entries`].
+    lower: SymbolicSparseColMat<usize>,
+    places: Vec<usize>,
+    size: usize,
+}
+
+/// L B L^T by Bunch and Kaufman within supernodes.
+pub struct Sparse<'a> {
+    symbolic: &'a Symbolic,
+    values: Vec<f64>,
+    subdiagonal: Vec<f64>,
+    forward: Vec<usize>,
+    inverse: Vec<usize>,
+    memory: MemBuffer,
+}
+
+impl Symbolic {
+    /// Of a leaf's matrix with so many border rows after all unknowns.
+    pub fn new(system: &System, unknowns: &Unknowns, rows: usize) -> Result<Self, DirectError> {
+        let border = unknowns.count;
+        let size = border + rows;
+        let (rods, n) = (system.rods(), system.segments);
+        let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
+        let mut pairs = Vec::new();
+        entries(system, unknowns, &ones, border, 0.0, |a, b, _| {
+            pairs.push([a.min(b), a.max(b)]);
+        });
+        let (lower, places) = lower_triangle(size, &pairs);
+        // With its ordering given, faer reads the pattern of the upper triangle.
+        let upper = lower.transpose().to_col_major();
+        let upper = upper.map_err(|_| DirectError::Memory)?;
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let factors = factorize_symbolic_cholesky(
+            upper.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Identity,
+            params,
+        )
+        .map_err(|_| DirectError::Memory)?;
+        let symbolic = Symbolic {
+            factors,
+            lower,
+            places,
+            size,
+        };
+        memory::factor(symbolic.fill()).map_err(|_| DirectError::Memory)?;
+        Ok(symbolic)
+    }
+
+    /// Number of stored entries of the factors.
+    pub fn fill(&self) -> usize {
+        self.supernodes().len_val()
+    }
+
+    fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
+        match self.factors.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => symbolic,
+            _ => unreachable!("supernodes are forced"),
+        }
+    }
+
+    /// Factorises the matrix assembled in `system` plus `shift` times the mass matrix, bordered
+    /// with a zero corner block.
+    pub fn factorize(
+        &self,
+        system: &System,
+        unknowns: &Unknowns,
+        shift: f64,
+        border: &[Field],
+    ) -> Result<Sparse<'_>, DirectError> {
+        let symbolic = self.supernodes();
+        let mut values = vec![0.0; self.lower.compute_nnz()];
+        let mut places = self.places.iter();
+        let first_border = unknowns.count;
+        entries(
+            system,
+            unknowns,
+            border,
+            first_border,
+            shift,
+            |_, _, value| {
+                if let Some(&place) = places.next() {
+                    values[place] += value;
+                }
+            },
+        );
+        let scratch =
+            supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
+                symbolic,
+                Par::Seq,
+                Default::default(),
+            )
+            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let mut factor = Sparse {
+            symbolic: self,
+            values: vec![0.0; symbolic.len_val()],
+            subdiagonal: vec![0.0; self.size],
+            forward: vec![0; self.size],
+            inverse: vec![0; self.size],
+            memory: MemBuffer::try_new(scratch).map_err(|_| DirectError::Memory)?,
+        };
+        supernodal::factorize_supernodal_numeric_intranode_lblt(
+            &mut factor.values,
+            &mut factor.subdiagonal,
+            &mut factor.forward,
+            &mut factor.inverse,
+            SparseColMatRef::new(self.lower.as_ref(), &values),
+            symbolic,
+            Par::Seq,
+            MemStack::new(&mut factor.memory),
+            Default::default(),
+        );
+        let finite = factor.has_finite_pivots();
+        finite.then_some(factor).ok_or(DirectError::NotFinite)
+    }
+}
+
+impl Sparse<'_> {
+    fn parts(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
+        let symbolic = self.symbolic.supernodes();
+        let perm = PermRef::new_checked(&self.forward, &self.inverse, self.symbolic.size);
+        supernodal::SupernodalIntranodeLbltRef::new(symbolic, &self.values, &self.subdiagonal, perm)
+    }
+
+    /// What is not a number in the matrix spreads to a pivot.
+    fn has_finite_pivots(&self) -> bool {
+        let parts = self.parts();
+        let mut nodes = (0..parts.symbolic().n_supernodes()).map(|s| parts.supernode(s).val());
+        nodes.all(|pivots| (0..pivots.ncols()).all(|k| pivots[(k, k)].is_finite()))
+            && self.subdiagonal.iter().all(|value| value.is_finite())
+    }
+
+    /// Number of negative eigenvalues, by Sylvester's law of inertia: the
+    /// negative 1 x 1 pivots, and one for each 2 x 2 pivot (two if negative definite).
+    pub fn negative(&self) -> usize {
+        let parts = self.parts();
+        let mut negative = 0;
+        for s in 0..parts.symbolic().n_supernodes() {
+            let node = parts.supernode(s);
+            let (pivots, start) = (node.val(), node.start());
+            let mut k = 0;
+            while k < pivots.ncols() {
+                let off = self.subdiagonal[start + k];
+                if off == 0.0 {
+                    negative += usize::from(pivots[(k, k)] < 0.0);
+                    k += 1;
+                } else {
+                    let (a, b) = (pivots[(k, k)], pivots[(k + 1, k + 1)]);
+                    negative += match a * b < off * off {
+                        true => 1,
+                        false if a < 0.0 => 2,
+                        false => 0,
+                    };
+                    k += 2;
+                }
+            }
+        }
+        negative
+    }
+
+    /// Solves in place.
+    pub fn solve(&mut self, b: &mut [f64]) {
+        let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
+        let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
+        self.parts().solve_in_place_no_numeric_permute_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
+        self.memory = memory;
+        for (b, &k) in b.iter_mut().zip(&self.inverse) {
+            *b = x[k];
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Factors vein after vein against those of the sparse factorisation, which pivots by blocks.
+
+use super::*;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::scenario::Scenario;
+use glam::DVec3;
+
+const LEAF: &str = r#"
+    name = "leaf"
+    leaf = { rods = 5, length = [0.9, 1.0, 1.1, 1.0, 0.9], fan = "symmetric" }
+    stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 2.0, axial = 1e4, shear_2 = 1e3, shear_3 = 2e3 }
+    rest = { bend_2 = 0.6, twist = [0.1, 0.2, 0.3, 0.4, 0.5] }
+    coupling = { y = 20.0, z = 5.0 }
+    load = { gravity = [0.1, 0.2, -3.0] }
+"#;
+
+/// The leaf with some entries replaced, in the state it starts in, its nodes displaced by a few
+/// hundredths, so that segments carry forces of both signs.
+fn on(segments: usize, entries: &[&str]) -> System {
+    let entries: Vec<String> = entries.iter().map(|&entry| entry.into()).collect();
+    let leaf = Leaf::new(&Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap());
+    let leaf = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
+    let mut state: State = crate::relax::start(&leaf);
+    for j in 0..state.rods() {
+        let base = state.base(j);
+        let last = segments - usize::from(leaf.leaf.joined() || leaf.leaf.held.is_some());
+        for i in 1..=last {
+            let wave = 0.01 * (3.0 * (i + 2 * j) as f64).sin();
+            state.x[base + i] += wave * DVec3::new(0.2, 1.0, -0.7);
+        }
+    }
+    let mut system = System::new(&leaf);
+    leaf.assemble(&state, &mut system);
+    system
+}
+
+/// A vector without symmetry.
+fn load(size: usize) -> Vec<f64> {
+    (0..size)
+        .map(|k| ((k * 7919) % 101) as f64 - 50.0)
+        .collect()
+}
+
+/// The same matrix by the sparse factorisation.
+fn sparse(system: &System) -> DirectSolver {
+    let solver = DirectSolver::of_coupling(system).unwrap();
+    DirectSolver {
+        condenses: false,
+        ..solver
+    }
+}
+
+#[test]
+fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
+    let leaves: [&[&str]; 6] = [
+        &[],
+        &["leaf.joined=false"],
+        &[
+            "leaf.rods=2",
+            "leaf.length=1.0",
+            "rest.twist=0.3",
+            "leaf.fan=[-0.3, 0.5]",
+        ],
+        &["coupling.x=3.0", "coupling.y=0.0", "coupling.z=0.0"],
+        &[
+            "coupling.x=[1, 0, 2, 3]",
+            "coupling.y=[0, 4, 5, 6]",
+            "coupling.z=1e4",
+        ],
+        &["stiffness.axial=1e7", "load.tip_force=[-40, 3, 2]"],
+    ];
+    for entries in leaves {
+        for segments in [1, 2, 8, 15, 32] {
+            let system = on(segments, entries);
+            let (condensed, sparse) =
+                (DirectSolver::of_coupling(&system).unwrap(), sparse(&system));
+            for shift in [0.0, 5.0, -10.0, -300.0, -4e3] {
+                let what = format!("{entries:?}, {segments} segments, shift {shift}");
+                let mut here = condensed.factorize(&system, shift).unwrap();
+                assert!(matches!(here.kind, Kind::Condensed(_)), "{what}");
+                let mut there = sparse.factorize(&system, shift).unwrap();
+                assert_eq!(here.negative(), there.negative(), "{what}");
+                let count = condensed.count_negative(&system, shift);
+                assert_eq!(count, Ok(there.negative()), "{what}");
+                let mut solutions = [load(condensed.size()), load(condensed.size())];
+                here.solve_vector(&mut solutions[0]);
+                there.solve_vector(&mut solutions[1]);
+                let [a, b] = &solutions;
+                let most = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                for (a, b) in a.iter().zip(b) {
+                    // Of stiff veins both lose digits by the condition of the matrix.
+                    assert!((a - b).abs() < 1e-6 * most, "{what}: {a} for {b}");
+                }
+            }
+        }
+    }
+}
+
+/// Where a pivot is too small for what it divides, the sparse factorisation takes over.
+#[test]
+fn small_pivots_are_left_to_the_sparse_factorisation() {
+    let system = on(8, &[]);
+    let solver = DirectSolver::of_coupling(&system).unwrap();
+    // The shift at which the first pivot vanishes: at a rotation about an axis of its own.
+    let group = &system.groups[0].matrix;
+    let (own, _) = group.blocks(0, 0);
+    let turns = nalgebra::Matrix3::from_fn(|r, c| own[r.min(c)][r.max(c)]);
+    let [rotary, _] = system.mass(0, 0);
+    let shift = -turns.symmetric_eigenvalues()[1] / rotary;
+    assert!(Condensed::new(&system, shift).is_none());
+    let there = sparse(&system)
+        .factorize(&system, shift)
+        .unwrap()
+        .negative();
+    assert_eq!(solver.factorize(&system, shift).unwrap().negative(), there);
+    assert_eq!(solver.count_negative(&system, shift), Ok(there));
+}
+
+/// Axes along which veins are not coupled separate them: on finer grids, where the factors are
+/// sparse ones, these stay small.
+#[test]
+fn sparse_factors_are_as_small_as_the_coupling_allows() {
+    let system = on(64, &[]);
+    let fill = |solver: DirectSolver| solver.symbolic(&system).unwrap().fill();
+    let any = fill(DirectSolver::new(&system).unwrap());
+    let own = fill(DirectSolver::of_coupling(&system).unwrap());
+    assert!(own <= any * 9 / 10, "{own} for {any}");
+}
