@@ -307,3 +307,22 @@ fn a_buckled_branch_reports_the_straight_one_that_crosses_it() {
         );
     }
 }
+
+/// A column under its own weight that a small weight sideways bends: its pitchfork is unfolded, and the
+/// branch, stable throughout, has no critical point, however near it passes the other one.
+#[test]
+fn a_pitchfork_that_is_unfolded_is_none() {
+    let stiff = "stiffness.bending_3=1.3; stiffness.axial=1000; stiffness.shear_2=1000; stiffness.shear_3=1000";
+    for sideways in [1e-5, 3e-4, 1e-3, 1e-2] {
+        for end in [-9.0, -20.0, -35.4] {
+            let what = format!("{sideways} to {end}");
+            let entries = format!("{stiff}; load.gravity=[0, 0, {}]", -sideways);
+            let found = follow(ROD, &entries, &format!("load.gravity[0]=0..{end}"), false);
+            changes_at(&what, &found, &[], 0.0);
+            let last = found.branches[0].points.last().unwrap();
+            assert_eq!((last.value, last.index), (end, 0), "{what}");
+            let tip = last.tips[0];
+            assert!(tip.x < 0.67 && tip.z < -0.4, "{what}: {tip}");
+        }
+    }
+}

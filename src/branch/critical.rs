@@ -6,6 +6,7 @@ use super::field::{combined, dot, plus, times};
 use super::states::eigenvalue_rounding;
 use super::step::Found;
 use super::{Direction, Point};
+use crate::largest::larger;
 use crate::leaf::{Field, State};
 
 /// Additional modes in the border: others may be nearly neutral.
@@ -22,6 +23,12 @@ const LOCAL: f64 = 1e-6;
 
 /// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
 const NEUTRAL: f64 = 1e-6;
+
+/// At a zero an eigenvalue is smaller than this part of its values at the ends of the step, or than
+/// so many times its rounding error: where the step has led across a gap to another branch, it
+/// jumps.
+const CONTINUOUS: f64 = 1e-6;
+const ROUNDINGS: f64 = 100.0;
 
 /// Zeros closer than this part of a step are the same.
 const SAME: f64 = 1e-6;
@@ -200,6 +207,7 @@ impl Search<'_, '_> {
         mut value: [f64; 2],
     ) -> Result<(f64, Critical), Stuck> {
         let whole = distance[1] - distance[0];
+        let largest = larger(value[0].abs(), value[1].abs());
         let mut slope = (value[1] - value[0]) / whole;
         let mut best: Option<(f64, Evaluated)> = None;
         let (mut last, mut last_value) = (distance[1], value[1]);
@@ -229,6 +237,13 @@ impl Search<'_, '_> {
             (distance[1], value[1]) = (at, now);
         }
         let (at, best) = best.ok_or(Stuck::NotConverged)?;
+        let params = best.sample.solution.params;
+        let stiffest = self.equations.stiffest_condensed(params)?;
+        let rounding = eigenvalue_rounding(stiffest, self.from.state.segments());
+        let least = best.eigenvalues[which].abs();
+        if !(least <= larger(CONTINUOUS * largest, ROUNDINGS * rounding)) {
+            return Err(Stuck::NotConverged);
+        }
         Ok((at, self.critical(best, which, slope)))
     }
 

@@ -123,7 +123,7 @@ fn of_softened(
     wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
     let mut system = System::new(soft);
-    let pattern = DirectSolver::of_coupling(&system).ok()?;
+    let pattern = DirectSolver::of_modes(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,

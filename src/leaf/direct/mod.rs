@@ -74,6 +74,17 @@ impl DirectSolver {
         DirectSolver::along(system, system.coupled_axes(), 0)
     }
 
+    /// As [`DirectSolver::of_coupling`], but by the sparse factorisation alone, whose pivots leave
+    /// the digits that eigenvectors of stiff veins need.
+    pub fn of_modes(system: &System) -> Result<Self, DirectError> {
+        let solver = DirectSolver {
+            condenses: false,
+            ..DirectSolver::of_coupling(system)?
+        };
+        solver.symbolic(system)?;
+        Ok(solver)
+    }
+
     /// For the matrix bordered by `rows` dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, DirectError> {
         DirectSolver::along(system, [system.coupled(); 3], rows)

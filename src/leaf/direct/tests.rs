@@ -41,17 +41,9 @@ fn load(size: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The same matrix by the sparse factorisation.
-fn sparse(system: &System) -> DirectSolver {
-    let solver = DirectSolver::of_coupling(system).unwrap();
-    DirectSolver {
-        condenses: false,
-        ..solver
-    }
-}
-
 #[test]
 fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
+    let mut condensed_ones = 0;
     let leaves: [&[&str]; 6] = [
         &[],
         &["leaf.joined=false"],
@@ -72,12 +64,12 @@ fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
     for entries in leaves {
         for segments in [1, 2, 8, 15, 32] {
             let system = on(segments, entries);
-            let (condensed, sparse) =
-                (DirectSolver::of_coupling(&system).unwrap(), sparse(&system));
+            let condensed = DirectSolver::of_coupling(&system).unwrap();
+            let sparse = DirectSolver::of_modes(&system).unwrap();
             for shift in [0.0, 5.0, -10.0, -300.0, -4e3] {
                 let what = format!("{entries:?}, {segments} segments, shift {shift}");
                 let mut here = condensed.factorize(&system, shift).unwrap();
-                assert!(matches!(here.kind, Kind::Condensed(_)), "{what}");
+                condensed_ones += usize::from(matches!(here.kind, Kind::Condensed(_)));
                 let mut there = sparse.factorize(&system, shift).unwrap();
                 assert_eq!(here.negative(), there.negative(), "{what}");
                 let count = condensed.count_negative(&system, shift);
@@ -88,12 +80,13 @@ fn veins_one_by_one_have_the_solutions_and_signs_of_the_sparse_factors() {
                 let [a, b] = &solutions;
                 let most = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
                 for (a, b) in a.iter().zip(b) {
-                    // Of stiff veins both lose digits by the condition of the matrix.
-                    assert!((a - b).abs() < 1e-6 * most, "{what}: {a} for {b}");
+                    assert!((a - b).abs() < 1e-7 * most, "{what}: {a} for {b}");
                 }
             }
         }
     }
+    // Elsewhere a pivot is too small.
+    assert!(condensed_ones > 135, "{condensed_ones} of 150");
 }
 
 /// Where a pivot is too small for what it divides, the sparse factorisation takes over.
@@ -108,7 +101,8 @@ fn small_pivots_are_left_to_the_sparse_factorisation() {
     let [rotary, _] = system.mass(0, 0);
     let shift = -turns.symmetric_eigenvalues()[1] / rotary;
     assert!(Condensed::new(&system, shift).is_none());
-    let there = sparse(&system)
+    let there = DirectSolver::of_modes(&system)
+        .unwrap()
         .factorize(&system, shift)
         .unwrap()
         .negative();
@@ -125,4 +119,42 @@ fn sparse_factors_are_as_small_as_the_coupling_allows() {
     let any = fill(DirectSolver::new(&system).unwrap());
     let own = fill(DirectSolver::of_coupling(&system).unwrap());
     assert!(own <= any * 9 / 10, "{own} for {any}");
+}
+
+/// The shifts at which the count of negative eigenvalues changes, which are eigenvalues, are those of
+/// the sparse factorisation to rounding, also of leaves that are far from definite there.
+#[test]
+fn counts_change_at_the_eigenvalues() {
+    let leaves: [&[&str]; 3] = [
+        &[],
+        &[
+            "leaf.joined=false",
+            "stiffness.axial=1e5",
+            "stiffness.shear_2=3e4",
+        ],
+        &[
+            "stiffness.axial=1e6",
+            "stiffness.shear_2=1e6",
+            "stiffness.shear_3=1e6",
+            "coupling.z=300",
+        ],
+    ];
+    for entries in leaves {
+        let system = on(12, entries);
+        let condensed = DirectSolver::of_coupling(&system).unwrap();
+        let sparse = DirectSolver::of_modes(&system).unwrap();
+        for number in [1, 5, 12, 40] {
+            let found = [&condensed, &sparse].map(|solver| {
+                let mut between = [-1e6, 1e6];
+                for _ in 0..100 {
+                    let middle = 0.5 * (between[0] + between[1]);
+                    let enough = solver.count_negative(&system, middle).unwrap() >= number;
+                    between[usize::from(!enough)] = middle;
+                }
+                between[0]
+            });
+            let apart = (found[0] - found[1]).abs();
+            assert!(apart < 1e-9 * 1e6, "{entries:?}, {number}: {found:?}");
+        }
+    }
 }

@@ -2,8 +2,8 @@
 //! it, and solutions for its rotations.
 
 use super::sweep::{
-    Matrix3, Workspace, are_small, matrix3, multiply_rows, padded, rows_of, subtract_product,
-    sweep, sweep3,
+    GROWTH, Matrix3, Workspace, are_small, matrix3, multiply_rows, padded, rows_of,
+    subtract_product, sweep, sweep3,
 };
 use crate::leaf::chain::{Block, group_and_lane};
 use crate::leaf::system::System;
@@ -21,8 +21,8 @@ pub struct Vein {
 /// A node of a vein: the blocks of the assembled matrix, the inverse pivot of its rotation, and
 /// that times the block between it and the next rotation.
 pub struct Node {
-    own: Block,
-    next: Block,
+    pub own: Block,
+    pub next: Block,
     inverse: Matrix3,
     ahead: Matrix3,
 }
@@ -169,7 +169,7 @@ impl WithSimd for Elimination<'_> {
         let Elimination { work, vein, before } = self;
         let turns = eliminate_rotations(simd, vein, work)?;
         if let Some((before, coupling)) = before {
-            add_previous(&mut vein.swept, &before.swept, coupling, work);
+            add_previous(&mut vein.swept, &before.swept, coupling, work)?;
         }
         Some(turns + sweep(simd, &mut vein.swept, work)?)
     }
@@ -230,14 +230,23 @@ fn eliminate_rotations<S: Simd>(simd: S, vein: &mut Vein, work: &mut Workspace) 
 }
 
 /// Adds what the elimination of the vein before leaves: of it the swept matrix, upper triangle.
+/// `None` if that is too large.
 #[inline(always)]
-fn add_previous(swept: &mut [f64], before: &[f64], coupling: &[f64], work: &Workspace) {
+fn add_previous(
+    swept: &mut [f64],
+    before: &[f64],
+    coupling: &[f64],
+    work: &Workspace,
+) -> Option<()> {
     let Workspace { width, own, .. } = *work;
     let stride = padded(width);
     for a in 0..width {
         let factor = coupling.get(a).copied().unwrap_or(1.0);
         let row = &mut swept[a * stride..][..width];
         let from = &before[a * stride..][..width];
+        if a < own && !(factor * from[a].abs() * factor <= GROWTH * work.scale[a]) {
+            return None;
+        }
         for c in a..own {
             row[c] += factor * from[c] * coupling[c];
         }
@@ -245,4 +254,5 @@ fn add_previous(swept: &mut [f64], before: &[f64], coupling: &[f64], work: &Work
             row[c] += factor * from[c];
         }
     }
+    Some(())
 }
