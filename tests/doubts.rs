@@ -167,3 +167,37 @@ fn a_tip_held_out_of_reach_is_named() {
     assert!(said.contains("tip.position is 40 from"), "{said}");
     assert!(!said.contains("lower load"), "{said}");
 }
+
+/// A rod whose scenario has slips: an angle in degrees, and a weight of another mass.
+const SLIPPED: &str = r#"
+    name = "slipped"
+    units = { length = "m", force = "N" }
+    leaf = { rods = 1, length = 0.3, fan = [45.0] }
+    section = { shape = "rectangle", width = 0.008, thickness = 0.001, young = 1e9, mass_density = 1e-3 }
+    load = { gravity = [0.0, 0.0, -0.01] }
+    dynamics = { duration = 0.01 }"#;
+
+/// What a scenario says is doubted whatever is done with it.
+#[test]
+fn slips_are_named_of_motions_traces_and_boundaries() {
+    let doubted = |what: &str, doubts: &[String]| {
+        assert_eq!(doubts.len(), 2, "{what}: {doubts:?}");
+        assert!(doubts[0].contains("radians"), "{what}: {doubts:?}");
+        assert!(doubts[1].contains("acceleration"), "{what}: {doubts:?}");
+    };
+    let slipped = Scenario::from_toml(SLIPPED).unwrap();
+    doubted("rest", &settle(&slipped, 1e-3).doubts);
+    let motion = leafdyn::simulate::Simulation::new(&slipped, &Default::default()).unwrap();
+    doubted("motion", motion.doubts());
+    let request =
+        || common::branch::request(base(SLIPPED, ""), "load.tip_force[2]=0..0.01", 1e-3, 20);
+    let traced = leafdyn::study::trace(&request(), &mut |_, _, _| {}).unwrap();
+    doubted("trace", &traced.doubts);
+    let request = leafdyn::study::BoundaryRequest {
+        trace: request(),
+        across: "section.young=1e9..2e9".parse().unwrap(),
+        map: None,
+    };
+    let bound = leafdyn::study::boundary(&request, &mut |_, _, _| {}).unwrap();
+    doubted("boundary", &bound.doubts);
+}

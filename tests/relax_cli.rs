@@ -192,6 +192,24 @@ fn no_modes_are_null() {
     assert!(!run.out.contains("modes"));
 }
 
+/// A column at the load under which its own weight makes it buckle (Greenhill 1881).
+#[test]
+fn a_frequency_of_zero_is_told_with_what_it_means() {
+    let place = Workplace::new();
+    let column = r#"
+        name = "column"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 2.0, axial = inf, shear_2 = inf, shear_3 = inf }
+        load = { gravity = [-7.8373474, 0.0, 0.0] }"#;
+    place.write("column.toml", column);
+    let run = place.run("relax column.toml --write none --modes 2");
+    let parts = [
+        "modes    lowest frequencies 0, ",
+        "; zero within its error: ",
+    ];
+    run.ends(0).says(&parts);
+}
+
 /// The flat shape of this soft leaf is a saddle.
 #[test]
 fn unstable_modes_are_told_and_marked() {

@@ -116,6 +116,10 @@ impl Trace {
         .map_err(name_option)?;
         drop(line);
         job.remark(boundary.remark.as_ref());
+        boundary
+            .doubts
+            .iter()
+            .for_each(|doubt| job.remark(Some(doubt)));
         job.deliver(&boundary, boundary.complete)
     }
 
@@ -147,6 +151,10 @@ impl Trace {
         drop(line);
         trace.show.clone_from(&self.show);
         job.remark(trace.remark.as_ref());
+        trace
+            .doubts
+            .iter()
+            .for_each(|doubt| job.remark(Some(doubt)));
         job.deliver(&trace, trace.complete)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::method::{Energy, Snapshot, Stopped, Velocity};
 use super::physics::Physics;
+use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
@@ -74,13 +75,13 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
 
 /// Fails if the grid cannot resolve a segment bent by `turn`.
 pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
-    match turn > RESOLVED_TURN {
-        true => Err(Stopped::Unresolved {
+    match turn <= RESOLVED_TURN {
+        true => Ok(()),
+        false => Err(Stopped::Unresolved {
             time,
             turn,
             segments: leaf.segments(),
         }),
-        false => Ok(()),
     }
 }
 
@@ -153,7 +154,7 @@ impl EnergyBalance {
         }
         let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn();
         let turns = leaf.each(0..leaf.segments()).map(turn);
-        resolved(leaf, time, turns.fold(0.0, f64::max))
+        resolved(leaf, time, largest(turns))
     }
 
     /// Passes all numbers to `each`.

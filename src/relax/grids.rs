@@ -1,5 +1,6 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
+use crate::largest::largest;
 use crate::leaf::{Grid, RodFields, State};
 use crate::memory;
 use crate::newton::Stop;
@@ -225,7 +226,6 @@ impl Run<'_, '_> {
 fn largest_turn(level: &Level) -> f64 {
     let n = level.leaf.segments();
     let rods = level.state.q.chunks_exact(n + 1);
-    rods.flat_map(|rod| rod.windows(2))
-        .map(|ends| ends[0].angle_between(ends[1]))
-        .fold(0.0, f64::max)
+    let ends = rods.flat_map(|rod| rod.windows(2));
+    largest(ends.map(|ends| ends[0].angle_between(ends[1])))
 }

@@ -9,11 +9,10 @@ use crate::relax::level::{Level, flat};
 use crate::relax::method::Method;
 use crate::relax::nodes::with_sign_of;
 use crate::relax::path::{Event, Happening, Path, Stage};
-use crate::relax::plausible;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Run;
 use crate::relax::shape;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, obstacle};
 use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
 use glam::DVec3;
@@ -293,7 +292,7 @@ const COUNTS: f64 = 0.1;
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
 fn advice(run: &Run) -> String {
-    if let Some(slip) = plausible::slip(run.leaf.scenario()) {
+    if let Some(slip) = obstacle(run.leaf.scenario()) {
         return format!(": {slip}");
     }
     let Some(level) = run.levels.last() else {

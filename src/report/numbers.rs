@@ -6,6 +6,9 @@ use crate::relax::Equilibrium;
 /// Digits shown after the first for a result without an error estimate.
 const DIGITS: i32 = 9;
 
+/// Part of a length up to which rounding leaves its digits.
+pub const ROUNDING: f64 = 1e-14;
+
 /// The number of veins, and whether their tips are joined.
 pub fn veins(equilibrium: &Equilibrium) -> String {
     veins_of(equilibrium.shape.rods.len(), equilibrium.shape.joined)
@@ -65,8 +68,10 @@ pub fn seconds(time: f64) -> String {
 
 /// The number of decimals that the error of a position leaves.
 pub fn decimals(equilibrium: &Equilibrium) -> usize {
-    let relative = 10f64.powi(-DIGITS) * equilibrium.shape.longest();
-    decimals_within(equilibrium.accuracy.error_estimate.unwrap_or(relative))
+    let longest = equilibrium.shape.longest();
+    let relative = 10f64.powi(-DIGITS) * longest;
+    let error = equilibrium.accuracy.error_estimate.unwrap_or(relative);
+    decimals_within(error.max(ROUNDING * longest))
 }
 
 /// The number of decimals that an error leaves.

@@ -4,9 +4,10 @@
 use glam::DVec3;
 
 use super::kit::*;
+use crate::largest::largest;
 use crate::relax::{
     Barrier, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Outcome, Path, Push,
-    Sensitivity,
+    Reaction, Sensitivity,
 };
 use crate::study::{All, Found};
 
@@ -20,12 +21,13 @@ impl Reported for Equilibrium {
     }
 
     fn lines(&self) -> Lines {
+        let length = self.shape.longest();
         let mut lines = vec![("found", found(self))];
         lines.extend(self.path.as_ref().map(|path| ("path", way(path))));
         if let Some(saddle) = &self.stability.saddle {
             // It was seen on one grid.
             let (index, energy) = (saddle.negative_eigenvalues, brief(saddle.energy));
-            let tip = point(saddle.tip.to_array(), decimals(self).min(DECIMALS));
+            let tip = tip(saddle.tip, length);
             let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
             lines.push(("left", left));
         }
@@ -38,16 +40,16 @@ impl Reported for Equilibrium {
             lines.push(("energy", as_accurate(self, energy, energy)));
         }
         if let Some(reaction) = &self.reaction {
-            let size = reaction.force.length();
-            let force = reaction.force.to_array();
-            let force = force.map(|it| as_accurate(self, it, size)).join(", ");
+            let error = reaction_error(self, reaction);
+            let force = reaction.force.to_array().map(|it| known(it, error));
+            let force = force.join(", ");
             lines.push(("reaction", format!("({force}) on the holder of the tip")));
         }
         lines.extend(waves(self).map(|waves| ("waves", waves)));
         lines.push(("error", error(self)));
         lines.extend(modes(self).map(|modes| ("modes", modes)));
         lines.extend(labelled("changes", changes(self)));
-        let margin = self.margin.as_ref().map(margin_lines);
+        let margin = self.margin.as_ref().map(|it| margin_lines(it, length));
         lines.extend(labelled("margin", margin.unwrap_or_default()));
         if !self.accuracy.segments.is_empty() {
             lines.push(("model", self.model.description.clone()));
@@ -98,6 +100,26 @@ fn way(path: &Path) -> String {
     }
 }
 
+/// Error of positions, relative to the length, if none is estimated.
+const WITHOUT_ERROR: f64 = 1e-10;
+
+/// Errors of the force on a holder, relative to the forces within the leaf, are so many times those
+/// of positions relative to its length: of 48 leaves 14 times at most.
+const OF_FORCES: f64 = 20.0;
+
+/// The error of the force on a holder. Where that is small, as on a ring that closes by itself,
+/// the forces that bend the leaf and those of clamps tell how accurate it is.
+fn reaction_error(equilibrium: &Equilibrium, reaction: &Reaction) -> f64 {
+    let longest = equilibrium.shape.longest();
+    let moments = reaction.moments.iter().flatten();
+    let moment = largest(moments.map(|moment| moment.length()));
+    let energy = equilibrium.energy.unwrap_or_default().abs();
+    let force = largest([reaction.force.length(), moment / longest, energy / longest]);
+    let error = equilibrium.accuracy.error_estimate;
+    let relative = error.map_or(WITHOUT_ERROR, |error| error / longest);
+    OF_FORCES * relative.max(ROUNDING) * force
+}
+
 fn error(equilibrium: &Equilibrium) -> String {
     let source = match equilibrium.accuracy.intervals {
         Some(count) => format!("by {}", shooting(count)),
@@ -116,6 +138,10 @@ fn error(equilibrium: &Equilibrium) -> String {
     }
 }
 
+/// Part of the height and the length of waves to which these are told: they are measured at
+/// stations.
+const MEASURED: f64 = 5e-4;
+
 /// The waves along the margins, if any vein has waves.
 fn waves(equilibrium: &Equilibrium) -> Option<String> {
     let undulation = &equilibrium.undulation;
@@ -132,7 +158,10 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
     let (waves, high) = (margin.waves(), margin.amplitude);
     Some(match margin.wavelength {
         Some(long) => {
-            format!("{waves} along the margins, {high:.4} high and {long:.3} long; {theory}")
+            let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0);
+            let digits = |it: f64| brief(rounded_to(it, error.max(MEASURED * it)));
+            let [high, long] = [high, long].map(digits);
+            format!("{waves} along the margins, {high} high and {long} long; {theory}")
         }
         None => format!("none along the margins; {theory}"),
     })
@@ -214,15 +243,15 @@ fn work(equilibrium: &Equilibrium) -> String {
     )
 }
 
-/// Decimals of positions that were found on one grid.
-const DECIMALS: usize = 3;
+/// Part of the longest vein to which positions are told that were found on one grid.
+const ON_ONE_GRID: f64 = 1e-3;
 
-/// The lines about a margin, the smallest push first.
-fn margin_lines(margin: &Margin) -> Vec<String> {
+/// The lines about a margin of a leaf of this length, the smallest push first.
+fn margin_lines(margin: &Margin, length: f64) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| destabilizing_push(margin, push))
+        .map(|push| destabilizing_push(margin, push, length))
         .collect();
     lines.extend(stable_directions(margin));
     let unknown = margin.pushes.iter();
@@ -234,7 +263,7 @@ fn margin_lines(margin: &Margin) -> Vec<String> {
         format!("a push {which} is known up to {least} only, under which it is stable: {why}")
     }));
     match &margin.barrier {
-        Some(found) => lines.push(barrier(margin, found)),
+        Some(found) => lines.push(barrier(margin, found, length)),
         None if margin.climbs > 0 => {
             let what = "no pass to another equilibrium found";
             lines.push(format!("{what} from {} places", margin.climbs));
@@ -246,7 +275,7 @@ fn margin_lines(margin: &Margin) -> Vec<String> {
 }
 
 /// A push under which stability is lost.
-fn destabilizing_push(margin: &Margin, push: &Push) -> String {
+fn destabilizing_push(margin: &Margin, push: &Push, length: f64) -> String {
     let error = push.error.unwrap_or(0.0);
     let exact = push.force.unwrap_or_default();
     let at = force(margin, rounded_to(exact, error));
@@ -254,7 +283,8 @@ fn destabilizing_push(margin: &Margin, push: &Push) -> String {
         Some(Fate::BendsAside) => "makes it bend aside",
         Some(Fate::Snaps) | None => "snaps it",
     };
-    let rest = (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip)));
+    let rest =
+        (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip, length)));
     let within = push.error.map(|error| format!(", within {}", bound(error)));
     let weights = push.per_weight.map(|part| {
         let part = rounded_to(part, part * error / exact);
@@ -282,7 +312,7 @@ fn stable_directions(margin: &Margin) -> Option<String> {
     (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
 }
 
-fn barrier(margin: &Margin, barrier: &Barrier) -> String {
+fn barrier(margin: &Margin, barrier: &Barrier, length: f64) -> String {
     let energy = rounded_to(barrier.energy, barrier.error.unwrap_or(0.0));
     let energy = with_unit(energy, margin.units.energy().as_deref());
     let error = (barrier.error).map(|error| format!(" within {}", bound(error)));
@@ -294,13 +324,13 @@ fn barrier(margin: &Margin, barrier: &Barrier) -> String {
         "barrier of {energy}{}{}, over a saddle with tip {} to rest with tip {}",
         error.unwrap_or_default(),
         lifted.unwrap_or_default(),
-        tip(barrier.saddle.tip),
-        tip(barrier.neighbour.tip),
+        tip(barrier.saddle.tip, length),
+        tip(barrier.neighbour.tip, length),
     )
 }
 
-fn tip(tip: DVec3) -> String {
-    point(tip.to_array(), DECIMALS)
+fn tip(tip: DVec3, length: f64) -> String {
+    point(tip.to_array(), decimals_within(ON_ONE_GRID * length))
 }
 
 fn force(margin: &Margin, force: f64) -> String {
@@ -391,4 +421,17 @@ fn equilibrium_line(number: usize, found: &Found) -> String {
     let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
     let energy = as_accurate(leaf, energy, energy);
     format!("{number:>2}. energy {energy}: {stability}{tip}{within} ({starts}{plain})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A position found on one grid has three digits whatever the unit of length.
+    #[test]
+    fn positions_on_one_grid_have_digits_of_the_leaf() {
+        let at = |unit: f64| tip(DVec3::new(1.2345, 0.0, -0.5) * unit, 1.5 * unit);
+        assert_eq!(at(1.0), "(1.23, 0.00, -0.50)");
+        assert_eq!(at(1e-3), "(0.00123, 0.00000, -0.00050)");
+    }
 }

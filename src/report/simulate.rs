@@ -1,7 +1,11 @@
 //! The text report of a simulation.
 
 use super::kit::*;
+use crate::largest::{larger, largest};
 use crate::simulate::{Reason, Record};
+
+/// What the rounding of many steps leaves of the largest energy in the others.
+const NOISE: f64 = 1e-13;
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
@@ -78,11 +82,14 @@ fn energy(record: &Record) -> Lines {
         ("dissipated", e.dissipated),
         ("work put in", e.work),
     ];
-    let parts = parts.map(|(name, value)| format!("{name} {}", brief(value)));
+    let noise = NOISE * largest(parts.map(|(_, value)| value.abs()));
+    let digits = |value: f64| brief(rounded_to(value, noise));
     let (start, end) = (first.energy.balance(), e.balance());
-    let change = brief(end - start);
-    let [start, end] = [start, end].map(significant);
+    let change = end - start;
+    let [start, end] = [start, end].map(|value| known(value, larger(noise, change.abs())));
+    let change = digits(change);
     let balance = format!("{start} at the start, {end} at the end: changed by {change}");
+    let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
     vec![("energy", parts.join(", ")), ("balance", balance)]
 }
 
@@ -102,6 +109,29 @@ mod tests {
     use super::*;
     use crate::report::sample;
     use crate::simulate::Stopped;
+
+    /// The balance has the digits that its change leaves, and what is rounding is none.
+    #[test]
+    fn energies_have_the_digits_that_are_known() {
+        let mut record = sample::record(1, 4);
+        let last = record.moments.len() - 1;
+        let zero = record.moments[0].energy.map(|_| 0.0);
+        record.moments[0].energy = zero;
+        record.moments[0].energy.elastic = 4.068881005;
+        record.moments[last].energy = zero;
+        record.moments[last].energy.elastic = 4.076036413;
+        record.moments[last].energy.kinetic = 8.4e-30;
+        let report = record.report(Vec::new());
+        for part in [
+            "  energy   kinetic 0, elastic 4.076, ",
+            "  balance  4.07 at the start, 4.08 at the end: changed by 0.0071554\n",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+        record.moments[last].energy.elastic = 4.068881005 * (1.0 + 4e-16);
+        let report = record.report(Vec::new());
+        assert!(report.contains(": changed by 0\n"), "{report}");
+    }
 
     #[test]
     fn an_early_end_without_a_step_of_its_own() {

@@ -49,7 +49,8 @@ impl Reported for Trace {
     }
 
     fn remarks(&self) -> Lines {
-        labelled("remark", self.remark.clone())
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
     }
 }
 
@@ -106,7 +107,8 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
     let stability = stable_or_index(point.index);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
-            let decimals = point.error.map_or(DECIMALS, decimals_within);
+            let error = point.error.unwrap_or(WITHOUT_ERROR * tip.length());
+            let decimals = decimals_within(error.max(ROUNDING * tip.length()));
             format!(", tip {}", numbers::point(tip.to_array(), decimals))
         }
         _ => String::new(),
@@ -130,8 +132,8 @@ fn value_of(trace: &Trace, point: &TracePoint) -> String {
     }
 }
 
-/// Decimals of a tip without an error.
-const DECIMALS: usize = 3;
+/// Part of its distance from the base to which a tip without an error is told.
+const WITHOUT_ERROR: f64 = 1e-3;
 
 fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
     let what = match point.kind {
@@ -208,7 +210,8 @@ impl Reported for Boundary {
     }
 
     fn remarks(&self) -> Lines {
-        labelled("remark", self.remark.clone())
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
     }
 }
 

@@ -19,6 +19,7 @@ mod read;
 mod schedule;
 mod schema;
 mod section;
+mod slips;
 mod source;
 mod tip;
 mod turning;
@@ -39,6 +40,7 @@ pub(crate) use read::{MOST_BYTES, utf8};
 pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Radii, Section};
+pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
 pub use tip::{Clamp, HeldTip};
 /// Values as they can be written.
 pub use toml::{Table, Value};

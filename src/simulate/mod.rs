@@ -40,7 +40,7 @@ use std::time::{Duration, Instant};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE};
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, slips};
 use crate::words::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
@@ -153,7 +153,7 @@ impl Simulation {
         let simulation = Simulation {
             leaf,
             choice,
-            doubts: doubt.into_iter().collect(),
+            doubts: doubt.into_iter().chain(slips(scenario)).collect(),
             stable,
             step,
             method,

@@ -33,6 +33,7 @@ use super::friction::rates;
 use super::method::Method;
 use super::physics::Physics;
 use crate::lanes::widest_arch;
+use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
 use glam::{DQuat, DVec3};
@@ -208,7 +209,7 @@ impl Explicit {
             (base..base + self.layout.segments)
                 .map(|at| (pack.quaternion(at + 1) - pack.quaternion(at)).length_squared())
         });
-        4.0 * (0.5 * deltas.fold(0.0, f64::max).sqrt()).min(1.0).asin()
+        4.0 * (0.5 * largest(deltas).sqrt()).min(1.0).asin()
     }
 
     /// Whether numbers are finite and bending is resolved.

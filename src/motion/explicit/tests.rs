@@ -1,5 +1,6 @@
 use super::*;
 use crate::leaf::{Grid, Leaf};
+use crate::motion::energy_balance::resolved;
 use crate::relax::start;
 use crate::scenario::Scenario;
 use std::collections::HashSet;
@@ -180,4 +181,21 @@ fn a_constant_factor_of_the_rest_curvature_counts() {
     assert_eq!(half.x, halved.x);
     assert_eq!(half.n, halved.n);
     assert_ne!(half.x, after(LEAF).x);
+}
+
+/// A rotation that cannot be computed is none that the grid resolves.
+#[test]
+fn what_is_not_a_number_is_not_trusted() {
+    let leaf = discrete(LEAF, 8);
+    let trusted = |state: &State| {
+        let physics = Physics::new(&leaf.leaf);
+        let explicit = Explicit::new(leaf.clone(), physics, state, Some(1e-3));
+        explicit.unwrap().trusted()
+    };
+    let mut state = start(&leaf);
+    assert!(trusted(&state));
+    state.q[3] = DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0);
+    assert!(!trusted(&state));
+    assert!(resolved(&leaf, 0.0, 0.1).is_ok());
+    assert!(resolved(&leaf, 0.0, f64::NAN).is_err());
 }

@@ -3,6 +3,7 @@
 
 use super::step::add_inertia;
 use super::{Inertia, Moving, SemiImplicit};
+use crate::largest::larger;
 use crate::motion::unstrained::unstrained;
 use glam::{DMat3, DVec3};
 
@@ -82,7 +83,7 @@ impl SemiImplicit {
             }
             self.advance_trial();
             let (turn, shift) = self.system.largest();
-            if turn.max(shift) < LAST {
+            if larger(turn, shift) < LAST {
                 break;
             }
         }

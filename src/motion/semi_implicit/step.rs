@@ -3,6 +3,7 @@
 use super::super::friction::rates;
 use super::super::physics::Inertia;
 use super::{SemiImplicit, Steps};
+use crate::largest::larger;
 use crate::leaf::{Loads, State, System};
 use crate::newton::Work;
 use crate::rotation;
@@ -116,7 +117,7 @@ impl SemiImplicit {
                 return None;
             }
             let (turn, shift) = self.system.largest();
-            let size = turn.max(shift);
+            let size = larger(turn, shift);
             if !size.is_finite() || size > before.max(LARGEST_TURN) {
                 return None;
             }
@@ -139,7 +140,7 @@ impl SemiImplicit {
         let mut error: f64 = 0.0;
         for (next, now) in self.next_moving.iter().zip(&self.moving) {
             for c in 0..2 {
-                error = error.max((next.a[c] - now.a[c]).length());
+                error = larger(error, (next.a[c] - now.a[c]).length());
             }
         }
         // Local error: this times h^2 times the change of acceleration.

@@ -12,6 +12,7 @@
 //!
 //! Where the path ends at a fold, the moment is applied before the other loads, or after them.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::{Equations, Newton, Stop};
 use crate::relax::methods::Relaxation;
@@ -172,7 +173,7 @@ pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for section in &leaf.sections {
         turn = segment_turn(section, base, leaf.tip_moment(), turn)?;
-        largest = largest.max(turn.length() / section.ds);
+        largest = larger(largest, turn.length() / section.ds);
         base = (base * rotation::exp(turn)).normalize();
     }
     Some(largest)

@@ -37,6 +37,9 @@ pub struct Boundary {
     /// Why there is no curve, or fewer than there may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
+    /// What in the scenario is probably not what was intended.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// The curves.
     pub curves: Vec<BoundaryCurve>,
     /// The map under them, if requested.

@@ -125,6 +125,7 @@ fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Bound
         tolerance: trace.tolerance,
         complete: false,
         remark: trace.remark.clone(),
+        doubts: trace.doubts.clone(),
         curves: Vec::new(),
         map: None,
         factorizations: trace.factorizations,

@@ -15,6 +15,7 @@ use super::cell::relaxed;
 use super::request::MapRequest;
 use super::row::{MapMethod, MapRow};
 use crate::branch::value_between;
+use crate::largest::larger;
 use crate::limit::Limit;
 use crate::relax::Method;
 use crate::scenario::longest;
@@ -194,7 +195,7 @@ fn distance_from_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<
         };
         for ((low, middle), high) in low.rods.iter().zip(&middle.rods).zip(&high.rods) {
             let between = 0.5 * (low.nodes[a].position + high.nodes[b].position);
-            most = most.max((middle.nodes[i].position - between).length());
+            most = larger(most, (middle.nodes[i].position - between).length());
         }
     }
     most.is_finite().then_some(most)

@@ -47,6 +47,9 @@ pub struct Trace {
     /// Why there is no branch, or fewer than there are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
+    /// What in the scenario is probably not what was intended.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if what varied is a tip force or the position of held tips.

@@ -10,7 +10,7 @@ use crate::branch::{Critical, Family, Followed, Grids, Kind, Point, Refined, Wal
 use crate::leaf::Grid;
 use crate::memory;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax};
-use crate::scenario::{Key, Part, Scenario};
+use crate::scenario::{Key, Part, Scenario, slips};
 use crate::study::Target;
 use crate::undulation::Undulation;
 use glam::DVec3;
@@ -81,6 +81,7 @@ pub fn traced(
         tolerance,
         complete: false,
         remark: None,
+        doubts: slips(&scenario),
         branches: Vec::new(),
         law: None,
         factorizations: 0,

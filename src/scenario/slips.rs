@@ -1,0 +1,215 @@
+//! What in a scenario is probably not what was intended.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec3;
+
+use super::{Clamp, Dynamics, Rod, Scenario};
+
+/// Largest plausible stretch of a vein relative to its rest stretch.
+pub(crate) const STRETCHED: f64 = 0.2;
+
+/// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under
+/// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+const TOO_LONG: f64 = 30.0;
+
+/// Gravity if entered by mistake as an acceleration in metres and seconds, and the relative
+/// tolerance with which that number is recognised.
+const ACCELERATION: f64 = 9.81;
+const ROUNDED: f64 = 2e-3;
+
+/// Multiple of that length from which on such a number is taken for this mistake.
+const SUSPICIOUS: f64 = 5.0;
+
+/// Multiple of the acceleration of gravity, and part of it, by which a weight contradicts a mass.
+const CONTRADICTS: f64 = 10.0;
+
+/// The acceleration of gravity in units of length of these names per second squared, and its range
+/// in any of them.
+const ACCELERATIONS: [(&str, f64); 4] = [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
+const ANY_UNIT: [f64; 2] = [9.81, 9810.0];
+
+/// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
+/// a turn that are multiples of this.
+const DEGREES: f64 = 15.0;
+
+/// What is probably not what was intended, one short sentence each.
+pub fn slips(scenario: &Scenario) -> Vec<String> {
+    let heavy = too_long(scenario).or_else(|| weight_of_another_mass(scenario));
+    let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
+    let angles = [in_degrees(scenario), held_in_degrees(scenario)];
+    angles.into_iter().chain(lengths).flatten().collect()
+}
+
+/// The one of them that most probably keeps a leaf from coming to rest.
+pub fn obstacle(scenario: &Scenario) -> Option<String> {
+    let slips = [
+        out_of_reach,
+        held_in_degrees,
+        in_degrees,
+        thicker_than_long,
+        weight_of_another_mass,
+    ];
+    slips.into_iter().find_map(|slip| slip(scenario))
+}
+
+/// A tip that is held farther from the base than a vein plausibly stretches.
+pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
+    let away = DVec3::from_array(scenario.held_tip.as_ref()?.position).length();
+    let long = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
+    let all = scenario.rods.iter().map(long).enumerate();
+    let (j, length) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let stretch = away / length - 1.0;
+    (stretch > STRETCHED).then(|| {
+        format!(
+            "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
+            four_digits(away),
+            j + 1,
+            four_digits(length),
+            100.0 * stretch
+        )
+    })
+}
+
+fn four_digits(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+/// Base angles of more than a right angle: a vein that grows backwards.
+fn in_degrees(scenario: &Scenario) -> Option<String> {
+    let angle = scenario.rods.iter().map(|rod| rod.angle);
+    let angle = angle.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    (angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED)).then(|| {
+        format!(
+            "leaf.fan is in radians, and {angle} is {}",
+            turned_by(angle)
+        )
+    })
+}
+
+/// An angle by which a clamped tip is turned that looks like one in degrees.
+fn held_in_degrees(scenario: &Scenario) -> Option<String> {
+    let clamps = scenario.held_tip.as_ref()?.clamps.as_ref()?;
+    let angle = |clamp: &Clamp| {
+        let whole = clamp.angle.fract() == 0.0 && clamp.angle.abs() > FRAC_PI_2;
+        whole.then_some(("angles", clamp.angle))
+    };
+    let twist = |clamp: &Clamp| {
+        let whole = clamp.twist % DEGREES == 0.0 && clamp.twist.abs() > TAU;
+        whole.then_some(("twist", clamp.twist))
+    };
+    let (key, angle) = clamps
+        .iter()
+        .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
+    let turned = turned_by(angle);
+    Some(format!("tip.{key} is in radians, and {angle} is {turned}"))
+}
+
+fn turned_by(angle: f64) -> &'static str {
+    match angle.abs() > TAU {
+        true => "more than a turn",
+        false => "more than a right angle",
+    }
+}
+
+/// A section with a side longer than its vein.
+fn thicker_than_long(scenario: &Scenario) -> Option<String> {
+    let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
+    let mut rods = scenario.rods.iter().enumerate();
+    let (j, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
+    Some(format!(
+        "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
+        j + 1,
+        four_digits(side(j)),
+        four_digits(rod.length)
+    ))
+}
+
+/// A weight that is not that of the mass, if both are given, in seconds.
+fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
+    let weight = DVec3::from_array(scenario.gravity).length();
+    let given = scenario.dynamics.density != Dynamics::default_for(&scenario.rods).density;
+    let unit = scenario.units.length.as_deref();
+    let known = ACCELERATIONS.iter().find(|(name, _)| Some(*name) == unit);
+    let [least, most] = match known {
+        Some((_, acceleration)) if given => [*acceleration; 2],
+        // In units without names densities alone may be dimensionless, those of a material not.
+        None if unit.is_none() && scenario.radii.have_mass() => ANY_UNIT,
+        _ => return None,
+    };
+    let mass = scenario.dynamics.mean_density();
+    let found = weight / mass;
+    let allowed = least / CONTRADICTS..=most * CONTRADICTS;
+    (weight > 0.0 && !allowed.contains(&found)).then(|| {
+        format!(
+            "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
+            four_digits(weight),
+            four_digits(mass),
+            four_digits(found)
+        )
+    })
+}
+
+/// A leaf that is too long for its weight and stiffness, if only its base is held.
+fn too_long(scenario: &Scenario) -> Option<String> {
+    if scenario.held_tip.is_some() {
+        return None;
+    }
+    let weight = DVec3::from_array(scenario.gravity).length();
+    // 9.81 times a power of ten, for other units of length.
+    let digits = weight / 10_f64.powf((weight / ACCELERATION).log10().round());
+    let slip = (digits / ACCELERATION - 1.0).abs() < ROUNDED;
+    // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
+    let stiffness = |rod: &Rod| {
+        let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));
+        if slip {
+            (face * edge).sqrt()
+        } else {
+            face.max(edge)
+        }
+    };
+    let times = |rod: &Rod| rod.length / (stiffness(rod) / weight).cbrt();
+    let shortest = scenario
+        .rods
+        .iter()
+        .map(times)
+        .fold(f64::INFINITY, f64::min);
+    if weight == 0.0 || shortest < if slip { SUSPICIOUS } else { TOO_LONG } {
+        return None;
+    }
+    let advice = match slip {
+        true => {
+            "load.gravity is a force per length, mass per length times 9.81, not the acceleration"
+        }
+        false => "load.gravity is a force per length: check it, the stiffnesses and the units",
+    };
+    Some(format!(
+        "every vein is {shortest:.0} times longer than (A/q)^(1/3), over which it carries its weight: {advice}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A weight of another mass may keep a leaf from coming to rest.
+    #[test]
+    fn a_weight_of_another_mass_is_an_obstacle() {
+        let heavy = |density: f64| {
+            let text = format!(
+                r#"
+                name = "heavy"
+                leaf = {{ rods = 1, length = 0.3, fan = [0.0] }}
+                section = {{ shape = "circle", diameter = 0.002, young = 1e9, mass_density = {density:e} }}
+                load = {{ gravity = [0.0, 0.0, -0.03] }}"#
+            );
+            obstacle(&Scenario::from_toml(&text).unwrap())
+        };
+        assert_eq!(heavy(1000.0), None);
+        let named = heavy(1e-6).unwrap();
+        assert!(
+            named.contains("the acceleration of gravity would be"),
+            "{named}"
+        );
+    }
+}
