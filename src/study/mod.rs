@@ -24,7 +24,7 @@ pub use chart::{
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use fit::{
-    Data, Experiment, Fit, FitCandidate, FitError, FitLeaf, FitOutcome, FitParameter, FitRequest,
+    Data, DataFile, Experiment, Fit, FitCandidate, FitError, FitLeaf, FitOutcome, FitParameter, FitRequest,
     FitResidual, FitStep, FitWork, Free, Measured, MeasuredQuantity, Origin, Traced, fit,
 };
 pub use map::{

@@ -61,7 +61,7 @@ class Fit(Table):
     name: str
     """The name of the scenario."""
     outcome: str
-    """``"converged"``, ``"undetermined"`` or ``"not-converged"``."""
+    """``"converged"``, ``"undetermined"``, ``"contradicted"`` or ``"not-converged"``."""
     success: bool
     """Whether it ended at a minimum, and the data determine every number."""
     remarks: list[str]

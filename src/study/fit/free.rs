@@ -128,6 +128,12 @@ impl Coordinate {
         }
     }
 
+    /// The bound at which the coordinate stands.
+    pub fn at_bound(&self, coordinate: f64) -> Option<f64> {
+        let [low, high] = self.bounds;
+        [low, high].into_iter().find(|bound| *bound == coordinate)
+    }
+
     /// So far on the way from the initial value to another, by orders of magnitude.
     pub fn on_the_way(&self, to: f64, part: f64) -> f64 {
         let way = to - self.start;

@@ -111,7 +111,9 @@ fn parameter(
     parameter.low = end(down, -1.0, free.bounds[0], low);
     parameter.high = end(up, 1.0, free.bounds[1], high);
     let near = |end: Option<f64>| end.is_some_and(|end| (free.of(end) - theta).abs() <= OPEN);
-    parameter.determined = near(parameter.low) && near(parameter.high);
+    // A bound at which the number stands is not an end that the data give.
+    let at_bound = free.at_bound(theta).is_some();
+    parameter.determined = !at_bound && near(parameter.low) && near(parameter.high);
     Ok(parameter)
 }
 

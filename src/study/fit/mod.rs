@@ -8,6 +8,7 @@
 mod candidates;
 mod case;
 mod coarse;
+mod contradiction;
 mod data;
 mod derivatives;
 mod directions;
@@ -24,10 +25,11 @@ mod quantity;
 mod responses;
 mod result;
 mod statistics;
+mod table;
 mod vein;
 mod words;
 
-pub use data::{Data, Experiment, Measured, Origin, Traced};
+pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
 pub use free::Free;
 pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{
@@ -139,6 +141,8 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         candidates: &request.candidates,
     };
     let mut found = search.run(&first, progress)?;
+    found.files = request.data.files.clone();
+    found.remarks.extend(comments(&found.files));
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
 }
@@ -199,8 +203,9 @@ impl<'m, 'a> Search<'m, 'a> {
             }
             let stats = self.statistics(&least);
             let shape = if same { &of_search } else { &stats };
+            let contradicted = contradiction::contradicts(&stats);
             let parameters = match end {
-                End::Converged => interval::intervals(&stats, shape, progress),
+                End::Converged if !contradicted => interval::intervals(&stats, shape, progress),
                 _ => Ok(interval::without_intervals(&stats)),
             };
             let (end, parameters) = match parameters {
@@ -222,6 +227,19 @@ impl<'m, 'a> Search<'m, 'a> {
     fn statistics<'p>(&'p self, point: &'p Point) -> Statistics<'p, 'a> {
         Statistics::new(self.model, self.weighting, self.known, point)
     }
+}
+
+/// How many lines among the rows of data were left out.
+fn comments(files: &[DataFile]) -> Option<String> {
+    let left_out = files.iter().filter(|file| file.comments_among_rows > 0);
+    let left_out = left_out.map(|file| format!("{} of {}", file.comments_among_rows, file.file));
+    let left_out: Vec<String> = left_out.collect();
+    (!left_out.is_empty()).then(|| {
+        format!(
+            "lines among the rows that begin with # were left out as comments: {}",
+            left_out.join(", ")
+        )
+    })
 }
 
 /// The coordinates of the free numbers, checked to be distinct.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::data::DataFile;
 use crate::newton::Work;
 use crate::words::words;
 
@@ -16,6 +17,8 @@ words! {
         NotConverged = "not-converged",
         /// At a minimum, but some number or combination of numbers is not determined.
         Undetermined = "undetermined",
+        /// At a minimum, but the data contradict the model there.
+        Contradicted = "contradicted",
     }
 }
 
@@ -129,6 +132,9 @@ pub struct Fit {
     /// Standard deviation of all data, if none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
+    /// The files of data.
+    #[serde(skip)]
+    pub files: Vec<DataFile>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.

@@ -72,6 +72,11 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
     let all_logs = parts.iter().all(|(k, _)| free[*k].log);
     match parts.as_slice() {
         [(k, _)] if open.exactly => format!("{}: not at all", key(*k)),
+        [(k, _)] if is_at_bound(&parameters[*k], &free[*k]) => format!(
+            "{}: not, as it stands at its bound {}",
+            key(*k),
+            digits(parameters[*k].value)
+        ),
         [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
             (Some(low), None) => format!("{}: only that it is above {low:.2e}", key(*k)),
             (None, Some(high)) => format!("{}: only that it is below {high:.2e}", key(*k)),
@@ -98,6 +103,12 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
             format!("{unseen}: {} together, for {which}", changes.join(", "))
         }
     }
+}
+
+/// Whether a number stands at a bound that was given.
+fn is_at_bound(parameter: &FitParameter, free: &Coordinate) -> bool {
+    let bounds = free.bounds.map(|bound| free.value(bound));
+    free.bounded && bounds.contains(&parameter.value)
 }
 
 /// Three significant digits.
