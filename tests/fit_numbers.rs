@@ -72,6 +72,66 @@ fn what_weight_and_stiffness_share_is_named_in_their_units() {
 
 const RIGIDLY: &str = "axial = inf, shear_2 = inf, shear_3 = inf";
 
+/// Data that no leaf like this can give: coordinates in millimetres of a leaf in metres, with and
+/// without standard deviations, and deviations far below what the model leaves.
+#[test]
+fn data_that_contradict_the_model_are_not_fitted() {
+    let hanging = "rod,x,z\n1,545.8,-40.0\n1,739.4,-99.9\n1,846.2,-500.2\n";
+    let known = "rod,x,z,sd\n1,545.8,-40.0,0.01\n1,739.4,-99.9,0.01\n1,846.2,-500.2,0.01\n";
+    let bent =
+        "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.06,1e-3\n-0.5,-0.2,1e-3\n-1.0,-0.21,1e-3\n";
+    let beats = "frequency_1,frequency_3\n0.5,0.51\n0.5,0.52\n";
+    for data in [hanging, known, bent, beats] {
+        let found = fitted(&request(base(VEIN, ""), &[data], &["stiffness.bending_2"]));
+        assert_eq!(found.outcome, FitOutcome::Contradicted, "{data}");
+        assert!(!found.is_success() && !found.parameters[0].determined);
+        assert_eq!(found.parameters[0].low, None);
+        assert!(!found.remarks.is_empty());
+    }
+}
+
+/// Data whose scatter is within what chance allows do not contradict the model, nor do outliers of
+/// a robust fit.
+#[test]
+fn data_within_their_deviations_do_not_contradict_the_model() {
+    let truth = "stiffness.bending_2=1.7";
+    let data = pulls(VEIN, truth, &PULLS, 1e-3, &mut Draw(7));
+    let narrow = data.replace(",0.001,0.001,0.001", ",0.0007,0.0007,0.0007");
+    assert_ne!(data, narrow);
+    let asked = request(base(VEIN, ""), &[&narrow], &["stiffness.bending_2"]);
+    assert_eq!(fitted(&asked).outcome, FitOutcome::Converged);
+    let outlier =
+        data.replacen("\n0.0,", "\n0.0,", 1) + "0.0,0.0,0.0,-0.5,0.9,0.8,0.001,0.001,0.001\n";
+    let mut asked = request(base(VEIN, ""), &[&outlier], &["stiffness.bending_2"]);
+    assert_eq!(fitted(&asked).outcome, FitOutcome::Contradicted);
+    asked.robust = true;
+    assert_eq!(fitted(&asked).outcome, FitOutcome::Converged);
+}
+
+/// A number at the bound that was given for it is not determined by the data.
+#[test]
+fn a_number_at_its_bound_is_not_determined() {
+    let data = pulls(VEIN, "stiffness.bending_2=1.7", &PULLS, 1e-3, &mut Draw(7));
+    for (bounds, at) in [("0.5..1.5", 1.5), ("1.9..3", 1.9)] {
+        let free = format!("stiffness.bending_2={bounds}");
+        let begin = format!("stiffness.bending_2={at}");
+        let asked = request(
+            base(VEIN, &begin),
+            &[&data.replace("0.001", "0.1")],
+            &[&free],
+        );
+        let found = fitted(&asked);
+        assert_eq!(found.parameters[0].value, at);
+        assert!(!found.parameters[0].determined);
+        assert_eq!(found.outcome, FitOutcome::Undetermined);
+        assert!(
+            found.says.concat().contains("at its bound"),
+            "{:?}",
+            found.says
+        );
+    }
+}
+
 /// Data in millimetres of a leaf in metres, forces a thousand times too small, and frequencies
 /// of a leaf without mass.
 #[test]

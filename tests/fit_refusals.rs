@@ -27,6 +27,10 @@ const DATA: &str = "
     rod,sigma,x|1,1.5,1 => from 0 to 1
     rod,x|1,1 => at least two of x, y, z
     rod,x,y,experiment|1,1,1,third => no row of an experiments file has that name
+    experiment,load.tip_force[2],tip_z|A,-0.1,-0.2|A,-0.2,-0.3 => data.csv:3: experiment A: has that name from data.csv:2
+    experiment,load.tip_force[2],tip_z|2,-0.1,-0.2|,-0.2,-0.3 => data.csv:3: experiment 2: has that name from data.csv:2
+    experiment,tip_x,tip_z|# 1,-0.1,none => data.csv:2: tip_z = none: must be a finite number
+    tip_z|# -0.2 => no row below the header (1 lines
     tip_z,frequency_1|-0.2,1 => standard deviations
     tip_z,tip_x,sd_tip_x|-0.2,1,0.1 => give all or none
     load.tip_force[2],tip_z|1e12,1 => data.csv:2
@@ -74,6 +78,48 @@ fn tables_divided_in_other_ways_are_explained() {
         let refused = Data::default().read(text, "data.csv", 5).unwrap_err();
         assert!(refused.to_string().contains(said), "{refused}");
     }
+}
+
+/// A name may begin with #: where the header has as many columns, the line is a row. Whole lines
+/// are comments, and those among the rows are said to be left out.
+#[test]
+fn lines_that_begin_with_a_number_sign() {
+    let read = |text: &str| {
+        let mut request = request(base(LEAF, ""), &[text], &["stiffness.bending_2"]);
+        request.tolerance = Some(1e-5);
+        fit(&request, &mut |_| {}).unwrap()
+    };
+    let named = "# pulls, made up\nexperiment,load.tip_force[2],tip_z\nNo 1,-0.1,-0.19\n\
+                 #2,-0.2,-0.21\n# No 3 slipped\nNo 4,-0.4,-0.25\n";
+    let found = read(named);
+    let names: Vec<_> = found.residuals.iter().map(|it| &it.experiment).collect();
+    assert_eq!(names, ["No 1", "#2", "No 4"]);
+    assert_eq!((found.files[0].rows, found.files[0].comments), (3, 2));
+    let said = "left out as comments: 1 of data0.csv";
+    assert!(
+        found.remarks.iter().any(|it| it.contains(said)),
+        "{:?}",
+        found.remarks
+    );
+    let numbers = "load.tip_force[2],tip_z\n-0.1,-0.19\n#-0.2,-0.21\n-0.4,-0.25\n";
+    let found = read(numbers);
+    assert_eq!(found.residuals.len(), 2);
+    assert!(
+        found.remarks.iter().any(|it| it.contains(said)),
+        "{:?}",
+        found.remarks
+    );
+}
+
+/// Rows of one name are repeated measurements if their settings are the same.
+#[test]
+fn repeated_measurements_have_one_name() {
+    let twice = "experiment,load.tip_force[2],tip_z\nA,-0.1,-0.2\nA,-0.1,-0.21\n";
+    let found = fit(
+        &request(base(LEAF, ""), &[twice], &["stiffness.bending_2"]),
+        &mut |_| {},
+    );
+    assert_eq!(found.unwrap().residuals.len(), 2);
 }
 
 #[test]

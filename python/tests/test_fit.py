@@ -75,6 +75,17 @@ def test_columns_are_as_good_as_files() -> None:
         assert numbers(leafdyn.fit(str(PULL), data, [AXIAL], set=REST)) == wanted
 
 
+def test_a_named_index_is_a_column() -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(measured("pull.csv"))
+    frame["experiment"] = [f"pull {row}" for row in range(len(frame))]
+    columns = leafdyn.fit(PULL, frame, AXIAL, set=REST).columns["experiment"]
+    for names in ("experiment", ["experiment", "load.tip_force[0]"]):
+        found = leafdyn.fit(PULL, frame.set_index(names), AXIAL, set=REST)
+        assert list(found.columns["experiment"]) == list(columns)
+        assert found.columns["model"][0] != found.columns["model"][1]
+
+
 def test_what_was_not_measured_is_empty() -> None:
     pandas = pytest.importorskip("pandas")
     table = measured("photograph.csv")

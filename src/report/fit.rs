@@ -1,9 +1,10 @@
 //! The text report of a fit, and its table.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use super::kit::*;
-use crate::study::{Fit, FitOutcome, FitParameter, FitResidual};
+use crate::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;
@@ -19,11 +20,13 @@ impl Reported for Fit {
         let found = match self.outcome {
             FitOutcome::Converged => "a minimum; the data determine every free number",
             FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
+            FitOutcome::Contradicted => "a minimum, at which the data contradict the model",
             FitOutcome::NotConverged => "no minimum",
         };
         let mut lines: Lines = vec![("found", found.into())];
         lines.extend(labelled("numbers", self.parameters.iter().map(number)));
         lines.extend(labelled("data say", self.says.clone()));
+        lines.extend(labelled("data", self.files.iter().map(read)));
         let (count, freedom) = (self.residuals.len(), self.degrees_of_freedom);
         let misfit = match self.standard_deviation {
             Some(sd) => format!("standard deviation {}", brief(sd)),
@@ -48,6 +51,19 @@ impl Reported for Fit {
 
     fn remarks(&self) -> Lines {
         labelled("remark", self.remarks.clone())
+    }
+}
+
+fn read(file: &DataFile) -> String {
+    let name = Path::new(&file.file).file_name();
+    let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());
+    let rows = counted(file.rows, "row", "rows");
+    match file.comments {
+        0 => format!("{name}: {rows}"),
+        count => {
+            let comments = counted(count, "line that is a comment", "lines that are comments");
+            format!("{name}: {rows}; {comments} left out")
+        }
     }
 }
 

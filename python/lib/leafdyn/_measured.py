@@ -39,7 +39,7 @@ def _table(table: Any, name: str) -> tuple[str, str] | str:
 
 def _text(table: Columns, name: str) -> str:
     """It as CSV."""
-    columns = {str(key): _column(column, f"{name}: {key}") for key, column in table.items()}
+    columns = {str(key): _column(column, f"{name}: {key}") for key, column in _named(table)}
     rows = max((len(column) for column in columns.values() if len(column) != 1), default=1)
     for key, column in columns.items():
         if len(column) not in (1, rows):
@@ -47,6 +47,16 @@ def _text(table: Columns, name: str) -> str:
     filled = [column * rows if len(column) == 1 else column for column in columns.values()]
     lines = [list(columns), *map(list, zip(*filled))]
     return "".join(",".join(line) + "\n" for line in lines)
+
+
+def _named(table: Columns) -> list[tuple[Any, Any]]:
+    """Its columns, and before them the levels of a ``pandas.DataFrame``'s index that have names."""
+    columns = list(table.items())
+    index = getattr(table, "index", None)
+    names = list(getattr(index, "names", ()))
+    known = {str(key) for key, _ in columns}
+    levels = [(key, index.get_level_values(level)) for level, key in enumerate(names) if key is not None]
+    return [(key, level) for key, level in levels if str(key) not in known] + columns
 
 
 def _column(column: Any, place: str) -> list[str]:

@@ -25,7 +25,7 @@ pub(super) fn rank(
     for experiment in wanted {
         let data = Data {
             experiments: vec![experiment.clone()],
-            traced: Vec::new(),
+            ..Data::default()
         };
         let of = stats.model;
         let model = Model::new(of.base, of.coordinates, &of.options, data)?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::FitError;
 use super::quantity::Quantity;
+use super::table::{NAME, Table, refuse};
 use crate::study::Keys;
 
 /// Origin of a number: a file and a line.
@@ -62,119 +63,40 @@ pub struct Traced {
     pub origin: Origin,
 }
 
+/// A file of data, and how much of it was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DataFile {
+    /// Its name.
+    pub file: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of lines left out because they are comments.
+    pub comments: usize,
+    /// How many of these are among the rows, below the header.
+    pub comments_among_rows: usize,
+}
+
 /// All data.
 #[derive(Clone, Debug, Default)]
 pub struct Data {
+    /// The files.
+    pub files: Vec<DataFile>,
     /// Experiments.
     pub experiments: Vec<Experiment>,
     /// Points on veins.
     pub traced: Vec<Traced>,
 }
 
-/// A parsed table.
-struct Table<'t> {
-    file: &'t str,
-    header: Vec<&'t str>,
-    /// Lines, counted from 1, and their cells.
-    rows: Vec<(usize, Vec<&'t str>)>,
-}
-
-fn refuse(file: &str, line: usize, why: impl std::fmt::Display) -> FitError {
-    FitError::Data(format!("{file}:{line}: {why}"))
-}
-
-fn unquoted(cell: &str) -> &str {
-    let cell = cell.trim();
-    let inner = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
-    inner.unwrap_or(cell).trim()
-}
-
-impl<'t> Table<'t> {
-    fn of(text: &'t str, file: &'t str) -> Result<Self, FitError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        if text.contains('\r') && !text.contains('\n') {
-            let why = "has line ends of CR alone: save it with line ends LF or CR LF";
-            return Err(refuse(file, 1, why));
-        }
-        let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
-        let mut lines = lines
-            .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-        let Some((first, header)) = lines.next() else {
-            return Err(refuse(
-                file,
-                1,
-                "is empty: give a header, and a row for each datum",
-            ));
-        };
-        if !header.contains(',') && header.contains([';', '\t']) {
-            let why = "columns are divided by commas, and numbers have a decimal point";
-            return Err(refuse(file, first, why));
-        }
-        let header: Vec<&str> = header.split(',').map(unquoted).collect();
-        if header.iter().any(|name| name.parse::<f64>().is_ok()) {
-            let why = "has no header: the first line names the columns, such as \
-                       load.tip_force[0],tip_x,sd_tip_x, or rod,sigma,x,y,z";
-            return Err(refuse(file, first, why));
-        }
-        for (k, name) in header.iter().enumerate() {
-            if header[..k].contains(name) {
-                let why = format!("the column {name} stands there twice: leave one out");
-                return Err(refuse(file, first, why));
-            }
-        }
-        let mut rows = Vec::new();
-        for (line, text) in lines {
-            let cells: Vec<&str> = text.split(',').map(unquoted).collect();
-            if cells.len() != header.len() {
-                let (found, wanted) = (cells.len(), header.len());
-                let why = format!(
-                    "has {found} cells, and the header {wanted}: cells are divided by commas, \
-                     numbers have a decimal point"
-                );
-                return Err(refuse(file, line, why));
-            }
-            rows.push((line, cells));
-        }
-        if rows.is_empty() {
-            return Err(refuse(file, first, "has no row below the header"));
-        }
-        Ok(Table { file, header, rows })
-    }
-
-    /// The number in a cell; `None` if it is empty.
-    fn number(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
-        let (line, cells) = &self.rows[row];
-        let cell = cells[column];
-        if cell.is_empty() {
-            return Ok(None);
-        }
-        match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(Some(value)),
-            _ => {
-                let name = self.header[column];
-                let why = format!(
-                    "{name} = {cell}: must be a finite number, or empty where nothing was measured"
-                );
-                Err(refuse(self.file, *line, why))
-            }
-        }
-    }
-
-    fn positive(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
-        let number = self.number(row, column)?;
-        if let Some(value) = number.filter(|value| *value <= 0.0) {
-            let name = self.header[column];
-            let why = format!("{name} = {value}: a standard deviation is greater than 0");
-            return Err(refuse(self.file, self.rows[row].0, why));
-        }
-        Ok(number)
-    }
-}
-
 impl Data {
     /// Adds a file of measured data; `veins` is the number of rods.
     pub fn read(&mut self, text: &str, file: &str, veins: usize) -> Result<(), FitError> {
         let table = Table::of(text, file)?;
+        self.files.push(DataFile {
+            file: file.into(),
+            rows: table.rows.len(),
+            comments: table.comments,
+            comments_among_rows: table.comments_among_rows,
+        });
         match table.header.contains(&"rod") {
             true => self.read_traced(&table, veins),
             false => {
@@ -186,7 +108,7 @@ impl Data {
     }
 
     fn read_traced(&mut self, table: &Table, veins: usize) -> Result<(), FitError> {
-        let known = ["rod", "x", "y", "z", "sigma", "sd", "experiment"];
+        let known = ["rod", "x", "y", "z", "sigma", "sd", NAME];
         let strange = table.header.iter().find(|name| !known.contains(name));
         if let Some(name) = strange {
             let why = format!(
@@ -222,7 +144,7 @@ impl Data {
                 let why = "at least two of x, y, z are needed, or one and sigma";
                 return Err(refuse(table.file, line, why));
             }
-            let experiment = column("experiment").map(|column| table.rows[row].1[column]);
+            let experiment = column(NAME).map(|column| table.rows[row].1[column]);
             self.traced.push(Traced {
                 experiment: experiment.filter(|name| !name.is_empty()).map(String::from),
                 rod: rod as usize - 1,
@@ -257,7 +179,7 @@ enum Column {
 
 fn column(table: &Table, name: &str) -> Result<Column, FitError> {
     let quantity = |text: &str| text.parse::<Quantity>().ok();
-    if name == "experiment" {
+    if name == NAME {
         return Ok(Column::Name);
     }
     if let Some(quantity) = quantity(name) {

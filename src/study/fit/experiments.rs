@@ -1,10 +1,10 @@
 //! Experiments with the points traced on their veins; those under the same conditions share a
 //! leaf.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::FitError;
-use super::data::{Data, Experiment, Measured, Traced};
+use super::data::{Data, Experiment, Measured, Origin, Traced};
 use crate::study::Keys;
 
 /// An experiment with the points traced on its veins.
@@ -95,11 +95,11 @@ fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
         traced: Vec::new(),
     };
     let mut all: Vec<_> = data.experiments.into_iter().map(observed).collect();
-    let mut named = HashMap::new();
+    let mut named: HashMap<String, usize> = HashMap::new();
     for (place, observed) in all.iter().enumerate() {
-        named
-            .entry(observed.experiment.name.clone())
-            .or_insert(place);
+        let experiment = &observed.experiment;
+        let first = *named.entry(experiment.name.clone()).or_insert(place);
+        check_alike(&all[first].experiment, experiment)?;
     }
     let mut plain = None;
     for traced in data.traced {
@@ -127,4 +127,24 @@ fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
     }
     all.retain(|it| !it.experiment.measured.is_empty() || !it.traced.is_empty());
     Ok(all)
+}
+
+/// Checks that two experiments of one name have the same settings: points on veins could
+/// belong to either.
+fn check_alike(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
+    let settings = |of: &Experiment| {
+        let settings = of.settings.iter();
+        let named = settings.map(|(keys, value)| (keys.to_string(), *value));
+        named.collect::<BTreeMap<_, _>>()
+    };
+    if settings(one) == settings(other) {
+        return Ok(());
+    }
+    let place = |of: &Experiment| of.origin.as_ref().map(Origin::to_string);
+    let [first, second] = [one, other].map(|of| place(of).unwrap_or_default());
+    Err(FitError::Data(format!(
+        "{second}: experiment {}: has that name from {first}, which has other settings: give each a \
+         name of its own",
+        other.name
+    )))
 }

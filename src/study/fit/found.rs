@@ -2,12 +2,13 @@
 
 use super::candidates;
 use super::case::Compared;
+use super::contradiction::{BEYOND, contradicts, misses};
 use super::data::Experiment;
 use super::directions::sparse;
 use super::experiments::Observed;
 use super::least_squares::End;
 use super::model::Model;
-use super::quantity::Quantity;
+use super::quantity::Kind;
 use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
 use super::statistics::{OPEN, Statistics};
 use super::words::{self, Undetermined};
@@ -19,11 +20,6 @@ use crate::study::Keys;
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
 
-/// Coordinates this far from the fitted leaf, in lengths of the longest rod, are hardly those of
-/// this leaf under these loads; and this far from the base, not of any leaf of this length.
-const MISSED: f64 = 0.5;
-const BEYOND: f64 = 3.0;
-
 pub(super) fn fit(
     stats: &Statistics,
     end: &End,
@@ -34,12 +30,14 @@ pub(super) fn fit(
     let base = stats.model.base;
     let coordinates = stats.model.coordinates;
     let mut remarks = remarks(stats, end);
+    let contradicted = *end == End::Converged && contradicts(stats);
     let open = match end {
-        End::Converged => open(stats, &parameters),
+        End::Converged if !contradicted => open(stats, &parameters),
         // Away from a minimum, the data may be insensitive to other combinations.
         _ => Vec::new(),
     };
     let outcome = match end {
+        End::Converged if contradicted => FitOutcome::Contradicted,
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
         }
@@ -65,6 +63,7 @@ pub(super) fn fit(
             .iter()
             .map(|open| words::map(open, coordinates))
             .collect(),
+        alternatives: Vec::new(),
         says: words::sentences(&parameters, &open, coordinates),
         parameters,
         chi_squared: match stats.known {
@@ -74,6 +73,7 @@ pub(super) fn fit(
         },
         degrees_of_freedom: stats.freedom,
         standard_deviation: (!stats.known).then_some(stats.spread * stats.weighting.assumed),
+        files: Vec::new(),
         residuals: compared(stats),
         candidates,
         work: FitWork {
@@ -104,9 +104,8 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
         End::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
     }
     for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
-        let bound = free.bounds.iter().find(|bound| *bound == theta);
-        if let Some(bound) = bound {
-            let (keys, bound) = (&free.keys, free.value(*bound));
+        if let Some(bound) = free.at_bound(*theta) {
+            let (keys, bound) = (&free.keys, free.value(bound));
             remarks.push(match free.bounded {
                 true => format!("{keys} is at its bound {bound}"),
                 false => format!("{keys} went as far as {bound:.3e}, and was let no farther"),
@@ -121,7 +120,7 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
     if stats.known && stats.suspicious() {
         remarks.push(format!(
             "chi squared is {:.3e} for {} degrees of freedom: the standard deviations are not \
-             those of these data, or the model is not that of this leaf; intervals are then too narrow",
+             those of these data, or the model is not that of this leaf, or this minimum is not the lowest",
             stats.residuals.norm_squared(),
             stats.freedom
         ));
@@ -133,20 +132,16 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
 fn other_units(stats: &Statistics) -> Vec<String> {
     let base = stats.model.base;
     let longest = longest(&base.scenario().rods);
-    let (mut beyond, mut missed, mut frequencies) = (0, 0, false);
-    for component in stats.point.components() {
-        match component.what {
-            Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => {
-                let apart = (component.observed - component.model).abs() > MISSED * longest;
-                match component.observed.abs() > BEYOND * longest {
-                    true => beyond += 1,
-                    false => missed += usize::from(apart),
-                }
-            }
-            Compared::Result(Quantity::Frequency(_)) => frequencies = true,
-            Compared::Result(Quantity::Reaction(_)) => {}
+    let (mut beyond, mut missed) = (0, 0);
+    for component in misses(stats) {
+        match component.what.kind() == Kind::Length {
+            true if component.observed.abs() > BEYOND * longest => beyond += 1,
+            true => missed += 1,
+            false => {}
         }
     }
+    let mut components = stats.point.components();
+    let frequencies = components.any(|component| component.what.kind() == Kind::Frequency);
     let mut remarks = Vec::new();
     let are = |count: usize| if count == 1 { "is" } else { "are" };
     if beyond > 0 {

@@ -114,6 +114,20 @@ impl Coordinate {
         Ok(coordinate)
     }
 
+    /// The same coordinate with another initial value. Bounds that were not given move with it.
+    pub fn starting_at(&self, start: f64) -> Coordinate {
+        let moved = start - self.start;
+        let bounds = match self.bounded {
+            true => self.bounds,
+            false => self.bounds.map(|bound| bound + moved),
+        };
+        Coordinate {
+            start,
+            bounds,
+            ..self.clone()
+        }
+    }
+
     pub fn of(&self, value: f64) -> f64 {
         match self.log {
             true => value.ln(),
@@ -126,6 +140,12 @@ impl Coordinate {
             true => coordinate.exp(),
             false => coordinate * self.unit,
         }
+    }
+
+    /// The bound at which the coordinate stands.
+    pub fn at_bound(&self, coordinate: f64) -> Option<f64> {
+        let [low, high] = self.bounds;
+        [low, high].into_iter().find(|bound| *bound == coordinate)
     }
 
     /// So far on the way from the initial value to another, by orders of magnitude.

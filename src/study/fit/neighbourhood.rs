@@ -43,7 +43,7 @@ impl<'j, 'm, 'a> Neighbourhood<'j, 'm, 'a> {
             return None;
         }
         let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
-        let fixed = coordinates.map(|(free, theta)| free.bounds.contains(theta));
+        let fixed = coordinates.map(|(free, theta)| free.at_bound(*theta).is_some());
         Some(Neighbourhood {
             stats,
             fixed: fixed.collect(),

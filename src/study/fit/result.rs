@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::data::DataFile;
 use crate::newton::Work;
 use crate::words::words;
 
@@ -16,6 +17,8 @@ words! {
         NotConverged = "not-converged",
         /// At a minimum, but some number or combination of numbers is not determined.
         Undetermined = "undetermined",
+        /// At a minimum, but the data contradict the model there.
+        Contradicted = "contradicted",
     }
 }
 
@@ -35,6 +38,10 @@ pub struct FitParameter {
     /// Whether the interval is that of the profile likelihood, since the quadratic approximation at
     /// the minimum is inaccurate.
     pub profiled: bool,
+    /// Values below and above beyond which the other numbers could not be fitted, so that an end
+    /// there is not known.
+    #[serde(skip)]
+    pub lost: [Option<f64>; 2],
 }
 
 /// One scalar datum.
@@ -79,6 +86,15 @@ pub struct FitCandidate {
     pub remark: Option<String>,
 }
 
+/// Other values of the free numbers that fit the data as well.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitAlternative {
+    /// The value of each number.
+    pub values: BTreeMap<String, f64>,
+    /// Sum of the squares of residuals there, as that of the fit.
+    pub chi_squared: f64,
+}
+
 /// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitStep {
@@ -120,6 +136,9 @@ pub struct Fit {
     /// Combinations to which the data are insensitive: for each, exponents of
     /// positive numbers and coefficients of others.
     pub undetermined: Vec<BTreeMap<String, f64>>,
+    /// Other values that fit the data as well, if such were found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<FitAlternative>,
     /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.
@@ -129,6 +148,9 @@ pub struct Fit {
     /// Standard deviation of all data, if none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
+    /// The files of data.
+    #[serde(skip)]
+    pub files: Vec<DataFile>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.

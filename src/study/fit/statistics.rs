@@ -106,12 +106,13 @@ impl<'m, 'a> Statistics<'m, 'a> {
         along / own
     }
 
-    /// Whether the residuals are larger than their standard deviations allow: by five
-    /// deviations of their sum of squares.
+    /// Whether the sum of squares of the residuals is larger than their standard deviations allow:
+    /// at the quantile of five deviations of a normal variable (Wilson and Hilferty 1931).
     pub fn suspicious(&self) -> bool {
-        let freedom = self.freedom as f64;
-        let expected = freedom + 5.0 * (2.0 * freedom).sqrt();
-        self.freedom > 0 && !self.weighting.robust && self.residuals.norm_squared() > expected
+        let freedom = self.freedom.max(1) as f64;
+        let part = 2.0 / (9.0 * freedom);
+        let most = freedom * (1.0 - part + 5.0 * part.sqrt()).powi(3);
+        !self.weighting.robust && !(self.residuals.norm_squared() <= most)
     }
 
     /// Whether the data are sensitive to every change of a coordinate.
@@ -127,7 +128,7 @@ impl<'m, 'a> Statistics<'m, 'a> {
         let (free, theta) = (&self.model.coordinates[k], self.point.theta[k]);
         let far = (theta - free.start).abs() > OPEN;
         let vague = || self.quantile * self.deviation(k).0 > OPEN;
-        free.bounds.contains(&theta) || far && vague()
+        free.at_bound(theta).is_some() || far && vague()
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
