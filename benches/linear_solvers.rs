@@ -118,7 +118,7 @@ fn compare_solvers(rods: usize) {
     for _ in 0..ROUNDS {
         parts.round(&leaf, &state, &mut next, &mut system);
         let pattern = symbolic
-            .time(|| DirectSolver::new(&system))
+            .time(|| DirectSolver::of_modes(&system))
             .expect("fits into memory");
         let mut factor = numeric
             .time(|| pattern.factorize(&system, 0.0))

@@ -7,7 +7,7 @@ use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, t
 use common::random::{cases, drawn, leaves};
 use common::vibration::Linear;
 use common::*;
-use leafdyn::internals::leaf::{DirectSolver, State, System};
+use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::Physics;
 use leafdyn::relax::{Mode, relax};
 use leafdyn::scenario::Dynamics;

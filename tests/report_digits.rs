@@ -2,7 +2,7 @@
 
 mod workplace;
 
-use workplace::{Json, Workplace};
+use workplace::Workplace;
 
 /// A closed ring of a straight rod, twisted: what holds its tip is a small force between large
 /// moments.
