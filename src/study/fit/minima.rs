@@ -18,7 +18,7 @@ use super::starts::{Scout, Start, misfit, sum};
 const FAR: f64 = 0.25;
 
 /// The same of a minimum, beyond which the data would be less accurate than measurements are.
-const COARSE: f64 = 0.02;
+const COARSE: f64 = 0.05;
 
 /// Largest number of searches from other values, and of values from which each begins.
 const MOST_SEARCHES: usize = 3;
@@ -222,7 +222,7 @@ impl<'a> Minima<'_, 'a> {
     /// Whether a sum of squares is less than that of a minimum by more than chance.
     fn is_better(&self, best: &Minimum, sum: f64) -> bool {
         match best.converged {
-            true => sum < best.sum - BETTER * best.significant,
+            true => sum < best.sum - BETTER * best.variance,
             false => sum < best.sum,
         }
     }

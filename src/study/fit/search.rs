@@ -30,8 +30,9 @@ const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to w
 pub(super) struct Minimum {
     pub fit: Fit,
     pub theta: Vec<f64>,
-    /// The sum of squares, and the excess over it at the ends of intervals.
+    /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
     pub sum: f64,
+    pub variance: f64,
     pub significant: f64,
     pub converged: bool,
     /// Root mean square of the residuals, relative to the size of the data.
@@ -118,6 +119,7 @@ impl<'m, 'a> Search<'m, 'a> {
             break Minimum {
                 fit: found::fit(&stats, &end, parameters, work, self.candidates),
                 sum: sum(weighting, stats.point),
+                variance: stats.spread.powi(2),
                 significant: (stats.quantile * stats.spread).powi(2),
                 converged: end == End::Converged,
                 misfit: misfit(model, stats.point),
