@@ -37,7 +37,7 @@ impl Reported for Trace {
         let errors = self.branches.iter().flat_map(|branch| &branch.points);
         let errors = errors.filter_map(|point| point.error);
         lines.extend(errors.reduce(f64::max).map(|worst| {
-            let (worst, segments) = (power_of_ten(worst), self.segments);
+            let (worst, segments) = (bound(worst), self.segments);
             let what = error_location(self);
             let error = format!("{what} within {worst}, followed on {segments} segments a vein");
             ("error", error)
@@ -203,7 +203,7 @@ impl Reported for Boundary {
         lines.extend(labelled("curve", curves));
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         let worst = points.map(|point| point.error).reduce(f64::max);
-        lines.extend(worst.map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))));
+        lines.extend(worst.map(|worst| ("error", format!("tips within {}", bound(worst)))));
         lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
         lines.push(("work", format!("{} in all", seconds(self.wall_seconds))));
         lines
