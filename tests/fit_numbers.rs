@@ -78,7 +78,8 @@ const RIGIDLY: &str = "axial = inf, shear_2 = inf, shear_3 = inf";
 fn data_that_contradict_the_model_are_not_fitted() {
     let hanging = "rod,x,z\n1,545.8,-40.0\n1,739.4,-99.9\n1,846.2,-500.2\n";
     let known = "rod,x,z,sd\n1,545.8,-40.0,0.01\n1,739.4,-99.9,0.01\n1,846.2,-500.2,0.01\n";
-    let bent = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.06,1e-3\n-0.5,-0.2,1e-3\n-1.0,-0.21,1e-3\n";
+    let bent =
+        "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.06,1e-3\n-0.5,-0.2,1e-3\n-1.0,-0.21,1e-3\n";
     let beats = "frequency_1,frequency_3\n0.5,0.51\n0.5,0.52\n";
     for data in [hanging, known, bent, beats] {
         let found = fitted(&request(base(VEIN, ""), &[data], &["stiffness.bending_2"]));
@@ -99,7 +100,7 @@ fn data_within_their_deviations_do_not_contradict_the_model() {
     assert_ne!(data, narrow);
     let asked = request(base(VEIN, ""), &[&narrow], &["stiffness.bending_2"]);
     assert_eq!(fitted(&asked).outcome, FitOutcome::Converged);
-    let outlier = data.replacen("\n0.0,", "\n0.0,", 1) + "0.0,0.0,0.0,-0.5,0.9,0.8,0.001,0.001,0.001\n";
+    let outlier = data.clone() + "0.0,0.0,0.0,-0.5,0.9,0.8,0.001,0.001,0.001\n";
     let mut asked = request(base(VEIN, ""), &[&outlier], &["stiffness.bending_2"]);
     assert_eq!(fitted(&asked).outcome, FitOutcome::Contradicted);
     asked.robust = true;
@@ -113,12 +114,20 @@ fn a_number_at_its_bound_is_not_determined() {
     for (bounds, at) in [("0.5..1.5", 1.5), ("1.9..3", 1.9)] {
         let free = format!("stiffness.bending_2={bounds}");
         let begin = format!("stiffness.bending_2={at}");
-        let asked = request(base(VEIN, &begin), &[&data.replace("0.001", "0.1")], &[&free]);
+        let asked = request(
+            base(VEIN, &begin),
+            &[&data.replace("0.001", "0.1")],
+            &[&free],
+        );
         let found = fitted(&asked);
         assert_eq!(found.parameters[0].value, at);
         assert!(!found.parameters[0].determined);
         assert_eq!(found.outcome, FitOutcome::Undetermined);
-        assert!(found.says.concat().contains("at its bound"), "{:?}", found.says);
+        assert!(
+            found.says.concat().contains("at its bound"),
+            "{:?}",
+            found.says
+        );
     }
 }
 

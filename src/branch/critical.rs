@@ -241,7 +241,8 @@ impl Search<'_, '_> {
         let stiffest = self.equations.stiffest_condensed(params)?;
         let rounding = eigenvalue_rounding(stiffest, self.from.state.segments());
         let least = best.eigenvalues[which].abs();
-        if !(least <= larger(CONTINUOUS * largest, ROUNDINGS * rounding)) {
+        let vanishes = least <= larger(CONTINUOUS * largest, ROUNDINGS * rounding);
+        if !vanishes {
             return Err(Stuck::NotConverged);
         }
         Ok((at, self.critical(best, which, slope)))

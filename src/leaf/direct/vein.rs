@@ -244,7 +244,8 @@ fn add_previous(
         let factor = coupling.get(a).copied().unwrap_or(1.0);
         let row = &mut swept[a * stride..][..width];
         let from = &before[a * stride..][..width];
-        if a < own && !(factor * from[a].abs() * factor <= GROWTH * work.scale[a]) {
+        let small = factor * from[a].abs() * factor <= GROWTH * work.scale[a];
+        if a < own && !small {
             return None;
         }
         for c in a..own {

@@ -112,7 +112,8 @@ impl<'m, 'a> Statistics<'m, 'a> {
         let freedom = self.freedom.max(1) as f64;
         let part = 2.0 / (9.0 * freedom);
         let most = freedom * (1.0 - part + 5.0 * part.sqrt()).powi(3);
-        !self.weighting.robust && !(self.residuals.norm_squared() <= most)
+        let explained = self.residuals.norm_squared() <= most;
+        !self.weighting.robust && !explained
     }
 
     /// Whether the data are sensitive to every change of a coordinate.
