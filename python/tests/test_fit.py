@@ -103,7 +103,7 @@ def test_what_was_not_measured_is_empty() -> None:
 
 @pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
 def test_what_the_data_do_not_say() -> None:
-    free = {AXIAL: (10, 1000), "stiffness.torsion": None, "stiffness.shear_3": None}
+    free = {AXIAL: (10, 1000), "stiffness.bending_3": None, "stiffness.torsion": None, "stiffness.shear_3": None}
     found = leafdyn.fit(PULL, MEASURED / "pull.csv", free)
     assert found.outcome == "undetermined"
     assert not found.success

@@ -52,7 +52,7 @@ def _text(table: Columns, name: str) -> str:
 def _named(table: Columns) -> list[tuple[Any, Any]]:
     """Its columns, and before them the levels of a ``pandas.DataFrame``'s index that have names."""
     columns = list(table.items())
-    index = getattr(table, "index", None)
+    index: Any = getattr(table, "index", None)
     names = list(getattr(index, "names", ()))
     known = {str(key) for key, _ in columns}
     levels = [(key, index.get_level_values(level)) for level, key in enumerate(names) if key is not None]
