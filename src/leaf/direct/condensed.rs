@@ -7,8 +7,8 @@
 //! Goodnight, A tutorial on the SWEEP operator, Am. Stat. 33, 1979), whose pivots have the signs of
 //! the eigenvalues by Sylvester's law; the displacement of a joint tip follows all others.
 //!
-//! Pivots are single diagonal entries. Where these would let the other entries grow, the
-//! matrix is left to the sparse factorisation, which pivots by blocks.
+//! The pivots are the rotation or the displacement of a node. Where one would let the other entries
+//! grow, the matrix is left to the sparse factorisation, which chooses its pivots.
 
 use super::sweep::{Matrix3, Workspace, padded, sweep3};
 use super::unknowns::Unknowns;

@@ -17,9 +17,9 @@ use sparse::{Sparse, Symbolic};
 use std::sync::OnceLock;
 use unknowns::{Unknowns, entries};
 
-/// Up to so many segments the matrix is factorised vein after vein. Measured: the sparse
-/// factorisation takes 1 to 3 times as long on 32 segments, 3 to 5 times on fewer, and twice that
-/// with its symbolic part.
+/// Up to so many segments the matrix is factorised vein after vein. Measured with the leaf of Fig. 4:
+/// the sparse factorisation takes 1 to 3 times as long on 32 segments, 2 to 5 times on 8 and 16; its
+/// symbolic part takes about half as long again.
 const MOST_CONDENSED: usize = 32;
 
 /// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
