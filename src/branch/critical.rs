@@ -286,7 +286,7 @@ impl Critical {
     /// Whether this is the same point, found again after a step that the walk gave up.
     pub fn is_at(&self, other: &Critical) -> bool {
         let apart = self.state.shift_to(&other.state);
-        apart.max((self.fraction - other.fraction).abs()) < REPEATED
+        larger(apart, (self.fraction - other.fraction).abs()) < REPEATED
     }
 
     /// The same critical point on another grid or of a softened matrix, by a secant method from

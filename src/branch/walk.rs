@@ -7,6 +7,7 @@ use super::refine::on_finer;
 use super::refined::Doubt;
 use super::step::Found;
 use super::{Direction, Point};
+use crate::largest::larger;
 
 /// First step and shortest step, as parts of the longest.
 const FIRST: f64 = 0.25;
@@ -357,7 +358,7 @@ fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) 
 
 /// Distance of two points: the larger of those of shape and parameter.
 fn distance(a: &Point, b: &Point) -> f64 {
-    (a.state.shift_to(&b.state)).max((a.fraction - b.fraction).abs())
+    larger(a.state.shift_to(&b.state), (a.fraction - b.fraction).abs())
 }
 
 impl Direction {

@@ -10,6 +10,7 @@ use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 use crate::branch::refine_critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
 use crate::branch::refined::Doubt;
+use crate::largest::larger;
 use crate::leaf::Grid;
 use crate::newton::Contraction;
 use crate::relax::level::Level;
@@ -123,7 +124,7 @@ fn refine_from(
                 let left = LEFT * enough;
                 let from = (&near, &start);
                 let found = newton_or_secant(&mut manifold, from, given, left, &mut contraction)?;
-                table.iteration_error = table.iteration_error.max(found.1);
+                table.iteration_error = larger(table.iteration_error, found.1);
                 (found.0, None)
             }
             _ => relocated(&mut manifold, &near, step.special, given)?,
@@ -256,7 +257,7 @@ fn least_softened(
     sought: (Option<Special>, Option<usize>),
     (table, along): (&Table, Option<f64>),
 ) -> Result<Parameters, Stuck> {
-    let largest = |[a, b]: [f64; 2]| a.max(b);
+    let largest = |[a, b]: [f64; 2]| larger(a, b);
     let mut numbers = unsoftened(manifold, near, sought, FIRST_SOFTENING)?;
     let finest = FINER * manifold.grid().segments() as f64;
     for softening in SOFTENINGS {
