@@ -14,20 +14,24 @@ use crate::newton::{Equations, Newton, Stop, at_saddle};
 use crate::relax::saddle;
 
 /// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the steps: the
-/// first, the factors by which they rise after a failed step and fall at most after a successful
-/// one, the rate below which there are no springs (beside a bifurcation a leaf moves slowly), and
-/// the rates above which the motion fails, in general and where segments are unresolved.
-const FIRST_RATE: f64 = 10.0;
-const RATE_INCREASE: f64 = 8.0;
-const LARGEST_RATE_DECREASE: f64 = 8.0;
+/// first, the rate below which there are no springs (beside a bifurcation a leaf moves slowly),
+/// and the rates above which the motion fails, in general and where segments are unresolved.
+const FIRST_RATE: f64 = 3.0;
 const LEAST_RATE: f64 = 0.02;
 const LARGEST_RATE: f64 = 1e12;
 const LARGEST_UNRESOLVED: f64 = 1e6;
 
+/// Factors by which the rate falls after the first of several successful steps and rises after
+/// the first of several failed ones, each time squared, and their limits.
+const FIRST_DECREASE: f64 = 0.8;
+const LARGEST_DECREASE: f64 = 1.0 / 8.0;
+const FIRST_INCREASE: f64 = 3.0;
+const LARGEST_INCREASE: f64 = 16.0;
+
 /// Newton iterations of a step, their accuracy, and the largest increment and the largest change
 /// in a step (radians, lengths): longer steps could leave the valley.
 const ITERATIONS: usize = 12;
-const STEP_ACCURACY: f64 = 1e-3;
+const STEP_ACCURACY: f64 = 0.1;
 const LARGEST_INCREMENT: f64 = 0.5;
 const LARGEST_CHANGE: f64 = 0.5;
 
@@ -98,12 +102,12 @@ impl Walk<'_> {
     fn move_to_rest(&mut self) -> Result<(), Stop> {
         let leaf = &self.loading.leaf;
         leaf.strain_forces(&mut self.next);
-        let (mut rate, mut decrease): (f64, f64) = (FIRST_RATE, 1.0);
+        let mut rate = Rate::new();
         let mut saddles = 0;
         while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
             let from = self.next.clone();
             let step = Newton {
-                accuracy: if rate > 0.0 { STEP_ACCURACY } else { AT_REST },
+                accuracy: if rate.now > 0.0 { STEP_ACCURACY } else { AT_REST },
                 iterations: ITERATIONS,
                 work: self.work,
                 progress: self.progress,
@@ -111,7 +115,7 @@ impl Walk<'_> {
             let proximal = Equations::Proximal {
                 solver: &mut self.solver,
                 at: &from,
-                rate,
+                rate: rate.now,
                 largest: LARGEST_INCREMENT,
             };
             let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
@@ -120,7 +124,7 @@ impl Walk<'_> {
             }
             match moved {
                 Ok(size)
-                    if rate == 0.0
+                    if rate.now == 0.0
                         || at_saddle(leaf, &self.next, self.next.shift_to(&from).max(size)) =>
                 {
                     let shift = leaf.neutral_shift();
@@ -144,26 +148,56 @@ impl Walk<'_> {
                     let (state, system) = (&mut self.next, &mut self.system);
                     saddle::push_off(leaf, state, system, self.leaning, self.work);
                     leaf.strain_forces(&mut self.next);
-                    rate = FIRST_RATE;
+                    rate = Rate::new();
                 }
-                Ok(_) => {
-                    rate /= decrease;
-                    decrease = (2.0 * decrease).min(LARGEST_RATE_DECREASE);
-                    if rate < LEAST_RATE {
-                        rate = 0.0;
-                    }
-                }
+                Ok(_) => rate.fall(),
                 Err(stop) => {
                     self.next = from;
-                    rate = RATE_INCREASE * rate.max(LEAST_RATE);
-                    decrease = 1.0;
-                    if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
-                    {
+                    rate.rise();
+                    let unresolved = stop == Stop::Unresolved && rate.now > LARGEST_UNRESOLVED;
+                    if rate.now > LARGEST_RATE || unresolved {
                         return Err(stop);
                     }
                 }
             }
         }
         Err(Stop::StepLimit)
+    }
+}
+
+/// The spring rate of the steps.
+struct Rate {
+    now: f64,
+    /// The factor of its last change.
+    factor: f64,
+}
+
+impl Rate {
+    fn new() -> Self {
+        Rate {
+            now: FIRST_RATE,
+            factor: 1.0,
+        }
+    }
+
+    /// After a step that succeeded.
+    fn fall(&mut self) {
+        self.factor = match self.factor {
+            fell if fell < 1.0 => (fell * fell).max(LARGEST_DECREASE),
+            _ => FIRST_DECREASE,
+        };
+        self.now *= self.factor;
+        if self.now < LEAST_RATE {
+            self.now = 0.0;
+        }
+    }
+
+    /// After a step that failed.
+    fn rise(&mut self) {
+        self.factor = match self.factor {
+            rose if rose > 1.0 => (rose * rose).min(LARGEST_INCREASE),
+            _ => FIRST_INCREASE,
+        };
+        self.now = self.factor * self.now.max(LEAST_RATE);
     }
 }

@@ -17,10 +17,6 @@ const FIRST_STEP: f64 = 0.125;
 const SHORTEST_STEP: f64 = 1.0 / 512.0;
 const LONGEST_STEP: f64 = 0.5;
 
-/// Steps from which on an equilibrium of any index is looked for where none is found that is
-/// surely stable: more expensive.
-const SUSPICIOUS_STEP: f64 = 1.0 / 64.0;
-
 /// Largest factor on a step after a successful one.
 const GROWTH: f64 = 2.5;
 
@@ -29,7 +25,7 @@ const SHORTENED: f64 = 0.25;
 
 /// The distance of a state from its prediction (lengths, radians) that steps are made for, and
 /// the largest accepted.
-const WANTED_DRIFT: f64 = 0.05;
+const WANTED_DRIFT: f64 = 0.1;
 const LARGEST_DRIFT: f64 = 0.3;
 
 /// Largest increment of Newton's method, lengths or radians: the first after the natural leaf
@@ -144,7 +140,7 @@ impl<'w> Walk<'w> {
             };
             // A last step may be longer by a half.
             let shortest = step <= 1.01 * SHORTEST_STEP;
-            match self.step_to(part, part - at <= SUSPICIOUS_STEP) {
+            match self.step_to(part, shortest) {
                 Step::Stable(drift) => {
                     self.accept(part);
                     let factor = (WANTED_DRIFT / drift).sqrt().min(GROWTH);
@@ -230,8 +226,8 @@ impl<'w> Walk<'w> {
         self.loading.place_tips(&mut self.next);
     }
 
-    /// Predicts and corrects the equilibrium at another part. Where the matrix is not positive
-    /// definite, one of any index is looked for if `any_sign`, and converged to rounding: a
+    /// Predicts and corrects the equilibrium at another part. Where none is found that is surely
+    /// stable, one of any index is looked for if `any_sign` (more expensive), and converged to rounding: a
     /// neutral mode, as that of a buckled round column, is not unstable.
     fn step_to(&mut self, part: f64, any_sign: bool) -> Step {
         self.predict(part);
