@@ -57,6 +57,9 @@ const FIRST_PART: f64 = 2e-3;
 const OF_ERROR: f64 = 0.5;
 const NEXT_PART: f64 = 6.0;
 
+/// Eigenvectors of this accuracy or less are found with solutions that are not refined.
+const QUICK_ACCURACY: f64 = 1e-6;
+
 /// Number of searches that start with approximate modes.
 const FROM_NEAR: usize = 2;
 
@@ -123,7 +126,7 @@ fn of_softened(
     wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
     let mut system = System::new(soft);
-    let pattern = DirectSolver::of_modes(&system).ok()?;
+    let pattern = DirectSolver::of_coupling(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,
@@ -178,10 +181,15 @@ fn softened(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
 }
 
 impl Vibration<'_> {
-    /// K - shift M.
-    fn factorize(&self, system: &mut System, shift: f64) -> Option<Factors<'_>> {
+    /// Assembles K - shift M.
+    fn assemble(&self, system: &mut System, shift: f64) {
         self.leaf.assemble(self.state, system);
         self.masses.add(system, -shift);
+    }
+
+    /// K - shift M, factorised.
+    fn factorize(&self, system: &mut System, shift: f64) -> Option<Factors<'_>> {
+        self.assemble(system, shift);
         self.pattern.factorize(system, 0.0).ok()
     }
 
@@ -272,8 +280,13 @@ impl Vibration<'_> {
         for part in BELOW {
             let part = part.max(least * part / BELOW[0]);
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
-            let there = self.factorize(system, below)?.negative();
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
+            self.assemble(system, below);
+            let mut there = self.pattern.count_negative(system, 0.0).ok()?;
+            if there != others + here {
+                // So close to an eigenvalue, quick factors may tell a wrong sign.
+                there = self.pattern.factorize_sparse(system, 0.0).ok()?.negative();
+            }
             // Too many: one is equal to the limit up to rounding.
             if let Some(count) = there.checked_sub(others + here) {
                 return Some((count, below));
@@ -319,10 +332,14 @@ impl Vibration<'_> {
             true => (self.near_start(found.len()), 2),
             false => (self.start(search), 4),
         };
+        let quick = self.wanted.accuracy >= QUICK_ACCURACY;
         let mut lanczos = Lanczos {
             masses: &self.masses,
             shift,
-            solve: &mut |b| factor.solve_vector(b),
+            solve: &mut |b| match quick {
+                true => factor.solve_quickly(b),
+                false => factor.solve_vector(b),
+            },
             known: found,
             accuracy: self.wanted.accuracy,
             check_every,

@@ -98,7 +98,8 @@ impl Condensed {
         b.iter_mut().zip(&x).for_each(|(b, x)| *b += x);
     }
 
-    fn solve_once(&self, unknowns: &Unknowns, b: &mut [f64]) {
+    /// Solves in place without refinement.
+    pub fn solve_once(&self, unknowns: &Unknowns, b: &mut [f64]) {
         self.arch.dispatch(Solution {
             condensed: self,
             unknowns,

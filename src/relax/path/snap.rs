@@ -107,7 +107,11 @@ impl Walk<'_> {
         while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
             let from = self.next.clone();
             let step = Newton {
-                accuracy: if rate.now > 0.0 { STEP_ACCURACY } else { AT_REST },
+                accuracy: if rate.now > 0.0 {
+                    STEP_ACCURACY
+                } else {
+                    AT_REST
+                },
                 iterations: ITERATIONS,
                 work: self.work,
                 progress: self.progress,
