@@ -8,9 +8,11 @@ use super::cache::{LruCache, Patterns};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State, System};
 use crate::scenario::Scenario;
 
-/// Largest stiffness in stretch and shear, in units of A/L^2, with which the segment forces are
-/// condensed out: near singular points a larger stiffness loses digits.
-const STIFFEST: f64 = 1e5;
+/// Up to this stiffness in stretch and shear, in units of A/L^2, the matrix is that of the leaf:
+/// tangents and signs of eigenvalues are exact. The forces of stiffer, nearly rigid segments are
+/// condensed out with a lower one, `CONDENSING`: near singular points a larger one loses digits.
+pub(super) const STIFFEST: f64 = 1e7;
+const CONDENSING: f64 = 1e5;
 
 /// The value at a fraction of a range, or of that of its logarithm.
 pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
@@ -189,7 +191,11 @@ fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf
     for section in &mut discrete.sections {
         section.condensing = match softening {
             Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
-            None => section.condensing.min(DVec3::splat(STIFFEST)),
+            None => {
+                let exact = section.compliance.cmpge(DVec3::splat(1.0 / STIFFEST));
+                let least = section.condensing.min(DVec3::splat(CONDENSING));
+                DVec3::select(exact, section.condensing, least)
+            }
         };
     }
     discrete

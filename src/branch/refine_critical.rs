@@ -2,7 +2,7 @@
 
 use super::critical::{Critical, Kind};
 use super::equations::{Equations, Stuck};
-use super::family::Family;
+use super::family::{Family, STIFFEST};
 use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
@@ -19,7 +19,7 @@ const EXACT: f64 = 1e-12;
 /// L^2/A, used one to four times: smaller ones increase rounding errors, larger ones the error
 /// of extrapolation to zero. And the stiffness above which matrices are softened.
 pub const SOFTENINGS: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
-pub const NEARLY_RIGID: f64 = 1.01e5;
+pub const NEARLY_RIGID: f64 = 1.01 * STIFFEST;
 
 /// Weights of the values at softenings of 1, 2, 3, 4 for extrapolation to zero: by the cubic
 /// through all of them, and by the parabola through the first three.
