@@ -42,6 +42,7 @@ pub use schema::schema;
 pub use section::{Property, Radii, Section};
 pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
 pub use tip::{Clamp, HeldTip};
+pub use turning::Turning;
 /// Values as they can be written.
 pub use toml::{Table, Value};
 
