@@ -380,3 +380,37 @@ fn points_stand_in_order_where_the_given_number_changes() {
         }
     }
 }
+
+/// Two round columns that are coupled across buckle in two directions, alike or against each other;
+/// the second loads alike cross the first ones against each other where the coupling is 235.5. That
+/// two such curves cross is said where they end.
+#[test]
+fn curves_that_several_modes_share_end_where_they_cross() {
+    let text = r#"
+        name = "two"
+        leaf = { rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false }
+        stiffness = { torsion = 10.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+        coupling = { y = 1.0, z = 1.0 }
+        load = { tip_force = [-1.0, 0.0, 0.0] }
+    "#;
+    let (load, coupling) = (
+        "load.tip_force[0]=-21..-24",
+        "coupling.y+coupling.z=225..245",
+    );
+    let found = follow(text, "", load, coupling);
+    assert!(!found.complete);
+    let crossed = (found.curves.iter()).filter(|curve| {
+        let mut ends = curve.ends.iter().map(|end| format!("{end:?}"));
+        ends.any(|end| end.contains("several modes"))
+    });
+    assert_eq!(
+        crossed.count(),
+        2,
+        "{:?}",
+        found.curves.iter().map(|it| &it.ends).collect::<Vec<_>>()
+    );
+    for point in found.curves.iter().flat_map(|curve| &curve.points) {
+        assert!((point.values[1] - 235.5).abs() < 11.0);
+        assert_eq!(point.index_behind - point.index_before, 2, "{point:?}");
+    }
+}

@@ -26,6 +26,9 @@ pub enum Stuck {
     /// Rounding may change the sign of the softest eigenvalues.
     #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
     Rounding,
+    /// Other modes that become neutral together are about to.
+    #[error("another curve on which several modes become neutral together crosses it there")]
+    BesideSeveral,
     /// Modes that became neutral together no longer do.
     #[error("modes that become neutral together part")]
     Separated,

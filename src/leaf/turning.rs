@@ -110,8 +110,7 @@ impl DiscreteLeaf {
             for j in rods.clone() {
                 for (node, increments) in field[j].iter_mut().enumerate() {
                     let k = state.base(j) + node + 1;
-                    let (spin, velocity) =
-                        (*axis - state.q[k] * DVec3::X, axis.cross(state.x[k]));
+                    let (spin, velocity) = (*axis - state.q[k] * DVec3::X, axis.cross(state.x[k]));
                     *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
                 }
             }

@@ -80,7 +80,10 @@ pub fn found(equilibrium: &Equilibrium) -> String {
 
 /// That it is one of a circle of equilibria, if it is.
 fn turns(equilibrium: &Equilibrium) -> String {
-    match (equilibrium.stability.neutral_directions, equilibrium.rod_count) {
+    match (
+        equilibrium.stability.neutral_directions,
+        equilibrium.rod_count,
+    ) {
         (0, _) => String::new(),
         (1, 1) => ", one of a circle: it turns about its base without resistance".into(),
         (1, _) => ", one of a circle: round veins turn about their base without resistance".into(),

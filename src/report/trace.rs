@@ -244,6 +244,9 @@ fn curve_end(end: &End) -> &'static str {
         End::Stuck(Stuck::Unfolded) => {
             "the second number breaks the symmetry by which branches cross"
         }
+        End::Stuck(Stuck::BesideSeveral) => {
+            "not followed across another curve on which several modes become neutral together"
+        }
         End::Stuck(Stuck::Separated) => "modes that become neutral together part",
         End::Stuck(Stuck::OutOfRange(_)) => "no leaf is there",
         End::Stuck(_) => "lost",

@@ -42,9 +42,9 @@ pub use schema::schema;
 pub use section::{Property, Radii, Section};
 pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
 pub use tip::{Clamp, HeldTip};
-pub use turning::Turning;
 /// Values as they can be written.
 pub use toml::{Table, Value};
+pub use turning::Turning;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.

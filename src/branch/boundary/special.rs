@@ -24,15 +24,11 @@ const EXACT: f64 = 1e-13;
 /// Accuracy of points at a given parameter.
 const GIVEN: f64 = 1e-12;
 
-/// Modes cross a boundary together if their eigenvalues at the crossing differ from zero by at
-/// most this, relative to their derivative along the boundary.
-const TOGETHER: f64 = 1e-5;
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Special {
     /// A curve of folds turns back: two folds meet and vanish.
     Cusp,
-    /// Another mode also becomes neutral, or several by symmetry: two boundaries cross or touch.
+    /// Another mode also becomes neutral: two boundaries cross or touch.
     Crossing,
 }
 
@@ -41,16 +37,13 @@ impl Special {
     fn value(self, point: &SingularPoint) -> f64 {
         match self {
             Special::Cusp => point.speed,
-            Special::Crossing => nearest(point).first().copied().unwrap_or(f64::INFINITY),
+            Special::Crossing => {
+                let others = point.others.iter().copied();
+                let nearest = others.min_by(|a, b| a.abs().total_cmp(&b.abs()));
+                nearest.unwrap_or(f64::INFINITY)
+            }
         }
     }
-}
-
-/// The eigenvalues of the modes that are not the boundary's own, the nearest to zero first.
-fn nearest(point: &SingularPoint) -> Vec<f64> {
-    let mut others = point.others.clone();
-    others.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    others
 }
 
 /// The point of the boundary in the plane normal to its tangent at a distance `step` along it.
@@ -141,20 +134,13 @@ pub fn special_between(
     step: f64,
 ) -> Result<Option<(Special, SingularPoint)>, Stuck> {
     let cusp = now.kind == Kind::Fold && now.speed * next.speed < 0.0;
-    let crossing = now.index.abs_diff(next.index);
-    let special = match (cusp, crossing) {
+    let special = match (cusp, now.index.abs_diff(next.index)) {
         (false, 0) => return Ok(None),
         (true, 0) => Special::Cusp,
-        (false, _) => Special::Crossing,
-        (true, _) => return Err(Stuck::NotConverged),
+        (false, 1) => Special::Crossing,
+        _ => return Err(Stuck::NotConverged),
     };
     let slope = (special.value(next) - special.value(now)) / step;
-    let (point, slope) = zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
-    // Where modes cross together by symmetry, no shorter step passes them one by one.
-    let within = TOGETHER * slope.abs();
-    let together = nearest(&point).iter().take_while(|value| value.abs() < within);
-    if crossing > 1 && together.count() < crossing {
-        return Err(Stuck::NotConverged);
-    }
+    let (point, _) = zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
     Ok(Some((special, point)))
 }

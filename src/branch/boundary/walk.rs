@@ -38,6 +38,10 @@ const AHEAD: usize = 8;
 /// The finest grid to follow a boundary on, in segments.
 const FINEST: usize = 256;
 
+/// Another curve is beside the end of one if it is nearer than this, on the solution manifold and
+/// to first order: points next to the crossing of two that several modes share are not verified.
+const BESIDE: f64 = 0.03;
+
 /// Tolerances (parameter, shape) within which the boundary is closed.
 const SAME: [f64; 2] = [1e-6, 1e-4];
 
@@ -130,9 +134,20 @@ impl<'a, 'h> Walk<'a, 'h> {
             };
             // A finer grid may resolve it.
             if !self.refine(&mut manifold) {
-                return end;
+                return self.explained(end);
             }
             counted = 0;
+        }
+    }
+
+    /// How it ended, if it could not be followed further: beside the curve of other modes that
+    /// become neutral together, if their eigenvalues are small at its last point.
+    fn explained(&self, end: End) -> End {
+        let last = &self.steps[self.steps.len() - 1].point;
+        let near = |value: &&f64| value.abs() < BESIDE * last.slope.abs();
+        match last.others.iter().filter(near).count() {
+            0 | 1 => end,
+            _ => End::Stuck(Stuck::BesideSeveral),
         }
     }
 

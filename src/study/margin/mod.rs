@@ -298,11 +298,7 @@ fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
         let mut axes = turnings.iter().map(|it| it.axis.to_array());
         axes.all(|axis| (axis[direction.axis].abs() - 1.0).abs() < IMAGES)
     };
-    let mirrored = [
-        false,
-        is_own_image(scenario, rest),
-        rest.model.planar,
-    ];
+    let mirrored = [false, is_own_image(scenario, rest), rest.model.planar];
     let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
     Direction::all().filter(own).filter(along).collect()
 }

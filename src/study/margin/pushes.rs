@@ -3,11 +3,11 @@
 use glam::DVec3;
 
 use super::{Stable, StartPoint};
-use crate::numbers::power_of_ten;
 use crate::branch::{
     Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
     refine_at, switch, times,
 };
+use crate::numbers::power_of_ten;
 use crate::relax::fall::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
@@ -63,7 +63,7 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
     let then = fate(stable, &mut grids, critical);
     let starts = starts(&mut grids, critical);
     let error = refined.fraction_error * stable.largest + rounding(stable, force, weight);
-    if error >= force {
+    if 2.0 * error >= force {
         let below = power_of_ten(force + error);
         let unknown = failed(format!("its loss, below {below}, cannot be told from zero"));
         return (unknown, starts);

@@ -203,6 +203,7 @@ impl End {
             End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
             End::Stuck(Stuck::Unresolved) => "unresolved",
             End::Stuck(Stuck::Unfolded) => "unfolds",
+            End::Stuck(Stuck::BesideSeveral) => "crossed",
             End::Stuck(Stuck::Separated) => "parts",
             End::Stuck(_) => "stuck",
             End::Unverified(_) => "unverified",
