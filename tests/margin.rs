@@ -321,3 +321,22 @@ fn margins_do_not_depend_on_threads() {
     assert_eq!(one, two);
     assert_eq!(one["pushes"].list().len(), 6);
 }
+
+/// Just below the load of a strip that stands on its edge, pushes to either side are mirror images:
+/// they have one number; and no number that is told is below its error.
+#[test]
+fn pushes_that_are_mirror_images_have_one_number() {
+    for load in [-7.8, -7.8373, -7.83733] {
+        let entries = format!("{RIGID}; stiffness.bending_3=3; load.gravity=[{load}, 0, 0]");
+        let leaf = relax_with_margin(&rod(&entries), &to(1e-6), &mut |_| {}).unwrap();
+        let margin = leaf.margin.unwrap();
+        let sides = ["+y", "-y"].map(|side| push(&margin, side));
+        assert_eq!(sides[0].force, sides[1].force, "{load}");
+        assert_eq!(sides[0].error, sides[1].error, "{load}");
+        for push in &margin.pushes {
+            if let (Some(force), Some(error)) = (push.force, push.error) {
+                assert!(error < force, "{load}: {push:?}");
+            }
+        }
+    }
+}

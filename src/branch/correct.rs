@@ -186,10 +186,10 @@ impl Equations<'_> {
         Err(Stuck::NotConverged)
     }
 
-    /// Subtracts the turn of a leaf that can turn without resistance, so that a tangent does not
-    /// depend on where the turn is held.
+    /// Subtracts the turns of veins that can turn without resistance, so that a tangent does not
+    /// depend on where the turns are held.
     fn exclude_turn(&mut self, at: &Solution, increments: &mut Field) -> Result<(), OutOfRange> {
-        if let Some(turn) = self.leaves.at(at.params)?.turn(&at.state) {
+        for turn in self.leaves.at(at.params)?.turns(&at.state) {
             let amount = self.product(&turn, increments) / self.product(&turn, &turn);
             add(increments, -amount, &turn);
         }

@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::arcs::{self, Arc};
 use super::state::{RodState, STATE};
 use crate::limit::Limit;
-use crate::scenario::{Profile, Rod, Scenario, ascending, longest};
+use crate::scenario::{Profile, Rod, Scenario, Turning, ascending, longest};
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -40,8 +40,8 @@ pub struct Equations<'a> {
     pub softest: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
     coupled_rate: Vec<f64>,
-    /// The axis about which the leaf can turn without resistance.
-    turning: Option<DVec3>,
+    /// The veins that can turn without resistance.
+    turnings: Vec<Turning>,
     arcs: Vec<Arc>,
     /// Fractions of the length where a profile has a kink, ascending.
     kinks: Vec<f64>,
@@ -154,7 +154,7 @@ impl<'a> Equations<'a> {
                 })
                 .collect(),
             softest,
-            turning: scenario.turning_axis(),
+            turnings: scenario.turnings(),
             arcs: arcs::arcs(scenario, &lengths),
             kinks: kinks(scenario),
             lengths,
@@ -212,10 +212,12 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// The axis about which the leaf can turn without resistance, if it has its own shape at rest.
-    pub fn turning_axis(&self) -> Option<DVec3> {
-        let own = self.part == 1.0 && self.softened == 1.0;
-        self.turning.filter(|_| own)
+    /// The veins that can turn without resistance, if the leaf has its own shape at rest.
+    pub fn turnings(&self) -> &[Turning] {
+        match self.part == 1.0 && self.softened == 1.0 {
+            true => &self.turnings,
+            false => &[],
+        }
     }
 
     /// A flat state at the base without stress.

@@ -30,7 +30,7 @@ pub struct March {
     left: Mat<f64>,
     singular_values: Vec<f64>,
     right: Mat<f64>,
-    /// How many directions the conditions determine: all, or all but the turn of a leaf that can
+    /// How many directions the conditions determine: all, or all but the turns of veins that can
     /// turn without resistance.
     determined: usize,
     tip: Tip,
@@ -38,14 +38,14 @@ pub struct March {
 }
 
 impl March {
-    /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turn` of a leaf
-    /// that can turn without resistance, at its base, is left undetermined where it is what the
-    /// conditions determine least.
+    /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turns` of
+    /// veins that can turn without resistance, at the base, are left undetermined where they are
+    /// what the conditions determine least.
     pub fn new(
         equations: &Equations,
         units: &Units,
         maps: Vec<Mat<f64>>,
-        turn: Option<Vec<f64>>,
+        turns: &[Vec<f64>],
     ) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
@@ -77,12 +77,12 @@ impl March {
             tip,
             units: units.clone(),
         };
-        if let Some(turn) = turn {
-            let least = &march.null()[0];
-            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            let cosine = dot(least, &turn) / (dot(least, least) * dot(&turn, &turn)).sqrt();
-            march.determined -= usize::from(cosine.abs() > ALONG_TURN);
-        }
+        let least = orthonormal((0..turns.len()).map(|k| march.direction(k).swap_remove(0)));
+        let along = |turn: &&Vec<f64>| {
+            let parts = least.iter().map(|direction| dot(direction, turn).powi(2));
+            (parts.sum::<f64>() / dot(turn, turn)).sqrt() > ALONG_TURN
+        };
+        march.determined -= turns.iter().filter(along).count();
         Some(march)
     }
 
@@ -144,12 +144,17 @@ impl March {
     }
 
     /// The direction that the tip's conditions determine least, at the beginnings of all
-    /// intervals; not the turn of a leaf that can turn without resistance.
+    /// intervals; not the turns of veins that can turn without resistance.
     pub fn null(&self) -> Vec<Vec<f64>> {
+        self.direction(0)
+    }
+
+    /// Of the directions that are determined, one of those that are least.
+    fn direction(&self, from_least: usize) -> Vec<Vec<f64>> {
         let none = |matrix: &Mat<f64>| Col::zeros(matrix.nrows());
         let offsets: Vec<Col<f64>> = self.bases.iter().map(none).collect();
         let shifts: Vec<Col<f64>> = self.growths.iter().map(none).collect();
-        let last = self.right.col(self.determined - 1).to_owned();
+        let last = self.right.col(self.determined - 1 - from_least).to_owned();
         self.back(last, &offsets, &shifts)
     }
 
@@ -202,6 +207,26 @@ fn back_substitute(r: &Mat<f64>, x: &mut Col<f64>) {
         }
         x[i] = sum / r[(i, i)];
     }
+}
+
+/// An orthonormal basis of what these directions span.
+fn orthonormal(directions: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut direction in directions {
+        for other in &basis {
+            let part = dot(other, &direction);
+            let pairs = direction.iter_mut().zip(other);
+            pairs.for_each(|(value, other)| *value -= part * other);
+        }
+        let length = dot(&direction, &direction).sqrt();
+        direction.iter_mut().for_each(|value| *value /= length);
+        basis.push(direction);
+    }
+    basis
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

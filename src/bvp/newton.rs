@@ -18,6 +18,7 @@ use super::trajectory::{Nodes, Trajectory};
 use crate::largest::largest;
 use crate::memory;
 use crate::rotation::angle_about;
+use crate::scenario::Turning;
 use crate::shape::equally_spaced;
 use glam::{DQuat, DVec3};
 
@@ -229,59 +230,61 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.condensed = March::new(self.equations, &self.units, maps, self.turn());
+        self.condensed = March::new(self.equations, &self.units, maps, &self.turns());
         match self.condensed {
             Some(_) => Ok(residuals),
             None => Err(no_progress(f64::INFINITY)),
         }
     }
 
-    /// The changes of forces and moments at the base as a leaf turns that can without resistance,
-    /// in the units; `None` if it cannot or carries none.
-    fn turn(&self) -> Option<Vec<f64>> {
-        let axis = self.equations.turning_axis()?;
+    /// The changes of forces and moments at the base as veins turn that can without resistance, in
+    /// the units; none of those that carry nothing.
+    fn turns(&self) -> Vec<Vec<f64>> {
         let base = &self.nodes.states[0];
-        let mut turn = Vec::with_capacity(TANGENT * self.equations.rods());
-        for j in 0..self.equations.rods() {
-            let rod = RodState::read(base, j);
-            let unit = |k: usize| self.units.of(TANGENT * j + k);
-            let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
-            turn.extend([0.0; 6]);
-            turn.extend(force.to_array());
-            turn.extend(moment.to_array());
-        }
-        (turn.iter().any(|value| value.abs() > NO_TURN)).then_some(turn)
+        let turn = |Turning { rods, axis }: &Turning| {
+            let mut turn = vec![0.0; TANGENT * self.equations.rods()];
+            for j in rods.clone() {
+                let rod = RodState::read(base, j);
+                let unit = |k: usize| self.units.of(TANGENT * j + k);
+                let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
+                let own = &mut turn[TANGENT * j + 6..TANGENT * (j + 1)];
+                own[..3].copy_from_slice(&force.to_array());
+                own[3..].copy_from_slice(&moment.to_array());
+            }
+            turn
+        };
+        let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > NO_TURN);
+        let turns = self.equations.turnings().iter().map(turn);
+        turns.filter(carries).collect()
     }
 
-    /// Turns a leaf that can turn without resistance until its moment at the base bends it down
-    /// (towards -e3), as that of a relaxed leaf does.
+    /// Turns veins that can turn without resistance until their moment at the base bends them down
+    /// (towards -e3), as those of a relaxed leaf are.
     fn lean_down(&mut self) {
-        let Some(axis) = self.equations.turning_axis() else {
-            return;
-        };
-        let rods = self.equations.rods();
-        let moments = (0..rods).map(|j| RodState::read(&self.nodes.states[0], j).m);
-        let angle = angle_about(axis, moments.sum(), axis.cross(-DVec3::Z));
-        let turn = DQuat::from_axis_angle(axis, angle);
-        let back = DQuat::from_rotation_x(-angle);
-        for (k, state) in self.nodes.states.iter_mut().enumerate() {
-            for j in 0..rods {
-                let rod = RodState::read(state, j);
-                let turned = RodState {
-                    r: turn * rod.r,
-                    q: turn * rod.q * back,
-                    n: turn * rod.n,
-                    m: turn * rod.m,
-                };
-                let turned = match k {
-                    0 => self.equations.base(j, turned.n, turned.m),
-                    _ => turned,
-                };
-                turned.write(state, j);
+        for Turning { rods, axis } in self.equations.turnings() {
+            let moments = (rods.clone()).map(|j| RodState::read(&self.nodes.states[0], j).m);
+            let angle = angle_about(*axis, moments.sum(), axis.cross(-DVec3::Z));
+            let turn = DQuat::from_axis_angle(*axis, angle);
+            let back = DQuat::from_rotation_x(-angle);
+            for (k, state) in self.nodes.states.iter_mut().enumerate() {
+                for j in rods.clone() {
+                    let rod = RodState::read(state, j);
+                    let turned = RodState {
+                        r: turn * rod.r,
+                        q: turn * rod.q * back,
+                        n: turn * rod.n,
+                        m: turn * rod.m,
+                    };
+                    let turned = match k {
+                        0 => self.equations.base(j, turned.n, turned.m),
+                        _ => turned,
+                    };
+                    turned.write(state, j);
+                }
             }
-        }
-        if angle.abs() > SAME_LINEARIZATION {
-            self.condensed = None;
+            if angle.abs() > SAME_LINEARIZATION {
+                self.condensed = None;
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use super::state::State;
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, ascending};
+use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, Turning, ascending};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -27,8 +27,8 @@ pub struct Leaf {
     pub loads: Loads,
     /// The tip, if it is held.
     pub held: Option<Held>,
-    /// The axis about which it can turn without resistance.
-    pub(super) turning: Option<DVec3>,
+    /// The veins that can turn without resistance.
+    pub(super) turnings: Vec<Turning>,
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest: f64,
@@ -118,7 +118,7 @@ impl Leaf {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
-            turning: scenario.turning_axis(),
+            turnings: scenario.turnings(),
             kinks,
             softest: softest / scale.stiffness,
             scenario,

@@ -10,19 +10,21 @@ use super::dimensionless::Leaf;
 use super::flow::RodFields;
 use super::state::State;
 use crate::scenario::{Profile, Rod, Scenario};
+use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
 impl Leaf {
     /// Half of the leaf, if it is its own mirror image and its tip is not held.
     pub fn half(&self) -> Option<Leaf> {
         let mut half = self.clone();
-        half.mirrored = self.held.is_none() && is_mirrored(self.scenario());
+        let several = self.rods() > 1;
+        half.mirrored = several && self.held.is_none() && is_mirrored(self.scenario());
         half.mirrored.then_some(half)
     }
 }
 
-/// Whether every rod, coupling and load is its own mirror image.
-fn is_mirrored(scenario: &Scenario) -> bool {
+/// Whether every rod, coupling and load is its own mirror image, or another's.
+pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
         coupling,
@@ -31,8 +33,7 @@ fn is_mirrored(scenario: &Scenario) -> bool {
         ..
     } = scenario;
     let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
-    rods.len() > 1
-        && gravity[1] == 0.0
+    gravity[1] == 0.0
         && tip_force[1] == 0.0
         && pairs(rods.len()).all(|(a, b)| are_images(&rods[a], &rods[b]))
         && pairs(coupling.len()).all(|(a, b)| coupling[a] == coupling[b])
@@ -50,6 +51,19 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
         && opposite(&a.rest_curvature[0], &b.rest_curvature[0])
         && a.rest_curvature[1] == b.rest_curvature[1]
         && opposite(&a.rest_curvature[2], &b.rest_curvature[2])
+}
+
+/// Whether these rods at rest are each other's mirror images, within a distance of their nodes and
+/// an angle, in radians, of their sections.
+pub fn are_mirrored(rods: &[RodShape], distance: f64, angle: f64) -> bool {
+    let images = |(a, b): (&NodeState, &NodeState)| {
+        a.position.distance(reflect(b.position, true)) <= distance
+            && a.rotation.angle_between(turned(b.rotation, true)) <= angle
+    };
+    let pairs = rods.iter().zip(rods.iter().rev());
+    pairs
+        .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
+        .all(images)
 }
 
 /// The state of half of a leaf that is in the state `whole`. What the mirror's plane cuts is put

@@ -24,7 +24,7 @@ pub use direct::{Bordered, DirectError, DirectSolver, Factors};
 pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
-pub use mirror::{half_of, whole_fields, whole_of};
+pub use mirror::{are_mirrored, half_of, is_mirrored, whole_fields, whole_of};
 pub use rate::{Forces, LeafRate, Response, at_constant_force};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, Sums, System};

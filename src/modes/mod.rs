@@ -19,7 +19,7 @@ mod loaded;
 mod masses;
 mod quotient;
 
-use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Increment, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Field, Increment, State, System};
 use crate::limit::Limit;
 use crate::motion::Physics;
 use glam::DVec3;
@@ -103,8 +103,8 @@ struct Vibration<'a> {
     wanted: Wanted<'a>,
     /// [`Wanted::near`] as vectors.
     near: Vec<Vec<f64>>,
-    /// The turn of a leaf without resistance, if it can turn.
-    turn: Option<Vec<f64>>,
+    /// The turns of veins without resistance.
+    turns: Vec<Vec<f64>>,
 }
 
 /// The lowest eigenvalues, ascending (all if there are fewer than wanted), with
@@ -134,12 +134,11 @@ fn of_softened(
         pattern,
         wanted,
         near: Vec::new(),
-        turn: None,
+        turns: Vec::new(),
     };
     let near = wanted.near.iter().map(|near| vibration.vector(near));
     vibration.near = near.collect();
-    let turn = soft.turn(state);
-    vibration.turn = turn.map(|turn| {
+    let turn = |turn: &Field| {
         let base = [[0.0; 6]];
         let all: Vec<_> = turn
             .iter()
@@ -147,7 +146,8 @@ fn of_softened(
             .copied()
             .collect();
         vibration.vector(&all)
-    });
+    };
+    vibration.turns = soft.turns(state).iter().map(turn).collect();
     let found = vibration.lowest(&mut system)?;
     let pair = |mode: &Mode| {
         let shape = vibration.shape(&mode.vector);
@@ -211,15 +211,18 @@ impl Vibration<'_> {
         }
     }
 
-    /// The turn as an eigenvector of unit mass, whose eigenvalue is zero.
-    fn turning(&self) -> Option<Mode> {
-        let mut vector = self.turn.clone()?;
-        let mass: f64 = (vector.iter().zip(self.masses.times(&vector)))
-            .map(|(v, m)| v * m)
-            .sum();
-        vector.iter_mut().for_each(|v| *v /= mass.sqrt());
-        let eigenvalue = 0.0;
-        Some(Mode { eigenvalue, vector })
+    /// The turns as eigenvectors of unit mass, whose eigenvalues are zero.
+    fn turning(&self) -> Vec<Mode> {
+        let mode = |turn: &Vec<f64>| {
+            let mass: f64 = (turn.iter().zip(self.masses.times(turn)))
+                .map(|(v, m)| v * m)
+                .sum();
+            Mode {
+                eigenvalue: 0.0,
+                vector: turn.iter().map(|v| v / mass.sqrt()).collect(),
+            }
+        };
+        self.turns.iter().map(mode).collect()
     }
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
@@ -227,14 +230,14 @@ impl Vibration<'_> {
         if self.wanted.count == 0 {
             return Some(Vec::new());
         }
-        let mut found: Vec<Mode> = self.turning().into_iter().collect();
+        let mut found = self.turning();
         let wanted = self.wanted.count;
         let (lowest, mut factor) = self.below_all(system)?;
         let below = factor.negative();
         // Some of the others may be above the shift.
         let others = self.wanted.above.map_or(0, |(others, _)| others - below);
-        // Beside a turn one more, so that the last one is not zero: the eigenvalues below it are
-        // counted.
+        // Beside turns as many more, so that the last one is not zero: the eigenvalues below it
+        // are counted.
         let count = (others + wanted + found.len()).min(self.pattern.size() - below);
         let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count - found.len());
         for search in 0..SEARCHES + count {

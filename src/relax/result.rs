@@ -95,8 +95,7 @@ pub fn equilibrium(
 
 /// Directions in which a leaf of this shape can move without resistance.
 pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
-    let nodes = rods.iter().flat_map(|rod| &rod.nodes);
-    scenario.neutral_directions(nodes.map(|node| node.position))
+    scenario.neutral_directions(|j| rods[j].nodes.iter().map(|node| node.position))
 }
 
 /// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end

@@ -73,16 +73,24 @@ pub fn found(equilibrium: &Equilibrium) -> String {
             format!("{verdict} (residual {residual:.1e})")
         }
         _ => {
-            verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues) + turns(equilibrium)
+            verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues) + &turns(equilibrium)
         }
     }
 }
 
 /// That it is one of a circle of equilibria, if it is.
-fn turns(equilibrium: &Equilibrium) -> &'static str {
-    match equilibrium.stability.neutral_directions {
-        0 => "",
-        _ => ", one of a circle: it turns about its base without resistance",
+fn turns(equilibrium: &Equilibrium) -> String {
+    match (
+        equilibrium.stability.neutral_directions,
+        equilibrium.rod_count,
+    ) {
+        (0, _) => String::new(),
+        (1, 1) => ", one of a circle: it turns about its base without resistance".into(),
+        (1, _) => ", one of a circle: round veins turn about their base without resistance".into(),
+        (count, _) => format!(
+            ", one of a family: {count} round veins, or groups of them, turn about their bases \
+             without resistance"
+        ),
     }
 }
 

@@ -44,6 +44,7 @@ pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
 pub use tip::{Clamp, HeldTip};
 /// Values as they can be written.
 pub use toml::{Table, Value};
+pub use turning::Turning;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.

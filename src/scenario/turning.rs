@@ -1,9 +1,11 @@
-//! Leaves that can turn about the axis of their base without resistance: of round veins that are
+//! Veins that can turn about the axis of their base without resistance: round ones that are
 //! clamped in line, loaded along this line and held on it, if at all.
 //!
-//! Where every vein turns about the axis by an angle and every section back about its own
-//! tangent, no clamp, load or strain energy changes: a leaf that is bent has a circle of
-//! equilibria, and no bifurcation.
+//! Where every vein of a group that is tied together, or a single one, turns about the axis by an
+//! angle and every section back about its own tangent, no clamp, load or strain energy changes: if
+//! it is bent it has a circle of equilibria, and no bifurcation.
+
+use std::ops::Range;
 
 use super::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
@@ -14,27 +16,60 @@ const ROUNDING: f64 = 1e-12;
 /// Profiles are compared at so many equal distances, and at their kinks.
 const COMPARED: usize = 16;
 
+/// Neighbouring veins that can turn together without resistance, whatever their shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turning {
+    /// Their numbers.
+    pub rods: Range<usize>,
+    /// The direction of the axis, which goes through the base.
+    pub axis: DVec3,
+}
+
 impl Scenario {
-    /// The axis about which the whole leaf can turn without resistance, whatever its shape.
-    pub fn turning_axis(&self) -> Option<DVec3> {
+    /// The groups of veins that can turn without resistance, each about its own axis.
+    pub fn turnings(&self) -> Vec<Turning> {
+        let groups = self.tied_groups().into_iter();
+        groups
+            .filter_map(|rods| {
+                let axis = self.axis_of(rods.clone())?;
+                Some(Turning { rods, axis })
+            })
+            .collect()
+    }
+
+    /// The veins that couplings or a free joint tip tie together.
+    fn tied_groups(&self) -> Vec<Range<usize>> {
+        let share_tip = self.joined && self.held_tip.is_none();
+        let tied = |gap: usize| share_tip || self.coupling[gap] != [0.0; 3];
+        let ends = (1..=self.rods.len()).filter(|&end| end == self.rods.len() || !tied(end - 1));
+        let mut start = 0;
+        ends.map(|end| std::mem::replace(&mut start, end)..end)
+            .collect()
+    }
+
+    /// The axis about which a group of tied veins can turn.
+    fn axis_of(&self, group: Range<usize>) -> Option<DVec3> {
+        let rods = &self.rods[group.clone()];
         let tangent = |rod: &Rod| DQuat::from_rotation_z(rod.angle) * DVec3::X;
-        let axis = tangent(self.rods.first()?);
+        let axis = tangent(rods.first()?);
         let in_line = |direction: DVec3| direction.distance(axis) <= ROUNDING;
         let along = |load: [f64; 3]| {
             let load = DVec3::from_array(load);
             load.reject_from_normalized(axis).length() <= ROUNDING * load.length()
         };
         let held = self.held_tip.as_ref().is_none_or(|held| {
-            let mut clamps = held.clamps.iter().flatten();
+            let clamps = held.clamps.as_ref().map(|clamps| &clamps[group.clone()]);
+            let mut clamps = clamps.into_iter().flatten();
             along(held.position) && clamps.all(|clamp| in_line(clamp.rotation() * DVec3::X))
         });
         // A coupling differs from a multiple of the unit matrix along the axis alone, which is
         // in the e1-e2 plane.
-        let coupling = self.coupling.iter().all(|&[x, y, z]| {
+        let within = &self.coupling[group.start..group.end - 1];
+        let coupling = within.iter().all(|&[x, y, z]| {
             let across = same(y, z) && (same(x, y) || in_line(DVec3::X));
             across || (axis.x.abs() <= ROUNDING && same(x, z))
         });
-        let turns = self.rods.iter().all(|rod| in_line(tangent(rod)) && is_round(rod))
+        let turns = rods.iter().all(|rod| in_line(tangent(rod)) && is_round(rod))
             && along(self.gravity)
             && along(self.tip_force)
             // A dead moment has no potential.
@@ -45,20 +80,24 @@ impl Scenario {
     }
 }
 
-/// A leaf whose points are all nearer to the axis than this part of its length is straight, and
-/// does not move when it turns.
+/// Veins whose points are all nearer to the axis than this part of the leaf's length are straight,
+/// and do not move when they turn.
 const ON_AXIS: f64 = 1e-6;
 
 impl Scenario {
-    /// Number of directions in which the leaf can move without resistance in the equilibrium
-    /// through these points: one if it can turn and is bent. Each has an eigenvalue that is zero.
-    pub fn neutral_directions(&self, points: impl IntoIterator<Item = DVec3>) -> usize {
+    /// Number of directions in which the leaf can move without resistance in an equilibrium: one
+    /// for every group of veins that can turn and is bent. Each has an eigenvalue that is zero.
+    /// `points` are those of a vein.
+    pub fn neutral_directions<P: IntoIterator<Item = DVec3>>(
+        &self,
+        points: impl Fn(usize) -> P,
+    ) -> usize {
         let near = ON_AXIS * super::longest(&self.rods);
-        let bent = |axis: DVec3| {
-            let mut points = points.into_iter();
-            points.any(|point| point.reject_from_normalized(axis).length() > near)
+        let bent = |turning: &Turning| {
+            let mut points = turning.rods.clone().flat_map(&points);
+            points.any(|point| point.reject_from_normalized(turning.axis).length() > near)
         };
-        usize::from(self.turning_axis().is_some_and(bent))
+        self.turnings().iter().filter(|it| bent(it)).count()
     }
 }
 
@@ -84,24 +123,44 @@ fn is_round(rod: &Rod) -> bool {
 mod tests {
     use super::*;
 
-    fn axis(change: &str) -> Option<DVec3> {
+    fn turnings(change: &str) -> Vec<Turning> {
         let text = format!(
             r#"
             name = "round"
             leaf = {{ rods = 2, length = [1.0, 0.8], fan = [0.0, 0.0], joined = false }}
-            coupling = {{ x = 1.0, y = 2.0, z = 2.0 }}
             load = {{ gravity = [-3.0, 0.0, 0.0] }}
             stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = 9.0, shear_3 = 9.0 }}
-            {change}
+            coupling = {{ x = 1.0, y = 2.0, z = 2.0 }}
             "#
         );
-        Scenario::from_toml(&text).unwrap().turning_axis()
+        let entries = change.split("; ").filter(|entry| !entry.is_empty());
+        let entries: Vec<_> = entries.map(|entry| entry.into()).collect();
+        let scenario = Scenario::from_toml_with(&text, "round", &entries).unwrap();
+        scenario.turnings()
+    }
+
+    fn about(axis: DVec3, rods: Range<usize>) -> Turning {
+        Turning { rods, axis }
     }
 
     #[test]
     fn only_what_has_no_preferred_direction_turns() {
-        assert_eq!(axis(""), Some(DVec3::X));
-        assert_eq!(axis("[rest]\ntwist = 0.4"), Some(DVec3::X));
-        assert_eq!(axis("[rest]\nbend_2 = 0.1"), None);
+        let both = [about(DVec3::X, 0..2)];
+        assert_eq!(turnings(""), both);
+        assert_eq!(turnings("rest.twist=0.4"), both);
+        assert_eq!(turnings("rest.bend_2=0.1"), []);
+    }
+
+    /// Veins that nothing ties together turn each for itself, and only those that are round.
+    #[test]
+    fn untied_veins_turn_each_for_itself() {
+        let untied = "coupling.x=0; coupling.y=0; coupling.z=0";
+        let each = [about(DVec3::X, 0..1), about(DVec3::X, 1..2)];
+        assert_eq!(turnings(untied), each);
+        let strip = format!("{untied}; stiffness.bending_3=[3.0, 1.0]");
+        assert_eq!(turnings(&strip), each[1..]);
+        let aside = format!("{untied}; leaf.fan=[0.3, 0.0]");
+        assert_eq!(turnings(&aside), each[1..]);
+        assert_eq!(turnings(&format!("{aside}; leaf.joined=true")), []);
     }
 }

@@ -43,8 +43,9 @@ pub fn relax_with_sensitivities(
     let (mut leaf, levels) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
+    let turnings = scenario.turnings().len();
     let (none, known): (Vec<_>, Vec<_>) = (numbers.into_iter())
-        .partition(|(_, number)| at_rest && turns && decides_where_it_turns(number));
+        .partition(|(_, number)| at_rest && turns && decides_where_it_turns(number, turnings));
     leaf.doubts
         .extend(none.iter().map(|(key, _)| no_derivative(key)));
     leaf.sensitivities = Some(match at_rest {
@@ -54,12 +55,12 @@ pub fn relax_with_sensitivities(
     Ok(leaf)
 }
 
-/// Whether a leaf that turns about its base without resistance no longer does after a change of
-/// this number: then the smallest change decides where it turns to.
-fn decides_where_it_turns(number: &Number) -> bool {
+/// Whether of so many groups of veins that turn about their base without resistance fewer do after
+/// a change of this number: then the smallest change decides where they turn to.
+fn decides_where_it_turns(number: &Number, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| scenario.turning_axis().is_none())
+        .any(|(_, scenario)| scenario.turnings().len() < turnings)
 }
 
 fn no_derivative(key: &str) -> String {

@@ -11,7 +11,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::branch::{Equations, Family, Stuck, on_finer};
-use crate::leaf::{Field, Grid, State};
+use crate::leaf::{Field, Grid, State, are_mirrored, is_mirrored};
 use crate::limit::Limit;
 use crate::memory;
 use crate::relax::{
@@ -271,25 +271,34 @@ fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
     (stiff + WEIGHTS * weight).min(AXIAL * axial * together / scenario.rods.len() as f64)
 }
 
+/// Veins at rest are each other's mirror images within this part of the leaf's length, and within
+/// this angle (radians), or the error of the leaf: the rounding of the softest of leaves.
+const IMAGES: f64 = 1e-9;
+
+/// Whether the leaf at rest is its own mirror image in the plane y = 0.
+fn is_own_image(scenario: &Scenario, rest: &Equilibrium) -> bool {
+    let error = rest.accuracy.error_estimate.unwrap_or_default();
+    let angle = IMAGES.max(error / rest.shape.longest());
+    let distance = angle * rest.shape.longest();
+    is_mirrored(scenario) && are_mirrored(&rest.shape.rods, distance, angle)
+}
+
 /// The directions of the pushes: none if the tip is held; for a mirror-symmetric leaf only the
 /// first of two that are mirror images.
 fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
     if scenario.held_tip.is_some() {
         return Vec::new();
     }
-    // A leaf that turns without resistance turns towards any push across its axis.
-    let axis = match rest.stability.neutral_directions {
-        0 => None,
-        _ => scenario.turning_axis(),
+    // Veins that turn without resistance turn towards any push across their axis.
+    let turnings = match rest.stability.neutral_directions {
+        0 => Vec::new(),
+        _ => scenario.turnings(),
     };
     let along = |direction: &Direction| {
-        axis.is_none_or(|axis| axis.to_array()[direction.axis].abs() == 1.0)
+        let mut axes = turnings.iter().map(|it| it.axis.to_array());
+        axes.all(|axis| (axis[direction.axis].abs() - 1.0).abs() < IMAGES)
     };
-    let mirrored = [
-        false,
-        rest.model.rods < scenario.rods.len(),
-        rest.model.planar,
-    ];
+    let mirrored = [false, is_own_image(scenario, rest), rest.model.planar];
     let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
     Direction::all().filter(own).filter(along).collect()
 }

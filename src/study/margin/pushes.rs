@@ -7,6 +7,7 @@ use crate::branch::{
     Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
     refine_at, switch, times,
 };
+use crate::numbers::power_of_ten;
 use crate::relax::fall::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
@@ -61,13 +62,19 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
     let force = refined.fraction * stable.largest;
     let then = fate(stable, &mut grids, critical);
     let starts = starts(&mut grids, critical);
+    let error = refined.fraction_error * stable.largest + rounding(stable, force, weight);
+    if 2.0 * error >= force {
+        let below = power_of_ten(force + error);
+        let unknown = failed(format!("its loss, below {below}, cannot be told from zero"));
+        return (unknown, starts);
+    }
     let push = Push {
         kind: match critical.kind {
             Kind::Fold => Loss::Fold,
             Kind::Branching => Loss::BranchPoint,
         },
         force: Some(force),
-        error: Some(refined.fraction_error * stable.largest + rounding(stable, force, weight)),
+        error: Some(error),
         per_weight: (weight > 0.0).then(|| force / weight),
         then: Some(then),
         neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
