@@ -252,7 +252,7 @@ mod tests {
         let scenario = scenario(joined);
         let equations = Equations::new(&scenario);
         let units = Units::new(&equations, &Trajectory::straight(&equations));
-        March::new(&equations, &units, maps, None)
+        March::new(&equations, &units, maps, &[])
     }
 
     /// Pseudo-random numbers in -1..1.
