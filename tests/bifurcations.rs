@@ -4,8 +4,9 @@
 
 mod common;
 
-use common::branch::{changes_at, follow, text};
+use common::branch::{changes_at, follow, request, text};
 use common::*;
+use leafdyn::study::trace;
 
 /// A leaf, what varies and between which values, and where its index changes by how much.
 struct Case {
@@ -324,5 +325,43 @@ fn a_pitchfork_that_is_unfolded_is_none() {
             let tip = last.tips[0];
             assert!(tip.x < 0.67 && tip.z < -0.4, "{what}: {tip}");
         }
+    }
+}
+
+/// Curved veins, tied to each other side by side, stretch when the leaf bends. They are as
+/// slender as those of real leaves: with a softer matrix, tangents would be wrong by a tenth,
+/// steps short, and the second branch lost.
+#[test]
+fn leaves_whose_bending_stretches_their_veins_are_followed() {
+    let leaf = r#"
+        name = "shell"
+        leaf = { rods = 5, length = 1.0, fan = "symmetric" }
+        stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.0, axial = 5e5, shear_2 = 2e5, shear_3 = 2e5 }
+        rest = { bend_2 = -0.6 }
+        load = { gravity = [0.0, 0.0, 0.0] }
+    "#;
+    let shells = [
+        (
+            "leaf.fan=[-0.3, -0.15, 0, 0.15, 0.3]; coupling.y=1000; coupling.z=1000",
+            20,
+            0,
+        ),
+        (
+            "leaf.fan=[-0.6, -0.3, 0, 0.3, 0.6]; coupling.y=20; coupling.z=20",
+            40,
+            3,
+        ),
+    ];
+    for (entries, most, critical) in shells {
+        let request = request(base(leaf, entries), "load.gravity[2]=0..-20", 1e-6, 2000);
+        let found = trace(&request, &mut |_, _, _| {}).unwrap();
+        assert!(found.complete, "{entries}: {:?}", found.branches[0].end);
+        let branch = &found.branches[0];
+        assert!(
+            branch.points.len() <= most,
+            "{entries}: {}",
+            branch.points.len()
+        );
+        assert_eq!(branch.critical().count(), critical, "{entries}");
     }
 }

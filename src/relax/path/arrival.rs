@@ -32,7 +32,7 @@ const FARTHEST_GRID: usize = 8;
 
 /// Limits on the force evaluations of all walks, and on nodes times these: typical walks take a
 /// dozen, and a few hundred for each loss of stability.
-const MOST_EVALUATIONS: usize = 3000;
+const MOST_EVALUATIONS: usize = 2500;
 const BUDGET_OF_WALKS: usize = BUDGET / 8;
 
 /// The least compliance (L^2/A) on a walk: a stiffer leaf differs from it by its strains of some
