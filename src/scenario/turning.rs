@@ -124,18 +124,16 @@ mod tests {
     use super::*;
 
     fn turnings(change: &str) -> Vec<Turning> {
-        let text = format!(
-            r#"
+        let text = r#"
             name = "round"
-            leaf = {{ rods = 2, length = [1.0, 0.8], fan = [0.0, 0.0], joined = false }}
-            load = {{ gravity = [-3.0, 0.0, 0.0] }}
-            stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = 9.0, shear_3 = 9.0 }}
-            coupling = {{ x = 1.0, y = 2.0, z = 2.0 }}
-            "#
-        );
+            leaf = { rods = 2, length = [1.0, 0.8], fan = [0.0, 0.0], joined = false }
+            load = { gravity = [-3.0, 0.0, 0.0] }
+            stiffness = { torsion = 0.7, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = 9.0, shear_3 = 9.0 }
+            coupling = { x = 1.0, y = 2.0, z = 2.0 }
+            "#;
         let entries = change.split("; ").filter(|entry| !entry.is_empty());
         let entries: Vec<_> = entries.map(|entry| entry.into()).collect();
-        let scenario = Scenario::from_toml_with(&text, "round", &entries).unwrap();
+        let scenario = Scenario::from_toml_with(text, "round", &entries).unwrap();
         scenario.turnings()
     }
 
