@@ -227,8 +227,8 @@ impl<'w> Walk<'w> {
     }
 
     /// Predicts and corrects the equilibrium at another part. Where none is found that is surely
-    /// stable, one of any index is looked for if `any_sign` (more expensive), and converged to rounding: a
-    /// neutral mode, as that of a buckled round column, is not unstable.
+    /// stable, one of any index is looked for if `any_sign` (more expensive), and converged to
+    /// rounding: a neutral mode, as that of a buckled round column, is not unstable.
     fn step_to(&mut self, part: f64, any_sign: bool) -> Step {
         self.predict(part);
         let predicted = self.next.clone();
