@@ -201,6 +201,17 @@ fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf
     discrete
 }
 
+/// The same, with the sections of another leaf on this grid if its rods are the same.
+fn discretised_as(
+    other: Option<&DiscreteLeaf>,
+    leaf: &Leaf,
+    grid: &Grid,
+    softening: Option<f64>,
+) -> DiscreteLeaf {
+    let copied = other.and_then(|other| other.with_same_rods(leaf));
+    copied.unwrap_or_else(|| discretised(leaf, grid, softening))
+}
+
 /// Leaves of a family on one grid. The last few are cached: iterations
 /// return to them, and making a scenario costs more than assembling a small leaf.
 pub struct Leaves<'a, const N: usize = 1> {
@@ -238,7 +249,9 @@ impl<'a, const N: usize> Leaves<'a, N> {
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
         let (grid, softening) = (self.grid.refined(), self.softening);
-        let finer = |leaf: &DiscreteLeaf| discretised(&leaf.leaf, &grid, softening);
+        let finer = |before: Option<&DiscreteLeaf>, coarse: &DiscreteLeaf| {
+            discretised_as(before, &coarse.leaf, &grid, softening)
+        };
         Leaves {
             cache: self.cache.map(finer),
             family: self.family,
@@ -250,8 +263,9 @@ impl<'a, const N: usize> Leaves<'a, N> {
     /// The leaf at these parameters, as fractions of their ranges.
     pub fn at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
         let (family, grid, softening) = (self.family, &self.grid, self.softening);
-        let make = || Ok(discretised(&family.leaf(params)?, grid, softening));
-        self.cache.at(params, make)
+        self.cache.at(params, |last| {
+            Ok(discretised_as(last, &family.leaf(params)?, grid, softening))
+        })
     }
 }
 

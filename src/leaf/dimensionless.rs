@@ -136,6 +136,12 @@ impl Leaf {
         rods.div_ceil(if self.mirrored { 2 } else { 1 })
     }
 
+    /// Whether the rods of another leaf are the same in the same units.
+    pub fn has_same_rods(&self, other: &Leaf) -> bool {
+        (self.mirrored, self.scale) == (other.mirrored, other.scale)
+            && self.scenario.rods == other.scenario.rods
+    }
+
     /// Whether it is half of a leaf that is its own mirror image.
     pub fn in_half(&self) -> bool {
         self.mirrored

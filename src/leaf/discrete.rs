@@ -41,6 +41,19 @@ impl DiscreteLeaf {
             .flat_map(|j| (0..n).map(move |i| (j, i)))
             .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
             .collect();
+        DiscreteLeaf::with_sections(leaf, grid, sections)
+    }
+
+    /// Another leaf on the same grid, if its rods are the same: their sections are copied, since
+    /// evaluating profiles takes as long as assembling a small leaf.
+    pub fn with_same_rods(&self, leaf: &Leaf) -> Option<Self> {
+        let same = self.leaf.has_same_rods(leaf);
+        let copied = || (self.grid.clone(), self.sections.clone());
+        same.then(copied)
+            .map(|(grid, sections)| DiscreteLeaf::with_sections(leaf, grid, sections))
+    }
+
+    fn with_sections(leaf: &Leaf, grid: Grid, sections: Vec<Section>) -> Self {
         let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
         DiscreteLeaf {

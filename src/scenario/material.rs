@@ -42,14 +42,19 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
         Some(item) => item.quantity(rods)?,
         None => vec![Profile::Constant(0.0); rods],
     };
-    let section = |rod: usize| {
-        Arc::new(Section::new(
-            outline,
-            [&width, &thickness].map(|side| side[rod].clone()),
-            [&young, &poisson, &mass_density].map(|value| value[rod].clone()),
-        ))
-    };
-    let sections: Vec<_> = (0..rods).map(section).collect();
+    let all = [&width, &thickness, &young, &poisson, &mass_density];
+    let mut sections: Vec<Arc<Section>> = Vec::with_capacity(rods);
+    for rod in 0..rods {
+        let same = rod > 0 && all.iter().all(|values| values[rod] == values[rod - 1]);
+        sections.push(match sections.last() {
+            Some(last) if same => last.clone(),
+            _ => Arc::new(Section::new(
+                outline,
+                [&width, &thickness].map(|side| side[rod].clone()),
+                [&young, &poisson, &mass_density].map(|value| value[rod].clone()),
+            )),
+        });
+    }
     check(entries, entries.item(sides[1])?, &sections)?;
     Ok(Some(sections))
 }

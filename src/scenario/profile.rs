@@ -133,8 +133,8 @@ impl Profile {
                 property,
                 factor,
             } => {
-                let values = section.samples(*property).map(|value| factor * value);
-                values.fold(start, with)
+                let values = section.extremes(*property).map(|value| factor * value);
+                values.into_iter().fold(start, with)
             }
             Profile::Constant(value) => with(start, *value),
             Profile::Linear { value, .. } => value.iter().copied().fold(start, with),

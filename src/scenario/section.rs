@@ -50,6 +50,33 @@ pub enum Property {
     RotaryInertia,
 }
 
+impl Property {
+    /// All of them.
+    const ALL: [Property; 8] = {
+        use Property::{Couple, Density, Force, RotaryInertia};
+        [
+            Couple(0),
+            Couple(1),
+            Couple(2),
+            Force(0),
+            Force(1),
+            Force(2),
+            Density,
+            RotaryInertia,
+        ]
+    };
+
+    /// Its number among all.
+    fn number(self) -> usize {
+        match self {
+            Property::Couple(axis) => axis,
+            Property::Force(axis) => 3 + axis,
+            Property::Density => 6,
+            Property::RotaryInertia => 7,
+        }
+    }
+}
+
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
@@ -62,6 +89,8 @@ pub struct Section {
     pub(super) mass_density: Profile,
     /// Fractions inside (0, 1) where the slope of one of these may jump.
     kinks: Vec<f64>,
+    /// Least and largest value of every property.
+    extremes: [[f64; 2]; Property::ALL.len()],
 }
 
 impl Section {
@@ -78,9 +107,17 @@ impl Section {
             poisson,
             mass_density,
             kinks: Vec::new(),
+            extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
         };
         let profiles = section.profiles().into_iter();
         section.kinks = ascending(profiles.flat_map(Profile::kinks).copied());
+        for sigma in section.fractions() {
+            for property in Property::ALL {
+                let value = section.at(property, sigma);
+                let [least, most] = &mut section.extremes[property.number()];
+                (*least, *most) = (least.min(value), most.max(value));
+            }
+        }
         section
     }
 
@@ -155,9 +192,9 @@ impl Section {
         }
     }
 
-    /// Values at the knots and between them.
-    pub(super) fn samples(&self, property: Property) -> impl Iterator<Item = f64> {
-        self.fractions().map(move |sigma| self.at(property, sigma))
+    /// The least and the largest value of a property, of those at the knots and between them.
+    pub(super) fn extremes(&self, property: Property) -> [f64; 2] {
+        self.extremes[property.number()]
     }
 
     /// Cowper's factors for both shear forces, likewise.
@@ -170,7 +207,7 @@ impl Section {
         })
     }
 
-    fn fractions(&self) -> impl Iterator<Item = f64> {
+    fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
         let edges = [&[0.0], self.kinks(), &[1.0]].concat();
         (0..edges.len() - 1).flat_map(move |panel| {
             let (from, to) = (edges[panel], edges[panel + 1]);
