@@ -50,6 +50,8 @@ pub struct Followed {
     pub points: Vec<Refined>,
     /// Its critical points, likewise.
     pub critical: Vec<Refined>,
+    /// What was found of critical points beyond the last point.
+    beyond: Vec<Result<Refined, Doubt>>,
 }
 
 impl<'a> Grids<'a> {
@@ -101,6 +103,7 @@ impl<'a> Grids<'a> {
             end: End::MostPoints,
             points: Vec::new(),
             critical: Vec::new(),
+            beyond: Vec::new(),
         };
         let (mut ahead, mut tries) = (MOST / 2, 0);
         loop {
@@ -153,7 +156,8 @@ impl Followed {
         grid: &Grid,
         (accuracy, grids): (f64, usize),
     ) -> Option<Doubt> {
-        let critical = &self.branch.critical[self.critical.len()..];
+        let mut singular = std::mem::take(&mut self.beyond);
+        let critical = &self.branch.critical[self.critical.len() + singular.len()..];
         let points = &self.branch.points[self.points.len()..];
         // Points and critical points in one list, to keep all threads busy.
         let mut found: Vec<Result<Refined, Doubt>> = (0..points.len() + critical.len())
@@ -166,7 +170,7 @@ impl Followed {
                 }
             })
             .collect();
-        let mut singular = found.split_off(points.len());
+        singular.append(&mut found.split_off(points.len()));
         self.forget_vertices(&mut singular);
         let mut critical = singular.into_iter();
         let mut dropped = 0;
@@ -181,6 +185,7 @@ impl Followed {
                     continue;
                 } else if self.branch.end.is_none() {
                     // Decided once there is a point after it.
+                    self.beyond = critical.collect();
                     return None;
                 }
             }
