@@ -5,7 +5,7 @@ use super::equations::{Equations, Stuck};
 use super::field::{combined, dot, plus, times};
 use super::states::eigenvalue_rounding;
 use super::step::Found;
-use super::{Direction, Point, Solution};
+use super::{Direction, Point};
 use crate::largest::larger;
 use crate::leaf::{Field, State};
 
@@ -184,13 +184,8 @@ const FORCED: f64 = 1e-6;
 
 impl Search<'_, '_> {
     fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
-        self.beyond(&self.from.solution(), distance)
-    }
-
-    /// At a distance from a solution that was evaluated.
-    fn beyond(&mut self, solution: &Solution, distance: f64) -> Result<Evaluated, Stuck> {
         let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
-        let moved = equations.moved(solution, tangent, distance)?;
+        let moved = equations.moved(&self.from.solution(), tangent, distance)?;
         let border = equations.momenta(self.soft);
         let sample = equations.deflated(moved, [tangent], &border, None, self.exactly)?;
         let eigen = sample.solved.h.clone().symmetric_eigen();
@@ -323,15 +318,13 @@ impl Critical {
         let (mut distance, mut slope) = (0.0, self.slope);
         let mut best = search.at(distance)?;
         let mut value = best.eigenvalues[self.which];
-        let mut last = best.sample.solution.clone();
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || step.abs() > 1.0 {
                 return Err(Stuck::NotConverged);
             }
-            let next = search.beyond(&last, step)?;
-            last.clone_from(&next.sample.solution);
+            let next = search.at(distance + step)?;
             let after = next.eigenvalues[self.which];
             if step.abs() > LOCAL {
                 slope = (after - value) / step;
