@@ -265,10 +265,17 @@ fn margin_lines(margin: &Margin, length: f64) -> Vec<String> {
     let unknown = margin.pushes.iter();
     let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
-        let least = force(margin, push.more_than.unwrap_or_default());
         let why = push.remark.as_deref().unwrap_or_default();
         let which = directions(margin, push);
-        format!("a push {which} is known up to {least} only, under which it is stable: {why}")
+        match push.more_than.filter(|least| *least > 0.0) {
+            Some(least) => {
+                let least = force(margin, least);
+                format!(
+                    "a push {which} is known up to {least} only, under which it is stable: {why}"
+                )
+            }
+            None => format!("the effect of a push {which} is not known: {why}"),
+        }
     }));
     match &margin.barrier {
         Some(found) => lines.push(barrier(margin, found, length)),

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::branch::{Equations, Family, Stuck, on_finer};
+use crate::branch::{Equations, Family, Point, Stuck, on_finer};
 use crate::leaf::{Field, Grid, State, are_mirrored, is_mirrored};
 use crate::limit::Limit;
 use crate::memory;
@@ -60,7 +60,8 @@ pub enum MarginProgress {
     },
 }
 
-/// Largest relative difference of the softest eigenvalue between two successive grids.
+/// Largest relative difference of the softest eigenvalue between two successive grids, or of that
+/// extrapolated over them.
 const ALIKE: f64 = 0.25;
 
 /// Nodes of the finest grid in that search.
@@ -217,8 +218,43 @@ fn margin(
     })
 }
 
-/// The leaf on the coarsest grid on which its softest eigenvalue agrees with the next finer one:
-/// near a bifurcation that of a coarse grid differs. Or why there is none.
+/// The leaf on a grid, with its softest eigenvalue there.
+struct OnGrid {
+    grid: Grid,
+    point: Point,
+    softest: f64,
+}
+
+impl OnGrid {
+    fn of(equations: &mut Equations, point: &Point) -> Result<Self, Stuck> {
+        Ok(OnGrid {
+            grid: equations.grid().clone(),
+            softest: equations.softest(point)?,
+            point: point.clone(),
+        })
+    }
+}
+
+/// Whether the softest eigenvalue is that of the leaf on the first of these grids: it agrees with
+/// that on the next; or, near a bifurcation, where that of a coarse grid differs, the values
+/// extrapolated from the first two and from the last two agree, and the differences fall with the
+/// square of the segments' length.
+fn is_resolved(grids: &[OnGrid]) -> bool {
+    let alike = |a: f64, b: f64| (a - b).abs() < ALIKE * b;
+    let stable = grids.iter().all(|it| it.point.index == 0);
+    let softest: Vec<f64> = grids.iter().map(|it| it.softest).collect();
+    stable
+        && match softest[..] {
+            [a, b] => alike(a, b),
+            [a, b, c] => {
+                let [coarser, finer] = [[a, b], [b, c]].map(|[a, b]| b + (b - a) / 3.0);
+                alike(coarser, finer) && alike((a - b) / (b - c), 4.0)
+            }
+            _ => false,
+        }
+}
+
+/// The leaf on the coarsest grid on which its softest eigenvalue is known, or why there is none.
 fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State), &'static str> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
@@ -230,26 +266,27 @@ fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State),
         let point = equations.correct(&level.state, 0.0, None)?;
         Ok::<_, Stuck>((equations, point))
     };
-    let mut now = on_level(&levels[0]).map_err(|_| UNDECIDED)?;
+    let (mut equations, mut point) = on_level(&levels[0]).map_err(|_| UNDECIDED)?;
     nested.next();
+    let mut grids: Vec<OnGrid> = Vec::new();
     loop {
-        let softest = now.0.softest(&now.1).map_err(|_| UNDECIDED)?;
-        let finer = match nested.next() {
-            Some(level) => on_level(level),
-            None => on_finer(&mut now.0, &now.1),
-        };
-        let (mut equations, point) = finer.map_err(|_| UNDECIDED)?;
-        let next = equations.softest(&point).map_err(|_| UNDECIDED)?;
-        if now.1.index == 0 && point.index == 0 && (next - softest).abs() < ALIKE * next {
-            return Ok((now.0.grid().clone(), now.1.state));
+        grids.push(OnGrid::of(&mut equations, &point).map_err(|_| UNDECIDED)?);
+        for grids in [2, 3].map(|count| grids.len().checked_sub(count).map(|k| &grids[k..])) {
+            if let Some(grids) = grids.filter(|grids| is_resolved(grids)) {
+                return Ok((grids[0].grid.clone(), grids[0].point.state.clone()));
+            }
         }
-        if point.state.rods() * point.state.segments() > MOST_NODES {
+        if grids.len() > 1 && point.state.rods() * point.state.segments() > MOST_NODES {
             return Err(match point.index {
                 0 => UNDECIDED,
                 _ => "the leaf is unstable on grids finer than those of its relaxation",
             });
         }
-        now = (equations, point);
+        let finer = match nested.next() {
+            Some(level) => on_level(level),
+            None => on_finer(&mut equations, &point),
+        };
+        (equations, point) = finer.map_err(|_| UNDECIDED)?;
     }
 }
 
