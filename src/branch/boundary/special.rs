@@ -18,6 +18,10 @@ const LOCAL: f64 = 1e-7;
 /// Largest distance of the point from its initial guess, along the boundary.
 const REACH: f64 = 0.3;
 
+/// Modes of which the eigenvalues are below this, relative to their derivative along the boundary,
+/// become neutral at one crossing.
+const TOGETHER: f64 = 1e-5;
+
 /// Accuracy of the boundary points during the search.
 const EXACT: f64 = 1e-13;
 
@@ -127,7 +131,8 @@ pub fn at_value(
 }
 
 /// Special points between two points of a boundary, the second `step` along the tangent of the
-/// first; fails if there is more than one.
+/// first; fails if there is more than one. Several modes may become neutral together, as those of
+/// the boundary do.
 pub fn special_between(
     manifold: &mut Manifold,
     [now, next]: [&SingularPoint; 2],
@@ -137,10 +142,17 @@ pub fn special_between(
     let special = match (cusp, now.index.abs_diff(next.index)) {
         (false, 0) => return Ok(None),
         (true, 0) => Special::Cusp,
-        (false, 1) => Special::Crossing,
+        (false, _) => Special::Crossing,
         _ => return Err(Stuck::NotConverged),
     };
     let slope = (special.value(next) - special.value(now)) / step;
-    let (point, _) = zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
-    Ok(Some((special, point)))
+    let (point, slope) = zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?;
+    let vanishing = point
+        .others
+        .iter()
+        .filter(|it| it.abs() < TOGETHER * slope.abs());
+    match special == Special::Cusp || vanishing.count() == now.index.abs_diff(next.index) {
+        true => Ok(Some((special, point))),
+        false => Err(Stuck::NotConverged),
+    }
 }
