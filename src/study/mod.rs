@@ -24,9 +24,9 @@ pub use chart::{
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use fit::{
-    Data, DataFile, Experiment, Fit, FitCandidate, FitError, FitLeaf, FitOutcome, FitParameter,
-    FitRequest, FitResidual, FitStep, FitWork, Free, Measured, MeasuredQuantity, Origin, Traced,
-    fit,
+    Data, DataFile, Experiment, Fit, FitAlternative, FitCandidate, FitError, FitLeaf, FitOutcome,
+    FitParameter, FitRequest, FitResidual, FitStep, FitWork, Free, Measured, MeasuredQuantity,
+    Origin, Traced, fit,
 };
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,

@@ -74,6 +74,8 @@ class Fit(Table):
     undetermined: list[dict[str, float]]
     """Combinations of which the data say nothing, or little: by their keys, exponents of positive numbers and
     coefficients of others."""
+    alternatives: list[dict[str, Any]]
+    """Other values that fit as well, if such were found: ``values`` by their keys, and ``chi_squared``."""
     says: list[str]
     """What the data say, in words: the undetermined combinations, too."""
     chi_squared: float
@@ -98,6 +100,7 @@ class Fit(Table):
         self.correlations = read_only(np.array(said["correlations"], dtype=np.float64).reshape(count, count))
         for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
             setattr(self, name, said[name])
+        self.alternatives = said.get("alternatives", [])
         self.standard_deviation = said.get("standard_deviation")
         self.candidates = [Candidate(**entry) for entry in said.get("candidates", [])]
 

@@ -34,7 +34,7 @@ impl<'a> Model<'a> {
             ..self.clone()
         };
         let coarse = |case: usize| -> Result<CaseAt, FitError> {
-            let lost = |lost| self.no_equilibrium(case, &lost);
+            let lost = |lost| self.no_equilibrium(&accurate.theta, case, &lost);
             let known = &accurate.cases[case];
             for count in 1..=MOST_GRIDS {
                 let Some(at) = known.at.coarsest(count) else {

@@ -26,14 +26,21 @@ const SHORTER: f64 = 0.5;
 const FEW_LOST: usize = 3;
 
 /// A sum with a smaller relative error than this needs no further evaluation.
-const CLEARLY: f64 = 0.5;
+const CLEARLY: f64 = 0.3;
 
 /// Excess below the minimum, in variances, that indicates a better minimum.
 pub(super) const BETTER: f64 = 0.1;
 
-/// The distance from the minimum at which a profile ends on one side. `None` if it does not within
-/// a factor of ten, nor before a bound, or if leaves cannot be followed to its end.
-pub(super) type Reach = Option<f64>;
+/// Where a profile ends on one side of the minimum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Reach {
+    /// At this distance.
+    End(f64),
+    /// Not within a factor of ten, nor before a bound.
+    Open,
+    /// Beyond this distance, up to which it does not, the other numbers could not be fitted.
+    Lost(f64),
+}
 
 /// Residuals at a point near a minimum.
 type Known = (DVector<f64>, Point);
@@ -97,7 +104,7 @@ pub(super) fn ends(
     };
     let down = distance(-1.0, theta - low, None);
     let up = distance(1.0, high - theta, known);
-    let quadratic = half <= OPEN && down == Ok(Some(first)) && up == Ok(Some(first));
+    let quadratic = half <= OPEN && [down, up] == [Ok(Reach::End(first)); 2];
     (!quadratic).then_some([down, up])
 }
 
@@ -144,7 +151,7 @@ impl Search<'_, '_, '_, '_> {
     /// The approximate distance of the end, if the search does not converge.
     fn run(mut self, mut known: Option<Known>) -> Result<Reach, f64> {
         if self.most <= 0.0 {
-            return Ok(None);
+            return Ok(Reach::Open);
         }
         let mut lost = 0;
         for step in 0..FEW {
@@ -204,10 +211,10 @@ impl Search<'_, '_, '_, '_> {
             return Err(Failed);
         }
         if self.distance >= self.most && least.straight < wanted {
-            return Ok(Some(None));
+            return Ok(Some(Reach::Open));
         }
         if first && (least.above / wanted - 1.0).abs() < QUADRATIC {
-            return Ok(Some(Some(self.distance)));
+            return Ok(Some(Reach::End(self.distance)));
         }
         let gain = least.straight - least.above;
         let stagnates = self.there.is_some() && gain > STAGNATION * self.last.gain;
@@ -216,7 +223,7 @@ impl Search<'_, '_, '_, '_> {
             self.there = Some(self.near.slopes_at(point).map_err(|_| Failed)?);
             least = self.least(&residuals)?;
             if self.settled(&least) {
-                return Ok(Some(Some(self.distance)));
+                return Ok(Some(Reach::End(self.distance)));
             }
         }
         if stagnates {

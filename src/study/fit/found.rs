@@ -63,6 +63,7 @@ pub(super) fn fit(
             .iter()
             .map(|open| words::map(open, coordinates))
             .collect(),
+        alternatives: Vec::new(),
         says: words::sentences(&parameters, &open, coordinates),
         parameters,
         chi_squared: match stats.known {

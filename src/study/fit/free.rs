@@ -114,6 +114,20 @@ impl Coordinate {
         Ok(coordinate)
     }
 
+    /// The same coordinate with another initial value. Bounds that were not given move with it.
+    pub fn starting_at(&self, start: f64) -> Coordinate {
+        let moved = start - self.start;
+        let bounds = match self.bounded {
+            true => self.bounds,
+            false => self.bounds.map(|bound| bound + moved),
+        };
+        Coordinate {
+            start,
+            bounds,
+            ..self.clone()
+        }
+    }
+
     pub fn of(&self, value: f64) -> f64 {
         match self.log {
             true => value.ln(),

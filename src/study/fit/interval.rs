@@ -47,6 +47,7 @@ fn unknown(stats: &Statistics, k: usize) -> FitParameter {
         high,
         determined: false,
         profiled: false,
+        lost: [None; 2],
     }
 }
 
@@ -64,7 +65,7 @@ fn parameter(
     }
     let (low, high) = (parameter.low, parameter.high);
     let half = stats.quantile * stats.deviation(k).0;
-    let mut sides = [Some(half), Some(half)];
+    let mut sides = [Reach::End(half); 2];
     let (deviation, along) = shape.deviation(k);
     let first = shape.quantile * deviation;
     let few = match near {
@@ -80,7 +81,7 @@ fn parameter(
         true => few,
         false => {
             let guess = |side: Result<Reach, f64>| match side {
-                Ok(Some(end)) => Err(end),
+                Ok(Reach::End(end)) => Err(end),
                 other => other,
             };
             Some(few.map_or([Err(first); 2], |sides| sides.map(guess)))
@@ -102,12 +103,20 @@ fn parameter(
         }
     }
     let end = |side: Reach, sign: f64, bound: f64, given: Option<f64>| {
-        let end = side.map(|reach| theta + sign * reach);
+        let end = match side {
+            Reach::End(reach) => Some(theta + sign * reach),
+            Reach::Open | Reach::Lost(_) => None,
+        };
         // Outside the possible or permitted range.
         let inside = end.filter(|end| (bound - end) * sign >= 0.0);
         inside.map_or(given, |end| Some(free.value(end)))
     };
+    let lost = |side: Reach, sign: f64| match side {
+        Reach::Lost(reach) => Some(free.value(theta + sign * reach)),
+        Reach::End(_) | Reach::Open => None,
+    };
     let [down, up] = sides;
+    parameter.lost = [lost(down, -1.0), lost(up, 1.0)];
     parameter.low = end(down, -1.0, free.bounds[0], low);
     parameter.high = end(up, 1.0, free.bounds[1], high);
     let near = |end: Option<f64>| end.is_some_and(|end| (free.of(end) - theta).abs() <= OPEN);

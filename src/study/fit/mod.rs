@@ -18,12 +18,15 @@ mod found;
 mod free;
 mod interval;
 mod least_squares;
+mod minima;
 mod model;
 mod neighbourhood;
 mod profile;
 mod quantity;
 mod responses;
 mod result;
+mod search;
+mod starts;
 mod statistics;
 mod table;
 mod vein;
@@ -33,29 +36,21 @@ pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
 pub use free::Free;
 pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{
-    Fit, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitStep, FitWork,
+    Fit, FitAlternative, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitStep,
+    FitWork,
 };
 
+use std::cell::Cell;
 use std::time::Instant;
 
 use super::{Base, VaryError};
 use crate::limit::Limit;
-use crate::relax::{Lost, Options, RelaxError, check_tolerance};
+use crate::relax::{Options, RelaxError, check_tolerance};
 use free::Coordinate;
-use least_squares::{ASSUMED, End, Iteration, Weighting};
-use model::{Model, Point};
+use least_squares::{ASSUMED, Weighting};
+use minima::{Beginning, Minima};
+use model::Model;
 use quantity::Quantity;
-use statistics::Statistics;
-
-/// Largest number of minima abandoned for better ones.
-const MOST_MINIMA: usize = 4;
-
-/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
-const MOST_JUMPS: usize = 3;
-
-/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
-/// that of the search to it: a larger one is due to coarse grids.
-const SAME_SPREAD: f64 = 1.05;
 
 /// Why nothing can be fitted.
 #[derive(Debug, thiserror::Error)]
@@ -103,10 +98,6 @@ impl FitRequest {
     }
 }
 
-/// Remark if a leaf did not stay on its branch.
-const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to which it \
-    relaxes from the start: compare with a fit that starts from the values found";
-
 /// Fits the free numbers to the data. `progress` is called at each step.
 ///
 /// # Errors
@@ -124,109 +115,27 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         ..Options::default()
     };
     let model = Model::new(base, &coordinates, &options, request.data.clone())?;
-    let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
-    let assumed = ASSUMED * model.unit();
-    let first = model.with_loose_tolerance(assumed).find(&start)?;
-    let known = model.check_deviations(&first)?;
-    model.check_weights(&first)?;
-    let measured = first.components().filter(|component| !component.free);
+    let weighting = Weighting {
+        assumed: ASSUMED * model.unit(),
+        robust: request.robust,
+    };
+    let began = Beginning::find(&model, weighting)?;
+    let known = model.check_deviations(&began.point)?;
+    model.check_weights(&began.point)?;
+    let measured = began.point.components().filter(|component| !component.free);
     check_count(coordinates.len(), measured.count(), known)?;
-    let search = Search {
+    let minima = Minima {
         model: &model,
-        weighting: Weighting {
-            assumed,
-            robust: request.robust,
-        },
+        weighting,
         known,
         candidates: &request.candidates,
+        evaluations: Cell::new(0),
     };
-    let mut found = search.run(&first, progress)?;
+    let mut found = minima.best(began, progress)?;
     found.files = request.data.files.clone();
     found.remarks.extend(comments(&found.files));
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
-}
-
-/// The search for the best minimum.
-struct Search<'m, 'a> {
-    model: &'m Model<'a>,
-    weighting: Weighting,
-    /// Whether the standard deviations of the data are known.
-    known: bool,
-    candidates: &'m [Experiment],
-}
-
-impl<'m, 'a> Search<'m, 'a> {
-    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
-    /// there.
-    fn run(&self, first: &Point, progress: &mut dyn FnMut(&FitStep)) -> Result<Fit, FitError> {
-        let (model, weighting) = (self.model, self.weighting);
-        let (mut coarse, mut point) = model.coarse(first, weighting)?;
-        let mut work = FitWork::default();
-        let mut attempts = 0;
-        let mut jumps = 0;
-        let mut found = loop {
-            // The search on coarse grids; the last steps use all.
-            let mut searching = |step, sum| {
-                let known = None;
-                progress(&FitStep { step, sum, known });
-            };
-            let mut search = Iteration::new(&coarse, weighting, &mut searching);
-            let (near, searched, more) = search.run(point);
-            work.evaluations += more;
-            attempts += 1;
-            let there = model.follow(&near, &near.theta);
-            let there = there.or_else(|_| model.find(&near.theta))?;
-            let mut last = Iteration::new(model, weighting, &mut searching);
-            last.lean = true;
-            let (mut least, end, more) = last.run(there);
-            work.evaluations += 1 + more;
-            work.accurate += 1 + more;
-            let beyond = last
-                .jump
-                .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
-            if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
-                && let Some(there) = model.beyond(&theta, &least, weighting)
-            {
-                jumps += 1;
-                attempts -= 1;
-                (coarse, point) = model.coarse(&there, weighting)?;
-                continue;
-            }
-            let of_search = Statistics::new(&coarse, weighting, self.known, &near);
-            let spread = self.statistics(&least).spread;
-            let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
-            if !same && end == End::Converged {
-                // Its neighbourhood is computed with its own leaves.
-                let differentiated = model.differentiate(&mut least);
-                differentiated.map_err(|lost| model.no_equilibrium(0, &lost))?;
-            }
-            let stats = self.statistics(&least);
-            let shape = if same { &of_search } else { &stats };
-            let contradicted = contradiction::contradicts(&stats);
-            let parameters = match end {
-                End::Converged if !contradicted => interval::intervals(&stats, shape, progress),
-                _ => Ok(interval::without_intervals(&stats)),
-            };
-            let (end, parameters) = match parameters {
-                Ok(parameters) => (end, parameters),
-                Err(better) if attempts < MOST_MINIMA => {
-                    point = better;
-                    continue;
-                }
-                Err(_) => (End::MostSteps, interval::without_intervals(&stats)),
-            };
-            break found::fit(&stats, &end, parameters, work, self.candidates);
-        };
-        if jumps > 0 {
-            found.remarks.push(JUMPED.into());
-        }
-        Ok(found)
-    }
-
-    fn statistics<'p>(&'p self, point: &'p Point) -> Statistics<'p, 'a> {
-        Statistics::new(self.model, self.weighting, self.known, point)
-    }
 }
 
 /// How many lines among the rows of data were left out.

@@ -12,6 +12,7 @@ use super::data::{Data, Measured, Origin};
 use super::experiments::{self, Case};
 use super::free::Coordinate;
 use super::quantity::Kind;
+use super::words::digits;
 use crate::newton::Work;
 use crate::relax::{AtRest, Grids, Lost, Options};
 use crate::scenario::Scenario;
@@ -151,7 +152,7 @@ impl<'a> Model<'a> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = AtRest::find(&scenario, &self.options)?;
             let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], at));
-            found.map_err(|lost| self.no_equilibrium(case, &lost))
+            found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
         };
         self.point(theta, find)
     }
@@ -169,17 +170,38 @@ impl<'a> Model<'a> {
         })
     }
 
-    pub(super) fn no_equilibrium(&self, case: usize, lost: &Lost) -> FitError {
+    pub(super) fn no_equilibrium(&self, theta: &[f64], case: usize, lost: &Lost) -> FitError {
         let case = &self.cases[case];
         let (place, name) = (case.place(), case.name());
         let why = match lost {
             Lost::NotAtRest(why) => why.as_str(),
             Lost::Elsewhere => "it jumps to another equilibrium",
         };
+        let mut both = self.coordinates.iter().zip(theta);
+        let numbers = match both.all(|(free, theta)| free.start == *theta) {
+            true => "the numbers of the scenario".into(),
+            false => self.in_words(theta),
+        };
         FitError::NoEquilibrium(format!(
-            "{place}experiment {name}: with the numbers of the scenario there is no stable equilibrium ({why}): \
+            "{place}experiment {name}: with {numbers} there is no stable equilibrium ({why}): \
              start from other numbers, or leave this experiment out"
         ))
+    }
+
+    /// The number that each coordinate stands for.
+    pub fn numbers(&self, theta: &[f64]) -> Vec<(String, f64)> {
+        let both = self.coordinates.iter().zip(theta);
+        both.map(|(free, theta)| (free.keys.to_string(), free.value(*theta)))
+            .collect()
+    }
+
+    /// These in words.
+    pub fn in_words(&self, theta: &[f64]) -> String {
+        let numbers = self.numbers(theta);
+        let each = numbers
+            .iter()
+            .map(|(key, value)| format!("{key} = {}", digits(*value)));
+        each.collect::<Vec<_>>().join(", ")
     }
 
     /// The leaves at other values, followed from those of a point with derivatives.

@@ -15,11 +15,13 @@ const PROFILE_ITERATIONS: usize = 25;
 const LEAST: f64 = 1e-2;
 const PROFILE_ACCURACY: f64 = 0.01;
 
-/// Largest number of lost leaves in the search for an end of a profile.
+/// Largest number of distances at which the other numbers cannot be fitted, in the search for an
+/// end of a profile, and number of the smaller steps by which leaves are followed there.
 const MOST_LOST: usize = 6;
+const SMALLER_STEPS: usize = 4;
 
 /// Where fits begin again for numbers that ran away: so far on the way from their initial values.
-const BACK: [f64; 2] = [1.0 / 3.0, 0.0];
+const BACK: [f64; 3] = [1.0 / 3.0, 0.0, 2.0 / 3.0];
 
 /// The profile of the sum of squares along a number.
 pub(super) struct Profile<'s, 'm, 'a> {
@@ -32,8 +34,14 @@ pub(super) struct Profile<'s, 'm, 'a> {
     pub runaways: &'s [usize],
 }
 
-/// A lower sum may exist where leaves cannot be followed.
-struct Unsettled;
+/// A point of a profile.
+struct Known {
+    distance: f64,
+    /// The root of the sum, normalised to one at an end.
+    root: f64,
+    /// None at the minimum.
+    point: Option<Point>,
+}
 
 /// Excess of the sum of squares over the minimum, in squared spreads.
 pub(super) fn above(stats: &Statistics, point: &Point) -> f64 {
@@ -51,61 +59,74 @@ impl Profile<'_, '_, '_> {
     /// # Errors
     /// A point with a lower sum than the minimum.
     pub fn end(&self, first: f64, progress: &mut dyn FnMut(usize, f64)) -> Result<Reach, Point> {
-        let stats = self.stats;
         let sign = first.signum();
         let most = (OPEN + 0.1).min(self.room(sign));
+        if most <= 0.0 {
+            return Ok(Reach::Open);
+        }
         let mut reach = first.abs().min(most);
-        // Distance and root of the sum, inside and outside of the end; and a point from
-        // which leaves are followed.
-        let mut inside = (0.0, 0.0);
-        let mut outside: Option<(f64, f64)> = None;
-        let mut nearest: Option<Point> = None;
-        let mut lost = 0;
+        let mut inside = Known {
+            distance: 0.0,
+            root: 0.0,
+            point: None,
+        };
+        let mut outside: Option<Known> = None;
+        // The nearest distance at which all fits failed.
+        let mut lost = f64::INFINITY;
+        let mut failures = 0;
         for _ in 0..PROFILE_STEPS {
-            if most <= 0.0 {
-                return Ok(None);
-            }
-            let from = nearest.as_ref().unwrap_or(stats.point);
-            let Some(mut least) = self.fitted(from, sign * (reach - inside.0), progress) else {
-                lost += 1;
-                if lost > MOST_LOST {
-                    return Ok(None);
+            let least = self.least(sign * reach, &inside, outside.as_ref(), progress);
+            let Some(mut least) = least else {
+                failures += 1;
+                if failures > MOST_LOST {
+                    break;
                 }
-                reach = 0.5 * (inside.0 + reach);
+                lost = reach;
+                reach = 0.5 * (inside.distance + reach);
                 continue;
             };
-            let root = |least: &Point| above(stats, least).max(0.0).sqrt() / stats.quantile;
-            if root(&least) > 1.0 - PROFILE_ACCURACY {
-                match self.back(&least, progress) {
-                    Ok(lower) => least = lower.unwrap_or(least),
-                    Err(Unsettled) => return Ok(None),
-                }
+            if self.root(&least) > 1.0 - PROFILE_ACCURACY {
+                least = self.back(&least, progress).unwrap_or(least);
             }
-            if above(stats, &least) < -BETTER {
+            if above(self.stats, &least) < -BETTER {
                 return Err(least);
             }
-            let root = root(&least);
+            let root = self.root(&least);
             if (root - 1.0).abs() < PROFILE_ACCURACY {
-                return Ok(Some(reach));
+                return Ok(Reach::End(reach));
             }
+            let known = Known {
+                distance: reach,
+                root,
+                point: Some(least),
+            };
             match root < 1.0 {
-                true => {
-                    inside = (reach, root);
-                    nearest = Some(least);
-                }
-                false => outside = Some((reach, root)),
+                true => inside = known,
+                false => outside = Some(known),
             }
-            reach = match outside {
-                None if reach >= most => return Ok(None),
-                None => (reach / root.max(0.3) * 1.05).min(most),
+            reach = match &outside {
+                None if reach >= most => return Ok(Reach::Open),
+                None => {
+                    let next = (reach / root.max(0.3) * 1.05).min(most);
+                    next.min(0.5 * (reach + lost))
+                }
                 // The root of the sum is nearly linear.
                 Some(outside) => {
-                    let part = (1.0 - inside.1) / (outside.1 - inside.1);
-                    inside.0 + part.clamp(0.1, 0.9) * (outside.0 - inside.0)
+                    let part = (1.0 - inside.root) / (outside.root - inside.root);
+                    let width = outside.distance - inside.distance;
+                    inside.distance + part.clamp(0.1, 0.9) * width
                 }
             };
         }
-        Ok(outside.map(|(end, _)| end))
+        Ok(match outside {
+            Some(outside) if failures <= MOST_LOST => Reach::End(outside.distance),
+            _ => Reach::Lost(inside.distance),
+        })
+    }
+
+    /// The root of the sum, normalised to one at an end.
+    fn root(&self, least: &Point) -> f64 {
+        above(self.stats, least).max(0.0).sqrt() / self.stats.quantile
     }
 
     /// The distance of the bound on one side.
@@ -118,20 +139,64 @@ impl Profile<'_, '_, '_> {
         }
     }
 
-    /// The minimum over all other numbers so far from a point.
-    fn fitted(
+    /// The minimum over all other numbers at a distance from the minimum of all, with its sign. If it
+    /// is not reached from inside, it is approached in smaller steps, from outside, and with leaves
+    /// relaxed from their usual starts. `None` if all that fails.
+    fn least(
         &self,
-        from: &Point,
-        step: f64,
+        distance: f64,
+        inside: &Known,
+        outside: Option<&Known>,
         progress: &mut dyn FnMut(usize, f64),
     ) -> Option<Point> {
+        let from = inside.point.as_ref().unwrap_or(self.stats.point);
+        let sign = distance.signum();
+        let step = distance - sign * inside.distance;
+        let behind = outside.and_then(|known| {
+            let step = distance - sign * known.distance;
+            Some((known.point.as_ref()?, step))
+        });
+        let along = |from: &Point, step: f64| self.stats.model.moved(&from.theta, step, self.along);
+        let followed =
+            |from: &Point, step: f64| self.stats.model.follow(from, &along(from, step)).ok();
+        let relaxed = |theta: &[f64]| self.stats.model.find(theta).ok();
+        let initial = || {
+            let mut theta = self.initial();
+            theta[self.k] = along(from, step)[self.k];
+            theta
+        };
+        let ways: [&dyn Fn() -> Option<Point>; 5] = [
+            &|| followed(from, step),
+            &|| self.in_smaller_steps(from, step),
+            &|| behind.and_then(|(point, step)| followed(point, step)),
+            &|| relaxed(&along(from, step)),
+            &|| relaxed(&initial()),
+        ];
+        ways.into_iter().find_map(|way| {
+            let (least, end) = self.others(way()?, progress);
+            // Without a minimum there, the least sum is still no larger.
+            (end == End::Converged || self.root(&least) < 1.0).then_some(least)
+        })
+    }
+
+    /// A point followed in smaller steps, at each of which the derivatives are new.
+    fn in_smaller_steps(&self, from: &Point, step: f64) -> Option<Point> {
         let model = self.stats.model;
-        let start = model.moved(&from.theta, step, self.along);
-        let start = model.follow(from, &start).ok()?;
-        match self.others(start, progress) {
-            (least, End::Converged) => Some(least),
-            _ => None,
+        let mut there: Option<Point> = None;
+        for part in 1..=SMALLER_STEPS {
+            let part = part as f64 / SMALLER_STEPS as f64;
+            let theta = model.moved(&from.theta, part * step, self.along);
+            let mut next = model.follow(there.as_ref().unwrap_or(from), &theta).ok()?;
+            model.differentiate(&mut next).ok()?;
+            there = Some(next);
         }
+        there
+    }
+
+    /// The initial values.
+    fn initial(&self) -> Vec<f64> {
+        let coordinates = self.stats.model.coordinates.iter();
+        coordinates.map(|free| free.start).collect()
     }
 
     /// From a point to a minimum over all other numbers.
@@ -145,19 +210,14 @@ impl Profile<'_, '_, '_> {
     }
 
     /// A lower sum with the same value of the number, if numbers that ran away are fitted again
-    /// from where the data feel them.
-    fn back(
-        &self,
-        least: &Point,
-        progress: &mut dyn FnMut(usize, f64),
-    ) -> Result<Option<Point>, Unsettled> {
+    /// from where the data feel them. Where there is no leaf, there is no lower sum.
+    fn back(&self, least: &Point, progress: &mut dyn FnMut(usize, f64)) -> Option<Point> {
         if self.runaways.is_empty() {
-            return Ok(None);
+            return None;
         }
         let (stats, model) = (self.stats, self.stats.model);
         let lowest = above(stats, least);
         let mut before: Option<Point> = None;
-        let mut settled = true;
         for part in BACK {
             let mut theta = least.theta.clone();
             for &j in self.runaways {
@@ -166,25 +226,19 @@ impl Profile<'_, '_, '_> {
             let from = before.as_ref().unwrap_or(least);
             let there = model.follow(from, &theta).ok();
             let Some(mut there) = there.or_else(|| model.find(&theta).ok()) else {
-                settled = false;
                 continue;
             };
-            settled &= model.differentiate(&mut there).is_ok();
+            if model.differentiate(&mut there).is_err() {
+                continue;
+            }
             let start = model.follow(&there, &theta);
             before = Some(there);
-            let Ok(start) = start else {
-                settled = false;
-                continue;
-            };
-            let (found, end) = self.others(start, progress);
+            let Ok(start) = start else { continue };
+            let (found, _) = self.others(start, progress);
             if above(stats, &found) < lowest - LEAST {
-                return Ok(Some(found));
+                return Some(found);
             }
-            settled &= end == End::Converged;
         }
-        match settled {
-            true => Ok(None),
-            false => Err(Unsettled),
-        }
+        None
     }
 }

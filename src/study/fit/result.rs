@@ -38,6 +38,10 @@ pub struct FitParameter {
     /// Whether the interval is that of the profile likelihood, since the quadratic approximation at
     /// the minimum is inaccurate.
     pub profiled: bool,
+    /// Values below and above beyond which the other numbers could not be fitted, so that an end
+    /// there is not known.
+    #[serde(skip)]
+    pub lost: [Option<f64>; 2],
 }
 
 /// One scalar datum.
@@ -82,6 +86,15 @@ pub struct FitCandidate {
     pub remark: Option<String>,
 }
 
+/// Other values of the free numbers that fit the data as well.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitAlternative {
+    /// The value of each number.
+    pub values: BTreeMap<String, f64>,
+    /// Sum of the squares of residuals there, as that of the fit.
+    pub chi_squared: f64,
+}
+
 /// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitStep {
@@ -123,6 +136,9 @@ pub struct Fit {
     /// Combinations to which the data are insensitive: for each, exponents of
     /// positive numbers and coefficients of others.
     pub undetermined: Vec<BTreeMap<String, f64>>,
+    /// Other values that fit the data as well, if such were found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<FitAlternative>,
     /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.

@@ -51,6 +51,7 @@ pub(super) fn sentences(
             false => format!("{key}: to {half:.2e}"),
         });
     }
+    said.extend(parameters.iter().flat_map(lost));
     for open in open {
         said.push(sentence(open, parameters, free));
     }
@@ -78,6 +79,9 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
             digits(parameters[*k].value)
         ),
         [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
+            _ if parameters[*k].lost.iter().any(Option::is_some) => {
+                format!("{}: not known, as an end of its interval is not", key(*k))
+            }
             (Some(low), None) => format!("{}: only that it is above {low:.2e}", key(*k)),
             (None, Some(high)) => format!("{}: only that it is below {high:.2e}", key(*k)),
             _ => format!("{}: hardly, to no better than a factor of ten", key(*k)),
@@ -105,6 +109,20 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
     }
 }
 
+/// Which ends of an interval are not known.
+fn lost(parameter: &FitParameter) -> Vec<String> {
+    let sides = parameter.lost.iter().zip(["below", "above"]);
+    let lost = sides.filter_map(|(lost, side)| Some((digits((*lost)?), side)));
+    lost.map(|(lost, side)| {
+        format!(
+            "{}: where its interval ends {side} is not known: held beyond {lost}, the other numbers \
+             could not be fitted",
+            parameter.key
+        )
+    })
+    .collect()
+}
+
 /// Whether a number stands at a bound that was given.
 fn is_at_bound(parameter: &FitParameter, free: &Coordinate) -> bool {
     let bounds = free.bounds.map(|bound| free.value(bound));
@@ -112,7 +130,7 @@ fn is_at_bound(parameter: &FitParameter, free: &Coordinate) -> bool {
 }
 
 /// Three significant digits.
-fn digits(value: f64) -> f64 {
+pub(super) fn digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 
@@ -142,6 +160,7 @@ mod tests {
             high: None,
             determined: false,
             profiled: false,
+            lost: [None; 2],
         };
         let free: Vec<Coordinate> = parts.iter().map(coordinate).collect();
         let parameters: Vec<FitParameter> = parts.iter().map(parameter).collect();

@@ -1,0 +1,307 @@
+//! Which minimum is the answer: where the search begins, where it begins again if it ends without a
+//! good one, and other minima that fit the data as well.
+
+use std::cell::Cell;
+
+use super::FitError;
+use super::data::Experiment;
+use super::end::BETTER;
+use super::free::Coordinate;
+use super::least_squares::{End, Iteration, Weighting};
+use super::model::{Model, Point};
+use super::result::{Fit, FitAlternative, FitOutcome, FitParameter, FitStep};
+use super::search::{Minimum, Search};
+use super::starts::{Scout, Start, misfit, sum};
+
+/// Root mean square of the residuals, relative to the size of the data, beyond which initial values
+/// say nothing of the minimum: they are searched in decades first.
+const FAR: f64 = 0.25;
+
+/// The same of a minimum, beyond which the data would be less accurate than measurements are.
+const COARSE: f64 = 0.05;
+
+/// Largest number of searches from other values, and of values from which each begins.
+const MOST_SEARCHES: usize = 3;
+const MOST_STARTS: usize = 4;
+
+/// Largest number of steps to another minimum.
+const FEW_STEPS: usize = 30;
+
+/// Relative difference of values that are the same.
+const SAME: f64 = 1e-3;
+
+/// Where a search begins.
+pub(super) struct Beginning {
+    pub point: Point,
+    /// Why it does not begin at the values of the scenario, or what was tried.
+    remark: Option<String>,
+    /// How often the leaves were relaxed to find it.
+    evaluations: usize,
+}
+
+impl Beginning {
+    /// The values of the scenario, if all leaves come to rest there and the data are not far from
+    /// them; otherwise the best ones in decades around them, or near them.
+    pub fn find(model: &Model, weighting: Weighting) -> Result<Beginning, FitError> {
+        let start: Vec<f64> = model.coordinates.iter().map(|free| free.start).collect();
+        let loose = model.with_loose_tolerance(weighting.assumed);
+        let found = loose.find(&start);
+        let (initial, refused) = match found {
+            Ok(point) if misfit(model, &point) <= FAR => {
+                return Ok(Beginning {
+                    point,
+                    remark: None,
+                    evaluations: 0,
+                });
+            }
+            Ok(point) => (Some(point), None),
+            Err(FitError::NoEquilibrium(why)) => (None, Some(why)),
+            Err(other) => return Err(other),
+        };
+        let scout = Scout::new(model, weighting);
+        let least = match &initial {
+            Some(point) => sum(weighting, point),
+            None => f64::INFINITY,
+        };
+        let mut starts = match initial {
+            Some(_) => Vec::new(),
+            None => scout.near(&start),
+        };
+        if starts.is_empty() {
+            starts = scout.in_decades(&start, least);
+        }
+        let better = starts.iter().filter(|found| found.sum < least);
+        let better = better
+            .take(MOST_STARTS)
+            .find_map(|found| loose.find(&found.theta).ok());
+        let evaluations = scout.evaluations();
+        match (better, initial, refused) {
+            (Some(point), _, refused) => {
+                let values = model.in_words(&point.theta);
+                let why = refused.unwrap_or_else(|| {
+                    "with the numbers of the scenario the leaf is far from the data".into()
+                });
+                let remark = Some(format!("{why}; the search began with {values}"));
+                Ok(Beginning {
+                    point,
+                    remark,
+                    evaluations,
+                })
+            }
+            (None, Some(point), _) => {
+                let remark = Some(
+                    "with the numbers of the scenario the leaf is far from the data, and no other \
+                     decade of them is nearer"
+                        .into(),
+                );
+                Ok(Beginning {
+                    point,
+                    remark,
+                    evaluations,
+                })
+            }
+            (None, None, refused) => Err(FitError::NoEquilibrium(refused.unwrap_or_default())),
+        }
+    }
+}
+
+/// Searches for the best minimum.
+pub(super) struct Minima<'m, 'a> {
+    pub model: &'m Model<'a>,
+    pub weighting: Weighting,
+    /// Whether the standard deviations of the data are known.
+    pub known: bool,
+    pub candidates: &'m [Experiment],
+    /// How often the leaves were relaxed to compare minima.
+    pub evaluations: Cell<usize>,
+}
+
+impl<'a> Minima<'_, 'a> {
+    /// The best minimum, with the others that fit as well.
+    pub fn best(
+        &self,
+        began: Beginning,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<Fit, FitError> {
+        let remark = began.remark;
+        let mut best = match self.search(&began.point, progress) {
+            Err(FitError::NoEquilibrium(why)) => self.search_near(&began.point, why, progress)?,
+            found => found?,
+        };
+        let mut others = Vec::new();
+        for _ in 0..MOST_SEARCHES {
+            others = match self.doubts(&best) {
+                true => self.elsewhere(&best),
+                false => self.images(&best, &began.point),
+            };
+            let better = others
+                .iter()
+                .filter(|other| self.is_better(&best, other.sum));
+            let better = better.min_by(|a, b| a.sum.total_cmp(&b.sum));
+            let Some(point) = better.and_then(|it| self.loose().find(&it.theta).ok()) else {
+                break;
+            };
+            let Ok(again) = self.search(&point, progress) else {
+                break;
+            };
+            let gained = again.sum < best.sum || again.converged && !best.converged;
+            if !gained {
+                break;
+            }
+            best = again;
+        }
+        let mut fit = best.fit;
+        if best.converged {
+            let significant = best.significant;
+            let others = others
+                .iter()
+                .filter(|other| other.sum <= best.sum + significant);
+            for other in others {
+                self.tell(&mut fit, (other, best.sum));
+            }
+        }
+        fit.remarks.splice(0..0, remark);
+        fit.work.evaluations += began.evaluations + self.evaluations.get();
+        Ok(fit)
+    }
+
+    fn count(&self, more: usize) {
+        self.evaluations.set(self.evaluations.get() + more);
+    }
+
+    fn loose(&self) -> Model<'a> {
+        self.model.with_loose_tolerance(self.weighting.assumed)
+    }
+
+    /// The search from a point, with bounds around it if none are given.
+    fn search(
+        &self,
+        first: &Point,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<Minimum, FitError> {
+        let coordinates = self.model.coordinates.iter().zip(&first.theta);
+        let coordinates: Vec<Coordinate> = coordinates
+            .map(|(free, theta)| free.starting_at(*theta))
+            .collect();
+        let model = Model {
+            coordinates: &coordinates,
+            ..self.model.clone()
+        };
+        let search = Search {
+            model: &model,
+            weighting: self.weighting,
+            known: self.known,
+            candidates: self.candidates,
+        };
+        search.run(first, progress)
+    }
+
+    /// The search from values near those from which it ended where there is no leaf.
+    fn search_near(
+        &self,
+        from: &Point,
+        why: String,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<Minimum, FitError> {
+        let starts = Scout::new(self.model, self.weighting).near(&from.theta);
+        let mut points = starts.iter().take(MOST_STARTS);
+        let found = points.find_map(|start| {
+            let point = self.loose().find(&start.theta).ok()?;
+            self.search(&point, progress).ok()
+        });
+        found.ok_or(FitError::NoEquilibrium(why))
+    }
+
+    /// Whether there may well be a better minimum elsewhere.
+    fn doubts(&self, best: &Minimum) -> bool {
+        let contradicted = best.fit.outcome == FitOutcome::Contradicted;
+        let coarse = !self.known && best.misfit > COARSE;
+        !best.converged || best.jumped || best.at_window || contradicted || coarse
+    }
+
+    /// Whether a sum of squares is less than that of a minimum by more than chance.
+    fn is_better(&self, best: &Minimum, sum: f64) -> bool {
+        match best.converged {
+            true => sum < best.sum - BETTER * best.variance,
+            false => sum < best.sum,
+        }
+    }
+
+    /// Minima to which searches lead that begin elsewhere: in other decades, and near.
+    fn elsewhere(&self, best: &Minimum) -> Vec<Start> {
+        let scout = Scout::new(self.model, self.weighting);
+        let initial = self.model.coordinates.iter().map(|free| free.start);
+        let mut starts = scout.compare(vec![initial.collect()]);
+        starts.extend(scout.near(&best.theta));
+        if best.at_window || best.misfit > COARSE {
+            starts.extend(scout.in_decades(&best.theta, best.sum));
+        }
+        starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
+        self.count(scout.evaluations());
+        let starts = starts.into_iter().take(MOST_STARTS);
+        starts
+            .filter_map(|start| self.descend(&start.theta))
+            .collect()
+    }
+
+    /// Minima near values that may fit as well, if the leaves are nearer to the data there than where
+    /// the search began.
+    fn images(&self, best: &Minimum, began: &Point) -> Vec<Start> {
+        let scout = Scout::new(self.model, self.weighting);
+        let least = sum(self.weighting, began);
+        let images = scout.images(&best.theta).into_iter();
+        self.count(scout.evaluations());
+        let images = images.filter(|image| image.sum < least);
+        images
+            .filter_map(|image| self.descend(&image.theta))
+            .collect()
+    }
+
+    /// The minimum near some values, on coarse grids.
+    fn descend(&self, theta: &[f64]) -> Option<Start> {
+        let first = self.loose().find(theta).ok()?;
+        let (coarse, point) = self.model.coarse(&first, self.weighting).ok()?;
+        let mut quietly = |_, _| {};
+        let mut iteration = Iteration::new(&coarse, self.weighting, &mut quietly);
+        iteration.most_steps = FEW_STEPS;
+        let (point, end, more) = iteration.run(point);
+        self.count(1 + more);
+        (end == End::Converged).then(|| Start {
+            sum: sum(self.weighting, &point),
+            theta: point.theta,
+        })
+    }
+
+    /// Adds another minimum to a fit, if a number that is determined has a value there beyond its
+    /// interval: then it is not.
+    fn tell(&self, fit: &mut Fit, (other, least): (&Start, f64)) {
+        let values = self.model.numbers(&other.theta);
+        let beyond = |parameter: &FitParameter, value: f64| {
+            let (low, high) = (parameter.low, parameter.high);
+            let outside =
+                low.is_some_and(|low| value < low) || high.is_some_and(|high| value > high);
+            low.is_some() && high.is_some() && outside
+        };
+        let known = fit.alternatives.iter().any(|known| {
+            let mut both = values.iter();
+            both.all(|(key, value)| (known.values[key] / value - 1.0).abs() < SAME)
+        });
+        let differs: Vec<bool> = (fit.parameters.iter().zip(&values))
+            .map(|(parameter, (_, value))| beyond(parameter, *value))
+            .collect();
+        if known || !differs.contains(&true) {
+            return;
+        }
+        let ratio = if least > 0.0 { other.sum / least } else { 1.0 };
+        let alternative = FitAlternative {
+            chi_squared: fit.chi_squared * ratio,
+            values: values.iter().cloned().collect(),
+        };
+        let told = self.model.in_words(&other.theta);
+        fit.says.push(format!("other values fit as well: {told}"));
+        fit.alternatives.push(alternative);
+        fit.outcome = FitOutcome::Undetermined;
+        let parameters = fit.parameters.iter_mut().zip(differs);
+        parameters.for_each(|(parameter, differs)| parameter.determined &= !differs);
+    }
+}
