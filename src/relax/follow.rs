@@ -14,6 +14,7 @@ use crate::relax::{Equilibrium, Outcome};
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
 /// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
@@ -54,7 +55,35 @@ impl AtRest {
         scenario: &Scenario,
         options: &Options,
     ) -> Result<Result<(AtRest, Equilibrium), Lost>, RelaxError> {
-        let (leaf, levels) = relax_on_grids(scenario, options, false, &mut |_| {})?;
+        AtRest::observed(scenario, options, &mut |_| {})
+    }
+
+    /// The same in no more than so many steps; a leaf that needs more does not come to rest.
+    pub fn find_within(
+        scenario: &Scenario,
+        options: &Options,
+        most_steps: usize,
+    ) -> Result<Result<AtRest, Lost>, RelaxError> {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let mut limited = options.clone();
+        limited.limit.cancel = Some(cancel.clone());
+        let mut steps = 0;
+        let mut count = |_: &Progress| {
+            steps += 1;
+            if steps > most_steps || options.limit.reached() {
+                cancel.store(true, Ordering::Relaxed);
+            }
+        };
+        let found = AtRest::observed(scenario, &limited, &mut count)?;
+        Ok(found.map(|(at, _)| at))
+    }
+
+    fn observed(
+        scenario: &Scenario,
+        options: &Options,
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Result<(AtRest, Equilibrium), Lost>, RelaxError> {
+        let (leaf, levels) = relax_on_grids(scenario, options, false, progress)?;
         if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
             let remark = leaf.remark.clone();
             let why = remark.unwrap_or_else(|| leaf.outcome.word().into());

@@ -64,6 +64,7 @@ pub(super) fn fit(
             .map(|open| words::map(open, coordinates))
             .collect(),
         alternatives: Vec::new(),
+        tried: Vec::new(),
         says: words::sentences(&parameters, &open, coordinates),
         parameters,
         chi_squared: match stats.known {

@@ -31,6 +31,9 @@ const ACCURACY: f64 = 1e-2;
 /// A minimum is rejected if the longest step was expected to gain more than this part.
 const WORTHWHILE: f64 = 0.1;
 
+/// The part of the way to a sum worth reaching that the longest step must be expected to lead.
+const PROMISING: f64 = 0.5;
+
 /// Bisections for the damping that shortens a step.
 const BISECTIONS: usize = 40;
 
@@ -146,6 +149,9 @@ pub(super) struct Iteration<'m, 'a> {
     /// Whether the derivatives of the previous point may be used for the last one, if that is a
     /// minimum by them.
     pub lean: bool,
+    /// A sum worth reaching: the iteration ends where the longest step is not expected to lead a good
+    /// part of the way there.
+    pub target: f64,
     /// The nearest values tried at which a leaf would have had to jump.
     pub jump: Option<Vec<f64>>,
     /// Called with the number of the step and the sum.
@@ -165,6 +171,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             most_steps: MOST_STEPS,
             enough: GAIN,
             lean: false,
+            target: f64::INFINITY,
             jump: None,
             progress,
         }
@@ -189,6 +196,9 @@ impl<'m, 'a> Iteration<'m, 'a> {
             let open = linear.gain(&change(&point.theta, &longest));
             if open < self.enough * variance {
                 return (point, End::Converged, evaluations);
+            }
+            if open < PROMISING * (sum - self.target) {
+                return (point, End::Stuck(None), evaluations);
             }
             let nearly = open < ACCURACY * variance;
             let mut lost = None;

@@ -11,7 +11,7 @@ use super::least_squares::{End, Iteration, Weighting};
 use super::model::{Model, Point};
 use super::result::{Fit, FitAlternative, FitOutcome, FitParameter, FitStep};
 use super::search::{Minimum, Search};
-use super::starts::{Scout, Start, misfit, sum};
+use super::starts::{MOST_STEPS, Scout, Start, images, misfit, sum};
 
 /// Root mean square of the residuals, relative to the size of the data, beyond which initial values
 /// say nothing of the minimum: they are searched in decades first.
@@ -65,7 +65,7 @@ impl Beginning {
         };
         let mut starts = match initial {
             Some(_) => Vec::new(),
-            None => scout.near(&start),
+            None => scout.nearest(&start),
         };
         if starts.is_empty() {
             starts = scout.in_decades(&start, least);
@@ -105,6 +105,13 @@ impl Beginning {
     }
 }
 
+/// Other minima, and what was tried to find them.
+#[derive(Default)]
+struct Others {
+    minima: Vec<Start>,
+    tried: Vec<String>,
+}
+
 /// Searches for the best minimum.
 pub(super) struct Minima<'m, 'a> {
     pub model: &'m Model<'a>,
@@ -128,20 +135,27 @@ impl<'a> Minima<'_, 'a> {
             Err(FitError::NoEquilibrium(why)) => self.search_near(&began.point, why, progress)?,
             found => found?,
         };
-        let mut others = Vec::new();
+        for _ in 0..MOST_SEARCHES {
+            let further = best
+                .beyond_window
+                .then(|| self.again(&best.theta, progress));
+            match further.flatten().filter(|again| again.sum < best.sum) {
+                Some(again) => best = again,
+                None => break,
+            }
+        }
+        let mut others = Others::default();
         for _ in 0..MOST_SEARCHES {
             others = match self.doubts(&best) {
                 true => self.elsewhere(&best),
-                false => self.images(&best, &began.point),
+                false => self.images(&best),
             };
             let better = others
+                .minima
                 .iter()
                 .filter(|other| self.is_better(&best, other.sum));
             let better = better.min_by(|a, b| a.sum.total_cmp(&b.sum));
-            let Some(point) = better.and_then(|it| self.loose().find(&it.theta).ok()) else {
-                break;
-            };
-            let Ok(again) = self.search(&point, progress) else {
+            let Some(again) = better.and_then(|it| self.again(&it.theta, progress)) else {
                 break;
             };
             let gained = again.sum < best.sum || again.converged && !best.converged;
@@ -153,13 +167,12 @@ impl<'a> Minima<'_, 'a> {
         let mut fit = best.fit;
         if best.converged {
             let significant = best.significant;
-            let others = others
-                .iter()
-                .filter(|other| other.sum <= best.sum + significant);
-            for other in others {
+            let as_well = |other: &&Start| other.sum <= best.sum + significant;
+            for other in others.minima.iter().filter(as_well) {
                 self.tell(&mut fit, (other, best.sum));
             }
         }
+        fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
         fit.work.evaluations += began.evaluations + self.evaluations.get();
         Ok(fit)
@@ -196,6 +209,12 @@ impl<'a> Minima<'_, 'a> {
         search.run(first, progress)
     }
 
+    /// The search from other values.
+    fn again(&self, theta: &[f64], progress: &mut dyn FnMut(&FitStep)) -> Option<Minimum> {
+        let point = self.loose().find(theta).ok()?;
+        self.search(&point, progress).ok()
+    }
+
     /// The search from values near those from which it ended where there is no leaf.
     fn search_near(
         &self,
@@ -216,7 +235,7 @@ impl<'a> Minima<'_, 'a> {
     fn doubts(&self, best: &Minimum) -> bool {
         let contradicted = best.fit.outcome == FitOutcome::Contradicted;
         let coarse = !self.known && best.misfit > COARSE;
-        !best.converged || best.jumped || best.at_window || contradicted || coarse
+        !best.converged || best.beyond_window || contradicted || coarse
     }
 
     /// Whether a sum of squares is less than that of a minimum by more than chance.
@@ -228,44 +247,55 @@ impl<'a> Minima<'_, 'a> {
     }
 
     /// Minima to which searches lead that begin elsewhere: in other decades, and near.
-    fn elsewhere(&self, best: &Minimum) -> Vec<Start> {
+    fn elsewhere(&self, best: &Minimum) -> Others {
+        let mut tried = vec!["values near these".to_string()];
         let scout = Scout::new(self.model, self.weighting);
         let initial = self.model.coordinates.iter().map(|free| free.start);
         let mut starts = scout.compare(vec![initial.collect()]);
         starts.extend(scout.near(&best.theta));
-        if best.at_window || best.misfit > COARSE {
+        if best.beyond_window || best.misfit > COARSE {
+            tried.push("other decades".into());
             starts.extend(scout.in_decades(&best.theta, best.sum));
         }
         starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
         self.count(scout.evaluations());
         let starts = starts.into_iter().take(MOST_STARTS);
-        starts
-            .filter_map(|start| self.descend(&start.theta))
-            .collect()
+        let minima =
+            starts.filter_map(|start| self.descend(&start.theta, f64::INFINITY, FEW_STEPS));
+        Others {
+            minima: minima.collect(),
+            tried,
+        }
     }
 
-    /// Minima near values that may fit as well, if the leaves are nearer to the data there than where
-    /// the search began.
-    fn images(&self, best: &Minimum, began: &Point) -> Vec<Start> {
-        let scout = Scout::new(self.model, self.weighting);
-        let least = sum(self.weighting, began);
-        let images = scout.images(&best.theta).into_iter();
-        self.count(scout.evaluations());
-        let images = images.filter(|image| image.sum < least);
-        images
-            .filter_map(|image| self.descend(&image.theta))
-            .collect()
+    /// Minima near values that may fit as well, with no more work than the fit itself took.
+    fn images(&self, best: &Minimum) -> Others {
+        let mut others = Others::default();
+        let most = best.fit.work.evaluations;
+        let before = self.evaluations.get();
+        for (theta, what) in images(self.model, &best.theta) {
+            let spent = self.evaluations.get() - before;
+            if spent >= most {
+                break;
+            }
+            let found = self.descend(&theta, best.sum + best.significant, most - spent);
+            others.minima.extend(found);
+            others.tried.push(what);
+        }
+        others
     }
 
-    /// The minimum near some values, on coarse grids.
-    fn descend(&self, theta: &[f64]) -> Option<Start> {
-        let first = self.loose().find(theta).ok()?;
+    /// The minimum near some values, on coarse grids, if it may reach a sum.
+    fn descend(&self, theta: &[f64], target: f64, most_steps: usize) -> Option<Start> {
+        self.count(1);
+        let first = self.loose().find_within(theta, MOST_STEPS).ok()?;
         let (coarse, point) = self.model.coarse(&first, self.weighting).ok()?;
         let mut quietly = |_, _| {};
         let mut iteration = Iteration::new(&coarse, self.weighting, &mut quietly);
-        iteration.most_steps = FEW_STEPS;
+        iteration.most_steps = most_steps;
+        iteration.target = target;
         let (point, end, more) = iteration.run(point);
-        self.count(1 + more);
+        self.count(more);
         (end == End::Converged).then(|| Start {
             sum: sum(self.weighting, &point),
             theta: point.theta,

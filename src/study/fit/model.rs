@@ -157,6 +157,17 @@ impl<'a> Model<'a> {
         self.point(theta, find)
     }
 
+    /// The same in no more than so many steps of each leaf.
+    pub fn find_within(&self, theta: &[f64], most_steps: usize) -> Result<Point, FitError> {
+        let find = |case: usize| -> Result<CaseAt, FitError> {
+            let scenario = self.scenario(&self.cases[case], theta)?;
+            let found = AtRest::find_within(&scenario, &self.options, most_steps)?;
+            let found = found.and_then(|at| CaseAt::new(&self.cases[case], at));
+            found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
+        };
+        self.point(theta, find)
+    }
+
     /// The point at which `of` finds the leaf of each case.
     pub(super) fn point<E: Send>(
         &self,

@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use super::end::{BETTER, Reach};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
+use super::starts::MOST_STEPS;
 use super::statistics::{OPEN, Statistics};
 
 /// Steps to an end of a profile, iterations at each, accuracy of the least sum there, in
@@ -159,7 +160,7 @@ impl Profile<'_, '_, '_> {
         let along = |from: &Point, step: f64| self.stats.model.moved(&from.theta, step, self.along);
         let followed =
             |from: &Point, step: f64| self.stats.model.follow(from, &along(from, step)).ok();
-        let relaxed = |theta: &[f64]| self.stats.model.find(theta).ok();
+        let relaxed = |theta: &[f64]| self.stats.model.find_within(theta, MOST_STEPS).ok();
         let initial = || {
             let mut theta = self.initial();
             theta[self.k] = along(from, step)[self.k];
@@ -225,7 +226,8 @@ impl Profile<'_, '_, '_> {
             }
             let from = before.as_ref().unwrap_or(least);
             let there = model.follow(from, &theta).ok();
-            let Some(mut there) = there.or_else(|| model.find(&theta).ok()) else {
+            let Some(mut there) = there.or_else(|| model.find_within(&theta, MOST_STEPS).ok())
+            else {
                 continue;
             };
             if model.differentiate(&mut there).is_err() {

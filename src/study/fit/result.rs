@@ -139,6 +139,9 @@ pub struct Fit {
     /// Other values that fit the data as well, if such were found.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<FitAlternative>,
+    /// Which other values were tried to find out whether they fit as well, if any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tried: Vec<String>,
     /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.

@@ -3,7 +3,9 @@
 use super::FitError;
 use super::contradiction;
 use super::data::Experiment;
+use super::end::BETTER;
 use super::found;
+use super::free::LONGEST_STEP;
 use super::interval;
 use super::least_squares::{End, Iteration, Weighting};
 use super::model::{Model, Point};
@@ -37,10 +39,9 @@ pub(super) struct Minimum {
     pub converged: bool,
     /// Root mean square of the residuals, relative to the size of the data.
     pub misfit: f64,
-    /// Whether a leaf jumped on the way.
-    pub jumped: bool,
-    /// Whether a number without given bounds stands as far from its initial value as it may.
-    pub at_window: bool,
+    /// Whether the sum still falls where a number without given bounds is as far from its initial
+    /// value as it may be.
+    pub beyond_window: bool,
 }
 
 /// The search for a minimum near a start.
@@ -123,12 +124,11 @@ impl<'m, 'a> Search<'m, 'a> {
                 significant: (stats.quantile * stats.spread).powi(2),
                 converged: end == End::Converged,
                 misfit: misfit(model, stats.point),
-                jumped: jumps > 0,
-                at_window: is_at_window(model, stats.point),
+                beyond_window: falls_beyond_window(&stats),
                 theta: stats.point.theta.clone(),
             };
         };
-        if found.jumped {
+        if jumps > 0 {
             found.fit.remarks.push(JUMPED.into());
         }
         Ok(found)
@@ -139,8 +139,19 @@ impl<'m, 'a> Search<'m, 'a> {
     }
 }
 
-fn is_at_window(model: &Model, point: &Point) -> bool {
-    let coordinates = model.coordinates.iter().zip(&point.theta);
-    let mut coordinates = coordinates.filter(|(free, _)| !free.bounded);
-    coordinates.any(|(free, theta)| free.at_bound(*theta).is_some())
+/// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
+/// than chance.
+fn falls_beyond_window(stats: &Statistics) -> bool {
+    let weighed = stats.weighting.roots(&stats.residuals);
+    let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
+    let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+    coordinates.enumerate().any(|(k, (free, theta))| {
+        let [low, high] = free.bounds;
+        let slope = slopes[k];
+        let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
+        let bend = stats.jacobian.column(k).norm_squared();
+        let step = (slope.abs() / bend).min(LONGEST_STEP);
+        let gain = step * (2.0 * slope.abs() - bend * step);
+        !free.bounded && outwards && gain > BETTER * stats.spread.powi(2)
+    })
 }

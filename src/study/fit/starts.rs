@@ -29,8 +29,10 @@ const FEW: usize = 6;
 const FACTORS: [f64; 4] = [1.05, 1.0 / 1.3, 0.5, 2.0];
 const CHANGES: [f64; 4] = [-0.2, 0.2, -1.0, 1.0];
 
-/// Accuracy of leaves that are only compared, in lengths of the leaf.
+/// Accuracy of leaves that are only compared, in lengths of the leaf, and the largest number of
+/// steps in which they come to rest: soft leaves far from the data may take thousands.
 const COMPARED: f64 = 1e-3;
+pub(super) const MOST_STEPS: usize = 400;
 
 /// Values of the coordinates and the sum of squares there.
 #[derive(Clone, Debug)]
@@ -65,16 +67,12 @@ impl<'a> Scout<'a> {
 
     /// The leaves relaxed from their usual starts. `None` if one does not come to rest.
     fn at(&self, theta: Vec<f64>) -> Option<Start> {
-        let inside = self.model.coordinates.iter().zip(&theta);
-        let mut inside = inside.map(|(free, theta)| {
-            let [low, high] = free.bounds;
-            !free.bounded || (low..=high).contains(theta)
-        });
-        if !inside.all(|inside| inside) {
+        if !is_permitted(&self.model, &theta) {
             return None;
         }
         self.evaluations.fetch_add(1, Ordering::Relaxed);
-        let point = self.model.find(&theta).ok()?;
+        let most = std::env::var("MS").map_or(MOST_STEPS, |m| m.parse().unwrap());
+        let point = self.model.find_within(&theta, most).ok()?;
         let sum = sum(self.weighting, &point);
         sum.is_finite().then_some(Start { theta, sum })
     }
@@ -141,17 +139,38 @@ impl<'a> Scout<'a> {
         found
     }
 
+    /// Values near given ones at which all leaves come to rest, by ascending sums of squares:
+    /// all numbers changed together, or, if none of these does, one after the other.
+    pub fn nearest(&self, from: &[f64]) -> Vec<Start> {
+        let together = self.compare(self.together(from));
+        match together.is_empty() {
+            true => self.compare(self.one_by_one(from)),
+            false => together,
+        }
+    }
+
     /// Values near given ones, by ascending sums of squares.
     pub fn near(&self, from: &[f64]) -> Vec<Start> {
-        let free = self.model.coordinates;
-        let mut all = Vec::new();
-        for factor in FACTORS {
-            let together = free.iter().zip(from).map(|(free, theta)| match free.log {
+        let mut all = self.together(from);
+        all.extend(self.one_by_one(from));
+        self.compare(all)
+    }
+
+    fn together(&self, from: &[f64]) -> Vec<Vec<f64>> {
+        let times = |factor: f64| {
+            let both = self.model.coordinates.iter().zip(from);
+            let changed = both.map(|(free, theta)| match free.log {
                 true => theta + factor.ln(),
                 false => *theta,
             });
-            all.push(together.collect());
-        }
+            changed.collect()
+        };
+        FACTORS.map(times).into()
+    }
+
+    fn one_by_one(&self, from: &[f64]) -> Vec<Vec<f64>> {
+        let free = self.model.coordinates;
+        let mut all = Vec::new();
         for k in (0..free.len()).filter(|_| free.len() > 1 && free.len() <= FEW) {
             let changes = match free[k].log {
                 true => FACTORS.map(f64::ln),
@@ -163,46 +182,64 @@ impl<'a> Scout<'a> {
                 all.push(theta);
             }
         }
-        self.compare(all)
+        all
     }
+}
 
-    /// Values that may fit as well as given ones: of exchanged directions of a section, of reversed
-    /// lists of veins, and of the other sign.
-    pub fn images(&self, of: &[f64]) -> Vec<Start> {
-        let keys: Vec<String> = (self.model.coordinates.iter())
-            .map(|free| free.keys.to_string())
-            .collect();
-        let place = |key: &str| keys.iter().position(|other| other == key);
-        let permuted = |other: &dyn Fn(usize) -> Option<usize>| -> Vec<f64> {
-            let other = (0..of.len()).map(|k| other(k).map_or(of[k], |j| of[j]));
-            other.collect()
-        };
-        let exchange = |k: usize| match keys[k].contains("_2") {
-            true => place(&keys[k].replacen("_2", "_3", 1)),
-            false => place(&keys[k].replacen("_3", "_2", 1)),
-        };
-        let rods = self.model.base.scenario().rods.len();
-        let reverse = |k: usize| {
-            let (name, index) = keys[k].strip_suffix(']')?.rsplit_once('[')?;
-            let index: usize = index.parse().ok()?;
-            place(&format!("{name}[{}]", rods.checked_sub(index + 1)?))
-        };
-        let mut all = vec![permuted(&exchange), permuted(&reverse)];
-        let signed = (0..of.len()).filter(|&k| !self.model.coordinates[k].log);
-        let signed: Vec<usize> = signed.collect();
-        for &k in signed.iter().filter(|_| signed.len() <= FEW) {
-            let mut theta = of.to_vec();
-            theta[k] = -theta[k];
-            all.push(theta);
-        }
-        let mut images: Vec<Vec<f64>> = Vec::new();
-        for theta in all {
-            if theta != of && !images.contains(&theta) {
-                images.push(theta);
-            }
-        }
-        self.compare(images)
+/// Values that may fit as well as given ones, and what they are: of exchanged directions of a section,
+/// of reversed lists of veins, and of the other sign.
+pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
+    let keys = model.coordinates.iter().map(|free| free.keys.to_string());
+    let keys: Vec<String> = keys.collect();
+    let place = |key: &str| keys.iter().position(|other| other == key);
+    let permuted = |other: &dyn Fn(usize) -> Option<usize>| -> Vec<f64> {
+        let other = (0..of.len()).map(|k| other(k).map_or(of[k], |j| of[j]));
+        other.collect()
+    };
+    let exchange = |k: usize| match keys[k].contains("_2") {
+        true => place(&keys[k].replacen("_2", "_3", 1)),
+        false => place(&keys[k].replacen("_3", "_2", 1)),
+    };
+    let rods = model.base.scenario().rods.len();
+    let reverse = |k: usize| {
+        let (name, index) = keys[k].strip_suffix(']')?.rsplit_once('[')?;
+        let index: usize = index.parse().ok()?;
+        place(&format!("{name}[{}]", rods.checked_sub(index + 1)?))
+    };
+    let mut all = vec![
+        (
+            permuted(&exchange),
+            "the axes of the section exchanged".to_string(),
+        ),
+        (
+            permuted(&reverse),
+            "the veins in reversed order".to_string(),
+        ),
+    ];
+    let signed = (0..of.len()).filter(|&k| !model.coordinates[k].log);
+    let signed: Vec<usize> = signed.collect();
+    for &k in signed.iter().filter(|_| signed.len() <= FEW) {
+        let mut theta = of.to_vec();
+        theta[k] = -theta[k];
+        all.push((theta, format!("{} with the other sign", keys[k])));
     }
+    let mut images: Vec<(Vec<f64>, String)> = Vec::new();
+    for (theta, what) in all {
+        let known = images.iter().any(|(known, _)| *known == theta);
+        if theta != of && !known && is_permitted(model, &theta) {
+            images.push((theta, what));
+        }
+    }
+    images
+}
+
+/// Whether values are within the bounds that were given.
+fn is_permitted(model: &Model, theta: &[f64]) -> bool {
+    let mut both = model.coordinates.iter().zip(theta);
+    both.all(|(free, theta)| {
+        let [low, high] = free.bounds;
+        !free.bounded || (low..=high).contains(theta)
+    })
 }
 
 /// The sum of squares at a point.
