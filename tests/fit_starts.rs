@@ -21,7 +21,7 @@ const BENT: &str =
 /// The order of magnitude of a modulus need not be known.
 #[test]
 fn a_modulus_is_found_from_any_decade() {
-    for young in ["1e4", "1e6", "1e9", "1e12", "1e15"] {
+    for young in ["1e4", "1e6", "1e9", "1e12", "1e13", "1e15"] {
         let begin = base(BLADE, &format!("section.young={young}"));
         let found = fitted(&request(begin, &[BENT], &["section.young"]));
         assert_eq!(
@@ -97,6 +97,7 @@ fn exchanged_axes_are_named() {
     close("exchanged", alternative.values[free[1]], one.value, 1e-3);
     close("as well", alternative.chi_squared, found.chi_squared, 0.2);
     assert!(found.says.concat().contains("other values fit as well"));
+    assert_eq!(only(&found.tried), "the axes of the section exchanged");
     // A weight tells them apart.
     let bent = pulls(
         VEIN,
@@ -126,4 +127,21 @@ fn mirror_images_are_named() {
     );
     let value = only(&found.alternatives).values["load.tip_force[1]"];
     close("mirrored", value, -found.parameters[0].value, 1e-3);
+}
+
+/// Values that may fit as well cost no more than a look, where the search would lead back.
+#[test]
+fn a_fit_that_is_unique_costs_one_evaluation_more() {
+    let truth = "stiffness.bending_2=1.3; stiffness.bending_3=0.8";
+    let data = pulls(VEIN, truth, &common::fit::PULLS, 1e-3, &mut Draw(8));
+    let work = |free: &[&str]| {
+        let found = fitted(&request(base(VEIN, truth), &[&data], free));
+        assert_eq!(found.outcome, FitOutcome::Converged);
+        (found.tried.len(), found.work.evaluations)
+    };
+    let (tried, alone) = work(&["stiffness.bending_2"]);
+    assert_eq!(tried, 0);
+    let (tried, both) = work(&["stiffness.bending_2", "stiffness.bending_3"]);
+    assert_eq!(tried, 1);
+    assert!(both <= alone + 2, "{both} after {alone}");
 }

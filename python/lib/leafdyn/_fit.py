@@ -76,6 +76,8 @@ class Fit(Table):
     coefficients of others."""
     alternatives: list[dict[str, Any]]
     """Other values that fit as well, if such were found: ``values`` by their keys, and ``chi_squared``."""
+    tried: list[str]
+    """Which other values were tried to find out whether they fit as well."""
     says: list[str]
     """What the data say, in words: the undetermined combinations, too."""
     chi_squared: float
@@ -101,6 +103,7 @@ class Fit(Table):
         for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
             setattr(self, name, said[name])
         self.alternatives = said.get("alternatives", [])
+        self.tried = said.get("tried", [])
         self.standard_deviation = said.get("standard_deviation")
         self.candidates = [Candidate(**entry) for entry in said.get("candidates", [])]
 

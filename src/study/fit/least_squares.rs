@@ -31,8 +31,10 @@ const ACCURACY: f64 = 1e-2;
 /// A minimum is rejected if the longest step was expected to gain more than this part.
 const WORTHWHILE: f64 = 0.1;
 
-/// The part of the way to a sum worth reaching that the longest step must be expected to lead.
+/// The part of the way to a sum that the longest step must be expected to lead, and that of the
+/// way back to a known minimum that it may lead.
 const PROMISING: f64 = 0.5;
+const RETURNING: f64 = 0.5;
 
 /// Bisections for the damping that shortens a step.
 const BISECTIONS: usize = 40;
@@ -138,6 +140,24 @@ pub(super) enum End {
     Stuck(Option<Lost>),
 }
 
+/// A known minimum, besides which another one is searched.
+pub(super) struct Besides<'t> {
+    pub theta: &'t [f64],
+    /// The largest sum of another minimum that fits as well.
+    pub most: f64,
+    /// The distance at which the search begins.
+    pub distance: f64,
+}
+
+impl Besides<'_> {
+    /// Whether a step hardly leads to such a minimum: the sum that is expected after it is too large
+    /// still, or it leads back to the known minimum.
+    fn is_hopeless(&self, expected: f64, sum: f64, theta: &[f64]) -> bool {
+        let returns = change(self.theta, theta).norm() < RETURNING * self.distance;
+        returns || expected - self.most > (1.0 - PROMISING) * (sum - self.most).max(0.0)
+    }
+}
+
 pub(super) struct Iteration<'m, 'a> {
     pub model: &'m Model<'a>,
     pub weighting: Weighting,
@@ -149,9 +169,8 @@ pub(super) struct Iteration<'m, 'a> {
     /// Whether the derivatives of the previous point may be used for the last one, if that is a
     /// minimum by them.
     pub lean: bool,
-    /// A sum worth reaching: the iteration ends where the longest step is not expected to lead a good
-    /// part of the way there.
-    pub target: f64,
+    /// A minimum besides which another one is searched that fits as well.
+    pub besides: Option<Besides<'m>>,
     /// The nearest values tried at which a leaf would have had to jump.
     pub jump: Option<Vec<f64>>,
     /// Called with the number of the step and the sum.
@@ -171,7 +190,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             most_steps: MOST_STEPS,
             enough: GAIN,
             lean: false,
-            target: f64::INFINITY,
+            besides: None,
             jump: None,
             progress,
         }
@@ -197,7 +216,8 @@ impl<'m, 'a> Iteration<'m, 'a> {
             if open < self.enough * variance {
                 return (point, End::Converged, evaluations);
             }
-            if open < PROMISING * (sum - self.target) {
+            let besides = self.besides.as_ref();
+            if besides.is_some_and(|it| it.is_hopeless(sum - open, sum, &longest)) {
                 return (point, End::Stuck(None), evaluations);
             }
             let nearly = open < ACCURACY * variance;

@@ -7,7 +7,7 @@ use super::FitError;
 use super::data::Experiment;
 use super::end::BETTER;
 use super::free::Coordinate;
-use super::least_squares::{End, Iteration, Weighting};
+use super::least_squares::{Besides, End, Iteration, Weighting};
 use super::model::{Model, Point};
 use super::result::{Fit, FitAlternative, FitOutcome, FitParameter, FitStep};
 use super::search::{Minimum, Search};
@@ -260,8 +260,7 @@ impl<'a> Minima<'_, 'a> {
         starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
         self.count(scout.evaluations());
         let starts = starts.into_iter().take(MOST_STARTS);
-        let minima =
-            starts.filter_map(|start| self.descend(&start.theta, f64::INFINITY, FEW_STEPS));
+        let minima = starts.filter_map(|start| self.descend(&start.theta, None, FEW_STEPS));
         Others {
             minima: minima.collect(),
             tried,
@@ -278,22 +277,28 @@ impl<'a> Minima<'_, 'a> {
             if spent >= most {
                 break;
             }
-            let found = self.descend(&theta, best.sum + best.significant, most - spent);
+            let change = theta.iter().zip(&best.theta).map(|(to, from)| to - from);
+            let besides = Besides {
+                theta: &best.theta,
+                most: best.sum + best.significant,
+                distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
+            };
+            let found = self.descend(&theta, Some(besides), most - spent);
             others.minima.extend(found);
             others.tried.push(what);
         }
         others
     }
 
-    /// The minimum near some values, on coarse grids, if it may reach a sum.
-    fn descend(&self, theta: &[f64], target: f64, most_steps: usize) -> Option<Start> {
+    /// The minimum near some values, on coarse grids.
+    fn descend(&self, theta: &[f64], besides: Option<Besides>, most_steps: usize) -> Option<Start> {
         self.count(1);
         let first = self.loose().find_within(theta, MOST_STEPS).ok()?;
         let (coarse, point) = self.model.coarse(&first, self.weighting).ok()?;
         let mut quietly = |_, _| {};
         let mut iteration = Iteration::new(&coarse, self.weighting, &mut quietly);
         iteration.most_steps = most_steps;
-        iteration.target = target;
+        iteration.besides = besides;
         let (point, end, more) = iteration.run(point);
         self.count(more);
         (end == End::Converged).then(|| Start {

@@ -71,8 +71,7 @@ impl<'a> Scout<'a> {
             return None;
         }
         self.evaluations.fetch_add(1, Ordering::Relaxed);
-        let most = std::env::var("MS").map_or(MOST_STEPS, |m| m.parse().unwrap());
-        let point = self.model.find_within(&theta, most).ok()?;
+        let point = self.model.find_within(&theta, MOST_STEPS).ok()?;
         let sum = sum(self.weighting, &point);
         sum.is_finite().then_some(Start { theta, sum })
     }
