@@ -33,6 +33,8 @@ const SAME: f64 = 1e-3;
 /// Where a search begins.
 pub(super) struct Beginning {
     pub point: Point,
+    /// The values of the scenario, if it does not begin there although all leaves come to rest.
+    initial: Option<Point>,
     /// Why it does not begin at the values of the scenario, or what was tried.
     remark: Option<String>,
     /// How often the leaves were relaxed to find it.
@@ -50,6 +52,7 @@ impl Beginning {
             Ok(point) if misfit(model, &point) <= FAR => {
                 return Ok(Beginning {
                     point,
+                    initial: None,
                     remark: None,
                     evaluations: 0,
                 });
@@ -76,7 +79,7 @@ impl Beginning {
             .find_map(|found| loose.find(&found.theta).ok());
         let evaluations = scout.evaluations();
         match (better, initial, refused) {
-            (Some(point), _, refused) => {
+            (Some(point), initial, refused) => {
                 let values = model.in_words(&point.theta);
                 let why = refused.unwrap_or_else(|| {
                     "with the numbers of the scenario the leaf is far from the data".into()
@@ -84,6 +87,7 @@ impl Beginning {
                 let remark = Some(format!("{why}; the search began with {values}"));
                 Ok(Beginning {
                     point,
+                    initial,
                     remark,
                     evaluations,
                 })
@@ -96,6 +100,7 @@ impl Beginning {
                 );
                 Ok(Beginning {
                     point,
+                    initial: None,
                     remark,
                     evaluations,
                 })
@@ -119,7 +124,7 @@ pub(super) struct Minima<'m, 'a> {
     /// Whether the standard deviations of the data are known.
     pub known: bool,
     pub candidates: &'m [Experiment],
-    /// How often the leaves were relaxed to compare minima.
+    /// How often the leaves were relaxed, by searches and to compare minima.
     pub evaluations: Cell<usize>,
 }
 
@@ -130,16 +135,29 @@ impl<'a> Minima<'_, 'a> {
         began: Beginning,
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<Fit, FitError> {
-        let remark = began.remark;
-        let mut best = match self.search(&began.point, progress) {
-            Err(FitError::NoEquilibrium(why)) => self.search_near(&began.point, why, progress)?,
-            found => found?,
+        let mut remark = began.remark;
+        let first = self.search(&began.point, progress);
+        // What the initial values lead to is found even where other values seemed better.
+        let doubtful = first.as_ref().map_or(true, |first| self.doubts(first));
+        let plain = began.initial.filter(|_| doubtful);
+        let plain = plain.and_then(|initial| self.search(&initial, progress).ok());
+        let mut best = match (first, plain) {
+            (Ok(first), Some(plain)) if !plain.is_preferred_to(&first) => first,
+            (_, Some(plain)) => {
+                remark = None;
+                plain
+            }
+            (Err(FitError::NoEquilibrium(why)), None) => {
+                self.search_near(&began.point, why, progress)?
+            }
+            (first, None) => first?,
         };
         for _ in 0..MOST_SEARCHES {
             let further = best
                 .beyond_window
                 .then(|| self.again(&best.theta, progress));
-            match further.flatten().filter(|again| again.sum < best.sum) {
+            let further = further.flatten();
+            match further.filter(|again| again.is_preferred_to(&best)) {
                 Some(again) => best = again,
                 None => break,
             }
@@ -158,8 +176,7 @@ impl<'a> Minima<'_, 'a> {
             let Some(again) = better.and_then(|it| self.again(&it.theta, progress)) else {
                 break;
             };
-            let gained = again.sum < best.sum || again.converged && !best.converged;
-            if !gained {
+            if !again.is_preferred_to(&best) {
                 break;
             }
             best = again;
@@ -174,7 +191,7 @@ impl<'a> Minima<'_, 'a> {
         }
         fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
-        fit.work.evaluations += began.evaluations + self.evaluations.get();
+        fit.work.evaluations = began.evaluations + self.evaluations.get();
         Ok(fit)
     }
 
@@ -206,7 +223,9 @@ impl<'a> Minima<'_, 'a> {
             known: self.known,
             candidates: self.candidates,
         };
-        search.run(first, progress)
+        let found = search.run(first, progress)?;
+        self.count(found.fit.work.evaluations);
+        Ok(found)
     }
 
     /// The search from other values.

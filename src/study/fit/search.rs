@@ -44,6 +44,16 @@ pub(super) struct Minimum {
     pub beyond_window: bool,
 }
 
+impl Minimum {
+    /// Whether this is the better answer. A minimum is not left for values that are none.
+    pub fn is_preferred_to(&self, other: &Minimum) -> bool {
+        match self.converged == other.converged {
+            true => self.sum < other.sum,
+            false => self.converged,
+        }
+    }
+}
+
 /// The search for a minimum near a start.
 pub(super) struct Search<'m, 'a> {
     pub model: &'m Model<'a>,
