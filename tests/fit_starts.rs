@@ -145,3 +145,34 @@ fn a_fit_that_is_unique_costs_one_evaluation_more() {
     assert_eq!(tried, 1);
     assert!(both <= alone + 2, "{both} after {alone}");
 }
+
+/// Soft veins under forces that say how soft they are, and initial values from which the plain search
+/// ends in a valley that the data contradict.
+const SOFT: &str = r#"
+    name = "soft"
+    leaf = { rods = 3, length = 1.0, fan = "symmetric" }
+    stiffness = { torsion = 0.12184171565573146, bending_2 = 0.1039337847693259, bending_3 = 0.0315782543534351, axial = 458.1345312746382, shear_2 = 40.0, shear_3 = 40.0 }
+    load = { gravity = [0.0, 0.0, -0.3860082930064991] }
+    coupling = { y = 0.5, z = 0.5 }
+"#;
+const SAGGED: &str = "\
+load.tip_force[0],load.tip_force[1],load.tip_force[2],tip_x,tip_y,tip_z,sd_tip_x,sd_tip_y,sd_tip_z
+-0.01604627610571526,-0.010445125728233142,0.022445002034764655,0.8802182332780252,0.028409752489404697,-0.39402440243154424,0.0017656150348253322,0.0017656150348253322,0.0017656150348253322
+0.26786899092515165,0.023421960506608195,-0.03758599361516363,0.9052368297492256,0.04925692978002703,-0.3481229822564471,0.0017656150348253322,0.0017656150348253322,0.0017656150348253322
+-0.02869736892429635,-0.04984650957764181,-0.08277386770237057,0.8225232474610472,-0.11935473923304181,-0.46495974974633003,0.0017656150348253322,0.0017656150348253322,0.0017656150348253322
+-0.03079084772923291,0.0,0.08345620633333357,0.8973204876259218,-0.04620186256499005,-0.35433346338563604,0.0017656150348253322,0.0017656150348253322,0.0017656150348253322
+";
+
+/// Searches elsewhere do not replace a minimum by values that are none.
+#[test]
+fn a_minimum_is_not_left_for_values_that_are_none() {
+    let free = ["bending_2", "axial", "torsion", "bending_3"].map(|it| format!("stiffness.{it}"));
+    let free: Vec<&str> = free.iter().map(String::as_str).collect();
+    let found = fitted(&request(base(SOFT, ""), &[SAGGED], &free));
+    assert_eq!(
+        found.outcome,
+        FitOutcome::Contradicted,
+        "{:?}",
+        found.remarks
+    );
+}
