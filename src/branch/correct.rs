@@ -1,15 +1,12 @@
 //! Newton's method to a branch, within a plane or at a parameter, and the Morse index there.
 
-use std::cell::OnceCell;
-use std::sync::Arc;
-
 use super::equations::{Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized};
 use super::family::{OutOfRange, clamp};
 use super::field::{add, at_same_nodes, between, dot, is_finite, largest, plus};
-use super::states::{forces_on, rate};
+use super::states::rate;
 use super::{Direction, Point, Solution};
 use crate::largest::larger;
-use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Field, Solved, State};
+use crate::leaf::{DiscreteLeaf, Field, Solved, State};
 use crate::relax::NOISY;
 use crate::relax::prolong::prolong;
 
@@ -20,19 +17,6 @@ const SAME_INDEX: f64 = 1e-9;
 
 /// Iterations go on while an increment is at most this part of the one before.
 const CONTRACTING: f64 = 0.5;
-
-/// Iterations after Newton's method has converged, and the displacement (lengths) at which they
-/// end.
-const FURTHER: usize = 3;
-const FINISHED: f64 = 1e-12;
-
-/// The factorised matrix.
-enum Factored<'p> {
-    /// Rod by rod, in the system.
-    Rodwise,
-    /// As a whole; its negative pivots are counted.
-    Whole(Factors<'p>),
-}
 
 /// A hyperplane in which a point is sought.
 pub(super) struct Plane {
@@ -91,56 +75,34 @@ impl Equations<'_> {
         rate(held).map(Some)
     }
 
-    /// Factorises K + shift M: rod by rod if that is positive definite, else as a whole.
-    fn factorize<'p>(
+    /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
+    /// else by a direct factorisation, which also counts the negative eigenvalues.
+    fn solve(
         &mut self,
-        shift: f64,
-        pattern: &'p OnceCell<Arc<DirectSolver>>,
-    ) -> Result<Factored<'p>, Stuck> {
+        linear: &Linear,
+        rate: &Field,
+    ) -> Result<(Field, Field, Option<usize>), Stuck> {
+        let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
             if self.system.factorize(shift) {
-                return Ok(Factored::Rodwise);
+                let mut solved = |rhs: &Field| {
+                    self.system.set_rhs(rhs);
+                    let found = self.system.solve(None, CG_TOLERANCE);
+                    matches!(found, Solved::Yes(_)).then(|| self.system.solution())
+                };
+                if let (Some(forces), Some(rate)) = (solved(&linear.forces), solved(rate)) {
+                    return Ok((forces, rate, None));
+                }
             }
             self.rodwise = false;
             self.factorizations += 1;
         }
-        if pattern.get().is_none() {
-            // It is set once only.
-            let _ = pattern.set(self.pattern(0)?);
-        }
-        let pattern = pattern.get().ok_or(Stuck::TooLarge)?;
-        Ok(Factored::Whole(factorized(pattern, &self.system, shift)?))
-    }
-
-    /// The increments that these forces cause; `None` if the iteration over rods does not converge.
-    fn increments(&mut self, factored: &mut Factored, forces: &Field) -> Option<Field> {
-        match factored {
-            Factored::Whole(factors) => Some(factors.solve_bordered(forces, &[]).increments),
-            Factored::Rodwise => {
-                self.system.set_rhs(forces);
-                let found = self.system.solve(None, CG_TOLERANCE);
-                matches!(found, Solved::Yes(_)).then(|| self.system.solution())
-            }
-        }
-    }
-
-    /// Solves for the forces and their rate.
-    fn solve<'p>(
-        &mut self,
-        linear: &Linear,
-        rate: &Field,
-        pattern: &'p OnceCell<Arc<DirectSolver>>,
-    ) -> Result<(Field, Field, Factored<'p>), Stuck> {
-        loop {
-            let mut factored = self.factorize(linear.shift, pattern)?;
-            let mut solved = |rhs: &Field| self.increments(&mut factored, rhs);
-            match (solved(&linear.forces), solved(rate)) {
-                (Some(forces), Some(rate)) => return Ok((forces, rate, factored)),
-                _ if self.rodwise => self.rodwise = false,
-                _ => return Err(Stuck::NotConverged),
-            }
-        }
+        let pattern = self.pattern(0)?;
+        let mut factor = factorized(&pattern, &self.system, shift)?;
+        let forces = factor.solve_bordered(&linear.forces, &[]).increments;
+        let rate = factor.solve_bordered(rate, &[]).increments;
+        Ok((forces, rate, Some(factor.negative())))
     }
 
     /// Newton corrector: back to the branch within the plane normal to `normal`
@@ -172,75 +134,48 @@ impl Equations<'_> {
         fraction: f64,
         plane: Option<&Plane>,
     ) -> Result<Point, Stuck> {
-        Ok(self.corrected((state, fraction), plane, 0)?.0)
-    }
-
-    /// The same, iterated further until displacements are below rounding, as extrapolation over
-    /// grids magnifies what remains; and the last displacement. The further iterations use the last
-    /// factors.
-    pub(super) fn finish_within(
-        &mut self,
-        start: (&State, f64),
-        plane: Option<&Plane>,
-    ) -> Result<(Point, f64), Stuck> {
-        self.corrected(start, plane, FURTHER)
-    }
-
-    fn corrected(
-        &mut self,
-        (state, fraction): (&State, f64),
-        plane: Option<&Plane>,
-        further: usize,
-    ) -> Result<(Point, f64), Stuck> {
         let mut now = Solution {
             state: state.clone(),
             params: [fraction],
         };
-        let pattern = OnceCell::new();
         let mut previous = f64::INFINITY;
         for iterations in 1.. {
             let rates = self.rates(&now, false)?;
             let linear = self.assemble(&mut now, false)?;
-            let (forces, mut rate, mut factored) = self.solve(&linear, &rates[0], &pattern)?;
+            let (forces, mut rate, counted) = self.solve(&linear, &rates[0])?;
             if let Some(held) = self.held_rate(&now.state, now.params[0])? {
                 add(&mut rate, 1.0, &held);
             }
             self.exclude_turn(&now, &mut rate)?;
-            let mut size = self.step_within(plane, &forces, &rate, &mut now)?;
+            let step = plane.map_or(0.0, |plane| {
+                let off = plane.distance(&now.state) + dot(&plane.dual, &forces);
+                -off / (dot(&plane.dual, &rate) + plane.own)
+            });
+            let increments = plus(&forces, step, &rate);
+            let size = larger(largest(&increments), step.abs());
+            if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            now.params[0] += step;
+            now.state = self.advanced(&now.state, now.params, &increments, 1.0)?;
             if at_rest(size, previous) {
                 clamp(self.leaves.at(now.params)?, &mut now.state);
-                // The factorised matrix is that of the previous state.
-                let counted = match &factored {
-                    Factored::Whole(factors) if size < SAME_INDEX => Some(factors.negative()),
-                    _ => None,
-                };
-                for _ in 0..further {
-                    if size < FINISHED {
-                        break;
-                    }
-                    let leaf = self.leaves.at(now.params)?;
-                    let forces = forces_on(leaf, &now.state, &mut self.system);
-                    let forces = self.increments(&mut factored, &forces);
-                    let forces = forces.ok_or(Stuck::NotConverged)?;
-                    size = self.step_within(plane, &forces, &rate, &mut now)?;
-                    clamp(self.leaves.at(now.params)?, &mut now.state);
-                }
                 let tangent = self.normalised(Direction {
                     increments: rate,
                     params: [1.0],
                 });
+                // The factorised matrix is that of the previous state.
                 let index = match counted {
-                    Some(index) => index,
-                    None => self.index(&now)?,
+                    Some(index) if size < SAME_INDEX => index,
+                    _ => self.index(&now)?,
                 };
-                let point = Point {
+                return Ok(Point {
                     state: now.state,
                     fraction: now.params[0],
                     tangent,
                     index,
                     iterations,
-                };
-                return Ok((point, size));
+                });
             }
             // Where the matrix is that of a softer leaf, the method converges linearly.
             if iterations >= ITERATIONS && size > CONTRACTING * previous {
@@ -249,29 +184,6 @@ impl Equations<'_> {
             previous = size;
         }
         Err(Stuck::NotConverged)
-    }
-
-    /// Adds the increments due to the forces, and the rate times the change of the parameter that
-    /// leads into the plane; the size of the step.
-    fn step_within(
-        &mut self,
-        plane: Option<&Plane>,
-        forces: &Field,
-        rate: &Field,
-        now: &mut Solution,
-    ) -> Result<f64, Stuck> {
-        let step = plane.map_or(0.0, |plane| {
-            let off = plane.distance(&now.state) + dot(&plane.dual, forces);
-            -off / (dot(&plane.dual, rate) + plane.own)
-        });
-        let increments = plus(forces, step, rate);
-        let size = larger(largest(&increments), step.abs());
-        if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
-            return Err(Stuck::NotConverged);
-        }
-        now.params[0] += step;
-        now.state = self.advanced(&now.state, now.params, &increments, 1.0)?;
-        Ok(size)
     }
 
     /// Subtracts the turns of veins that can turn without resistance, so that a tangent does not

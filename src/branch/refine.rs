@@ -8,7 +8,7 @@ use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::both_sides;
 use super::{Direction, Point};
 use crate::largest::larger;
-use crate::leaf::Grid;
+use crate::leaf::{Grid, State};
 use crate::relax::prolong::{prolong, restrict};
 use glam::DVec3;
 
@@ -33,6 +33,11 @@ const ALONG: f64 = 0.995;
 
 /// A point on a coarser grid that is farther away than this (lengths) is another.
 const NEAR: f64 = 0.1;
+
+/// Iterations after Newton's method has converged, and the displacement (lengths) at which they
+/// end.
+const FURTHER: usize = 3;
+const FINISHED: f64 = 1e-12;
 
 /// Number of consecutive grids with the same index, if only the index is wanted.
 const AGREEING: usize = 3;
@@ -66,6 +71,26 @@ struct Finer<'a> {
     unfinished: f64,
 }
 
+/// A point in a plane, or at a parameter, iterated until the displacements are below rounding,
+/// as extrapolation over grids magnifies what remains; and the last displacement.
+fn finished(
+    equations: &mut Equations,
+    (state, fraction): (&State, f64),
+    plane: Option<&Plane>,
+) -> Result<(Point, f64), Stuck> {
+    let mut found = equations.correct_within(state, fraction, plane)?;
+    let mut unfinished = f64::INFINITY;
+    for _ in 0..FURTHER {
+        let next = equations.correct_within(&found.state, found.fraction, plane)?;
+        unfinished = found.state.shift_to(&next.state);
+        found = next;
+        if unfinished < FINISHED {
+            break;
+        }
+    }
+    Ok((found, unfinished))
+}
+
 /// The point in the same plane, or at the same parameter, on the grid with all segments halved.
 fn on_next_grid<'a>(
     equations: &mut Equations<'a>,
@@ -78,7 +103,7 @@ fn on_next_grid<'a>(
     let mut equations = equations.refined();
     let tangent = equations.prolonged(&point.tangent);
     let start = (&guess, point.fraction);
-    let (mut found, unfinished) = equations.finish_within(start, plane.as_ref())?;
+    let (mut found, unfinished) = finished(&mut equations, start, plane.as_ref())?;
     found.tangent = equations.oriented(found.tangent, &tangent);
     Ok(Finer {
         moved: guess.shift_to(&found.state),
@@ -99,9 +124,14 @@ pub fn refine(
 ) -> Result<Refined, Doubt> {
     match along_parameter(point) {
         true => refine_in(family, grid, point, accuracy, false),
-        false => refine_in(family, grid, point, accuracy, true)
+        false => refine_in(family, grid, point, accuracy, true).or_else(|doubt| {
+            let other = refine_in(family, grid, point, accuracy, false);
             // Beside a fold of a finer grid that grid may have no point at this parameter.
-            .or_else(|doubt| refine_in(family, grid, point, accuracy, false).map_err(|_| doubt)),
+            other.map_err(|other| match doubt {
+                Doubt::OtherIndex => doubt,
+                _ => other,
+            })
+        }),
     }
 }
 
@@ -162,7 +192,7 @@ fn on_coarser(
     };
     let plane = in_plane.then(|| Plane::across(&equations, &near));
     let start = (&near.state, point.fraction);
-    let (found, _) = equations.finish_within(start, plane.as_ref()).ok()?;
+    let (found, _) = finished(&mut equations, start, plane.as_ref()).ok()?;
     let along = equations.inner(&found.tangent, &near.tangent).abs();
     if along < SAME_BRANCH || near.state.shift_to(&found.state) > NEAR {
         return None;
@@ -190,7 +220,7 @@ fn refine_in(
         None => in_plane.then(|| Plane::across(&equations, point)),
     };
     let start = (&point.state, point.fraction);
-    let (mut now, unfinished) = equations.finish_within(start, plane.as_ref())?;
+    let (mut now, unfinished) = finished(&mut equations, start, plane.as_ref())?;
     now.tangent = equations.oriented(now.tangent, &point.tangent);
     table.noise = unfinished;
     let values = Values::of(&mut equations, &now.state, now.fraction)?;

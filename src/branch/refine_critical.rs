@@ -50,7 +50,7 @@ pub fn refine_critical(
     let mut equations = Equations::new(family, grid.clone());
     let mut critical = found.clone();
     let mut softening = Softening(SOFTENINGS[0]);
-    let (mut moved, mut apart) = (f64::INFINITY, 0);
+    let mut moved = f64::INFINITY;
     for level in 0..GRIDS {
         if level > 0 {
             let leaf = equations.leaves.at([critical.fraction])?;
@@ -71,10 +71,8 @@ pub fn refine_critical(
         }
         let (mut values, growth) = softening.on(family, &mut equations, &critical, &mut table)?;
         if critical.kind == Kind::Branching {
-            let near = (&critical, values.fraction);
-            let across = interpolate_across(&mut equations, near, accuracy, apart);
+            let across = interpolate_across(&mut equations, &critical, values.fraction, accuracy);
             if let Some(across) = across {
-                apart = across.apart;
                 table.common = larger(table.common, across.error);
                 table.slope = Some(across.slope);
                 values = across.values;
@@ -204,23 +202,21 @@ struct Interpolated {
     error: f64,
     /// Derivatives of the values with respect to the fraction.
     slope: Values,
-    /// The number of its spacing.
-    apart: usize,
 }
 
 /// Interpolates a branch across a branch point at this fraction. There the singular matrix
 /// leaves the component along the neutral mode undetermined to rounding; but the branch is
-/// smooth, and points on both sides are well determined. The first spacing is the best one of the
-/// grid before. None if there is no point on one side: at an end of the range.
+/// smooth, and points on both sides are well determined. None if there is no point on one side:
+/// at an end of the range.
 fn interpolate_across(
     equations: &mut Equations,
-    (critical, fraction): (&Critical, f64),
+    critical: &Critical,
+    fraction: f64,
     accuracy: f64,
-    first: usize,
 ) -> Option<Interpolated> {
     let mut best: Option<Interpolated> = None;
     let mut last: Option<(Values, f64)> = None;
-    for apart in first..APART.len() {
+    for apart in APART {
         let Some(mut now) = interpolated(equations, critical, fraction, apart) else {
             continue;
         };
@@ -252,7 +248,7 @@ fn interpolated(
     equations: &mut Equations,
     critical: &Critical,
     fraction: f64,
-    apart: usize,
+    apart: f64,
 ) -> Option<Interpolated> {
     // Weights of values at -3, -2, -1, 1, 2, 3: for the value at 0 and the slope to sixth
     // order, and, from four of them, for the value at 0 to fourth order.
@@ -261,9 +257,7 @@ fn interpolated(
     const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
     let tangent = &critical.tangent;
     let mut values_at = |side: f64| {
-        let point = critical
-            .beside(equations, tangent, side * APART[apart])
-            .ok()?;
+        let point = critical.beside(equations, tangent, side * apart).ok()?;
         Values::of(equations, &point.state, point.fraction).ok()
     };
     let pairs = [1.0, 2.0, 3.0].into_iter();
@@ -290,6 +284,5 @@ fn interpolated(
         error: values.distance(&at_fraction(FOURTH)),
         values,
         slope,
-        apart,
     })
 }
