@@ -89,7 +89,8 @@ pub struct Section {
     pub(super) mass_density: Profile,
     /// Fractions inside (0, 1) where the slope of one of these may jump.
     kinks: Vec<f64>,
-    /// Least and largest value of every property.
+    /// Least and largest value of every property, where they change along the rod: else the
+    /// profiles are constant.
     extremes: [[f64; 2]; Property::ALL.len()],
 }
 
@@ -111,7 +112,8 @@ impl Section {
         };
         let profiles = section.profiles().into_iter();
         section.kinks = ascending(profiles.flat_map(Profile::kinks).copied());
-        for sigma in section.fractions() {
+        let varies = !section.is_constant();
+        for sigma in section.fractions().filter(|_| varies) {
             for property in Property::ALL {
                 let value = section.at(property, sigma);
                 let [least, most] = &mut section.extremes[property.number()];
