@@ -27,7 +27,6 @@
 //! | follow one as a number varies, through folds | [`study::trace()`] |
 //! | see it move | [`simulate::Simulation`] |
 //! | see where methods fail, or how fast they are | [`study::map()`], [`study::chart()`] |
-//! | write the files of the program | [`files::write_all`] (feature `cli`) |
 //!
 //! # The model
 //!
@@ -99,28 +98,19 @@
 
 mod branch;
 mod bvp;
-mod checksum;
-#[cfg(feature = "cli")]
-pub mod cli;
-#[cfg(feature = "cli")]
-mod figure;
-#[cfg(feature = "cli")]
-pub mod files;
 mod lanes;
-mod largest;
+pub mod largest;
 mod leaf;
 mod limit;
 pub mod memory;
 mod modes;
 mod motion;
 mod newton;
-mod numbers;
+pub mod numbers;
 #[cfg(test)]
 #[path = "../tests/common/pairs.rs"]
 mod pairs;
 pub mod relax;
-#[cfg(feature = "cli")]
-mod report;
 mod rod;
 mod rotation;
 pub mod scenario;
@@ -130,9 +120,6 @@ pub mod study;
 mod tableau;
 pub mod undulation;
 mod words;
-
-#[cfg(feature = "cli")]
-pub use figure::view;
 
 /// Internals for this project's own tests and benchmarks: they may change with any release.
 #[doc(hidden)]

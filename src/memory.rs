@@ -125,7 +125,10 @@ pub(crate) fn shooting(rods: usize, intervals: usize) -> Result<(), TooMuch> {
 }
 
 /// A result at `stations` of each rod, besides its base, that are asked for.
-pub(crate) fn stations(rods: usize, stations: usize) -> Result<(), TooMuch> {
+///
+/// # Errors
+/// If it would take more memory than is [`allowed`].
+pub fn stations(rods: usize, stations: usize) -> Result<(), TooMuch> {
     // Measured: 580 for tables, 700 with those of modes, however many; 920 for a page, 1240
     // for that of a motion.
     let nodes = stations.saturating_add(1);

@@ -10,27 +10,10 @@ pub struct UnknownWord {
     pub allowed: Vec<&'static str>,
 }
 
-/// Words of earlier releases, with those that replace them.
-const FORMER: [(&str, &str); 2] = [
-    ("multiple-shooting", "shooting"),
-    ("relaxed-shooting", "shooting-from-rest"),
-];
-
-/// The word that replaces one of an earlier release; any other stays.
-pub fn current(word: &str) -> &str {
-    let replaced = FORMER.iter().find(|(former, _)| *former == word);
-    replaced.map_or(word, |(_, current)| current)
-}
-
-/// The words of earlier releases that this one replaces.
-#[cfg(feature = "cli")]
-pub fn former(word: &str) -> impl Iterator<Item = &'static str> {
-    let replaced = FORMER.iter().filter(move |(_, current)| *current == word);
-    replaced.map(|(former, _)| *former)
-}
-
 /// Declares an enum by the words for its variants, with `ALL` and `word()`, on which everything
 /// else is based.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! words {
     ($(
         $(#[$about:meta])*
@@ -56,11 +39,13 @@ macro_rules! words {
             }
         }
 
-        $crate::words::read_and_write!($type);
+        $crate::read_and_write!($type);
     )*};
 }
 
 /// Implements writing and parsing by word for types with `ALL` and `word()`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! read_and_write {
     ($type:ty) => {
         impl std::fmt::Display for $type {
@@ -70,12 +55,11 @@ macro_rules! read_and_write {
         }
 
         impl std::str::FromStr for $type {
-            type Err = $crate::words::UnknownWord;
+            type Err = $crate::study::UnknownWord;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
-                let word = $crate::words::current(text);
-                let found = Self::ALL.into_iter().find(|it| it.word() == word);
-                found.ok_or_else(|| $crate::words::UnknownWord {
+                let found = Self::ALL.into_iter().find(|it| it.word() == text);
+                found.ok_or_else(|| $crate::study::UnknownWord {
                     found: text.into(),
                     allowed: Self::ALL.map(|it| it.word()).to_vec(),
                 })
@@ -96,5 +80,3 @@ macro_rules! read_and_write {
         }
     };
 }
-
-pub(crate) use {read_and_write, words};

@@ -8,7 +8,7 @@ use crate::relax::path::Path;
 use crate::relax::saddle::Saddle;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
-use crate::words::words;
+use crate::words;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 

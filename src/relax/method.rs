@@ -1,7 +1,7 @@
 //! The methods by which a leaf is brought to rest, each with its own options.
 
+use crate::read_and_write;
 use crate::relax::path::Route;
-use crate::words::read_and_write;
 
 /// How a leaf is brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -197,13 +197,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_method_has_its_own_word_and_old_words_are_understood() {
+    fn every_method_has_its_own_word() {
         for method in Method::ALL {
             assert_eq!(method.word().parse(), Ok(method));
         }
-        let old = ["multiple-shooting", "relaxed-shooting"].map(|word| word.parse());
-        let new = Method::ALL[3..].iter().copied().map(Ok);
-        assert!(new.eq(old));
         let error = "newton".parse::<Method>().unwrap_err().to_string();
         assert!(error.starts_with("newton: must be one of semi-implicit, "));
     }

@@ -1,7 +1,7 @@
 //! The motion of a leaf: its mass, damping and duration, and loads that change in time.
 
 use super::{Profile, Rod, Scale, Schedule, ascending};
-use crate::words::words;
+use crate::words;
 
 /// Radius of the section over the length of the longest rod: half of it, the radius of
 /// gyration, is that of the relaxation.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// Escapes characters that a terminal would interpret: control characters other than
 /// line ends and tabs, and marks of the writing direction.
-pub(crate) fn printable(message: &str) -> Cow<'_, str> {
+pub fn printable(message: &str) -> Cow<'_, str> {
     let interpreted = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')
             || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

@@ -27,16 +27,13 @@ mod turning;
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
 pub use error::{Place, ScenarioError};
-#[cfg(feature = "cli")]
-pub(crate) use excerpt::printable;
+pub use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
 pub use profile::Profile;
 pub(crate) use profile::ascending;
-pub use read::text;
-#[cfg(feature = "cli")]
-pub(crate) use read::{MOST_BYTES, utf8};
+pub use read::{MOST_BYTES, text, utf8};
 pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Radii, Section};
@@ -190,7 +187,7 @@ impl Scale {
 }
 
 /// L: the longest rod.
-pub(crate) fn longest(rods: &[Rod]) -> f64 {
+pub fn longest(rods: &[Rod]) -> f64 {
     rods.iter()
         .fold(0.0, |longest, rod| longest.max(rod.length))
 }

@@ -11,7 +11,7 @@ use super::excerpt::line_of;
 use crate::memory;
 
 /// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
-pub(crate) const MOST_BYTES: u64 = 64 << 20;
+pub const MOST_BYTES: u64 = 64 << 20;
 
 impl Scenario {
     /// Reads and checks the TOML in `text`, or the JSON of a [`Scenario`] or of a
@@ -81,7 +81,7 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
 }
 
 /// Decodes the text of a scenario's `file` from its first bytes.
-pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
+pub fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
     if bytes.len() as u64 > MOST_BYTES {
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(ScenarioError::in_file(file, None, problem));

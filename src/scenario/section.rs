@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::{Profile, ascending};
-use crate::words::words;
+use crate::words;
 
 /// Steps between two knots in the search for extremes.
 const SAMPLES: usize = 16;

@@ -4,7 +4,7 @@ use super::cost::Cost;
 use super::{Options, Scheme};
 use crate::motion::Physics;
 use crate::numbers::two_digits;
-use crate::words::words;
+use crate::words;
 use serde::{Serialize, Serializer};
 use std::fmt;
 

@@ -28,7 +28,7 @@ mod record;
 mod start;
 mod stills;
 
-pub use crate::motion::Stopped;
+pub use crate::motion::{Energy, Stopped};
 pub use choice::{Choice, Reason};
 pub use cost::Cost;
 pub use error::{MOST_SECONDS, Refused};
@@ -41,7 +41,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, slips};
-use crate::words::words;
+use crate::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;

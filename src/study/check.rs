@@ -12,7 +12,7 @@ use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
-use crate::words::words;
+use crate::words;
 use shot::relaxation;
 
 /// Rotations may differ by this many times the tolerance (in radians) before

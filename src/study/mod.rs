@@ -12,11 +12,13 @@ mod sensitivity;
 mod trace;
 mod vary;
 
+pub use crate::branch::{Doubt, End as BranchEnd, Kind as CriticalKind, Stuck};
+pub use crate::bvp::{Neutral, Solution as ShootingSolution};
 pub use crate::words::UnknownWord;
 pub use all::{All, Found, IN_VAIN, all};
 pub use boundary::{
-    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, CurveEnd, LeafBeside,
-    MOST_CURVES, boundary,
+    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
+    boundary,
 };
 pub use chart::{
     Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, Reference, Row,

@@ -19,7 +19,7 @@ mod walk;
 pub use choice::preference;
 pub use walk::distance;
 
-use crate::words::words;
+use crate::words;
 use serde::Serialize;
 use std::fmt;
 

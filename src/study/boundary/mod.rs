@@ -6,7 +6,6 @@ mod map;
 mod result;
 mod run;
 
-pub use crate::branch::End as CurveEnd;
 pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside};
 pub use run::boundary;
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::ser::Serializer;
 
 use crate::branch::boundary::Special;
-use crate::branch::{End, Kind};
+use crate::branch::{End, Kind, value_between};
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 
@@ -129,6 +129,17 @@ pub struct BoundaryMap {
     pub index: Vec<Vec<Option<usize>>>,
     /// Cells for which the curves imply another index: column and row, from 1.
     pub disagreeing: Vec<[usize; 2]>,
+}
+
+impl Boundary {
+    /// Edges of equal cells along one of the two parameters, from one end of its range to the
+    /// other: one more than there are cells.
+    pub fn edges(&self, which: usize, cells: usize) -> Vec<f64> {
+        let part = |k: usize| k as f64 / cells as f64;
+        (0..=cells)
+            .map(|k| value_between(self.ranges[which], self.log[which], part(k)))
+            .collect()
+    }
 }
 
 impl BoundaryMap {

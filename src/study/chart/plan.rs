@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use crate::read_and_write;
 use crate::relax::Method;
-use crate::words::read_and_write;
 
 /// A method for an equilibrium, with one setting for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,15 +107,9 @@ mod tests {
     }
 
     #[test]
-    fn every_contender_has_its_own_word_and_old_words_are_understood() {
+    fn every_contender_has_its_own_word() {
         for contender in Contender::ALL {
             assert_eq!(contender.word().parse(), Ok(contender));
-        }
-        for (old, new) in [
-            ("multiple-shooting", "shooting"),
-            ("relaxed-shooting", "shooting-from-rest"),
-        ] {
-            assert_eq!(old.parse::<Contender>().unwrap().word(), new);
         }
     }
 }

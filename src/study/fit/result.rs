@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::data::DataFile;
 use crate::newton::Work;
-use crate::words::words;
+use crate::words;
 
 words! {
     /// How a fit ended.

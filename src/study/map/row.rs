@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::relax::Method;
 use crate::study::judge::Answer;
-use crate::words::{read_and_write, words};
+use crate::{read_and_write, words};
 
 /// The methods that are compared, in the order of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -9,7 +9,7 @@ use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 use crate::undulation::Undulation;
-use crate::words::words;
+use crate::words;
 
 /// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]

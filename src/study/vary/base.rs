@@ -37,7 +37,7 @@ impl Base {
     }
 
     /// The same from entries; settings of methods are unknown keys unless they are allowed.
-    pub(crate) fn new(
+    pub fn new(
         entries: &Entries,
         overrides: &[String],
         of_methods: bool,

@@ -1,0 +1,211 @@
+//! The boundary of stability: curves in the plane of two numbers, with the index on both
+//! sides, and leaves from either side.
+
+use std::collections::BTreeSet;
+
+use super::boundary_sides::write_indices;
+use super::kit::*;
+use super::map::{DARKEST_INDEX, fill_index, name};
+use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
+use crate::report::sides;
+use crate::report::words::stable_or_index;
+use leafdyn::scenario::Scenario;
+use leafdyn::study::CriticalKind as Kind;
+use leafdyn::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
+
+const DIAGRAM: f64 = 400.0;
+/// Right of the panel, for the key.
+const KEY: f64 = 210.0;
+/// Displacements of a buckled leaf below this fraction of its length are magnified.
+const VISIBLE: f64 = 0.1;
+
+pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
+    let shown: Vec<DrawnLeaf> = (boundary.curves.iter())
+        .flat_map(|curve| (curve.beside.iter()).map(|leaf| DrawnLeaf::new(curve.kind, leaf)))
+        .collect();
+    let longest = longest(shown.iter().flat_map(|it| &it.leaf.curves));
+    let shapes: Vec<Veins> = (shown.iter())
+        .map(|it| Veins::through(&it.curves, &it.tips, longest))
+        .collect();
+    let diagram = Cell::left_of_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
+    let below = diagram.end().y + PANEL_AXIS;
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
+    let name = format!("{}: where the index changes", boundary.scenario);
+    let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
+    drawing.height = panels.end();
+    drawing.group("curves", |page| {
+        draw_curves(page, boundary, &shown, diagram)
+    });
+    drawing.group("leaves", |page| {
+        for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
+            let [first, second] = shown.leaf.values.map(short);
+            let text = format!("{}, ({first}, {second})", shown.caption);
+            panels.draw(page, number, veins, [&letter(number), &text]);
+        }
+    });
+    drawing
+}
+
+/// A leaf next to a curve, as it is drawn.
+struct DrawnLeaf<'b> {
+    leaf: &'b LeafBeside,
+    caption: String,
+    curves: Vec<Vec<DVec3>>,
+    tips: Vec<DVec3>,
+}
+
+impl<'b> DrawnLeaf<'b> {
+    fn new(kind: Kind, leaf: &'b LeafBeside) -> Self {
+        let caption = match (&leaf.fallen_from, kind, leaf.index) {
+            (None, _, index) => stable_or_index(index),
+            (Some(_), Kind::Fold, _) => "snapped".into(),
+            (Some(from), Kind::Branching, _) => return DrawnLeaf::buckled(leaf, from),
+        };
+        DrawnLeaf {
+            leaf,
+            caption,
+            curves: leaf.curves.clone(),
+            tips: leaf.tips.clone(),
+        }
+    }
+
+    /// Next to a crossing of branches a leaf buckles only little: its displacements are
+    /// magnified until they are visible.
+    fn buckled(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
+        let mut curves = leaf.curves.clone();
+        let largest = curves.iter().flatten().zip(from.iter().flatten());
+        let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
+        let visible = VISIBLE * longest(&curves);
+        let mut caption = "buckled".to_string();
+        if 0.0 < largest && largest < visible {
+            let factor = round_step(visible / largest);
+            for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
+                *x = *from + factor * (*x - *from);
+            }
+            caption += &format!(" ×{}", short(factor));
+        }
+        let tips = tips(&curves, leaf.tips.len() == 1);
+        DrawnLeaf {
+            leaf,
+            caption,
+            curves,
+            tips,
+        }
+    }
+}
+
+/// The letter of a leaf in the diagram.
+fn letter(number: usize) -> String {
+    char::from(b'a' + number as u8).into()
+}
+
+fn notes(boundary: &Boundary) -> Vec<String> {
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    let curves = counted(boundary.curves.len(), "curve", "curves");
+    let points_on = format!("{} points on {curves}", points().count());
+    let mut notes = vec![number_of_veins(boundary.rods), points_on];
+    let worst = points().map(|point| point.error).fold(0.0, f64::max);
+    if worst > 0.0 {
+        notes.push(format!("tips within {}", power_of_ten(worst)));
+    }
+    notes
+}
+
+fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[DrawnLeaf], cell: Cell) {
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    let axes = Axes {
+        cell,
+        across: axis(boundary, 0, points().map(|point| point.values[0])),
+        up: axis(boundary, 1, points().map(|point| point.values[1])),
+    };
+    title(page, cell.corner, "", "curves, and the index on both sides");
+    if let Some(map) = &boundary.map {
+        draw_cells(page, &axes, boundary, map);
+    }
+    axes.draw(page);
+    let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
+    let mut labels = Labels::within(cell);
+    for (c, curve) in boundary.curves.iter().enumerate() {
+        let color = CURVES[c % CURVES.len()];
+        let line: Vec<(f64, f64)> = curve.points.iter().map(at).collect();
+        let stable = |point: &BoundaryPoint| point.index_before.min(point.index_behind) == 0;
+        let solid = curve.points.iter().any(stable);
+        let width = if solid { 2.0 } else { 1.2 };
+        axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
+        labels.avoid(&axes, &line);
+    }
+    for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
+        let special = points().filter(|point| point.kind == kind);
+        axes.markers(page, special.map(at), marker, INK);
+    }
+    let places = || (shown.iter()).map(|it| (it.leaf.values[0], it.leaf.values[1]));
+    axes.markers(page, places(), Marker::Dot, INK);
+    for (number, place) in places().enumerate() {
+        if let Some(place) = axes.at(place) {
+            labels.add(place, &letter(number));
+        }
+    }
+    labels.draw(page);
+    write_indices(page, &axes, boundary, &mut labels);
+    draw_key(page, boundary, cell);
+}
+
+/// Draws the cells of the map, each in the colour of its index.
+fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &BoundaryMap) {
+    let x = boundary.edges(0, map.first.len());
+    let y = boundary.edges(1, map.second.len());
+    for (r, row) in map.index.iter().enumerate() {
+        for (c, index) in row.iter().enumerate() {
+            let corners = [axes.at((x[c], y[r])), axes.at((x[c + 1], y[r + 1]))];
+            let ([Some(a), Some(b)], Some(index)) = (corners, index) else {
+                continue;
+            };
+            let corner = a.min(b);
+            let cell = Cell::new(corner, a.max(b) - corner);
+            fill_index(page, cell, *index);
+        }
+    }
+    for [c, r] in &map.disagreeing {
+        if let Some(at) = axes.at((map.first[c - 1], map.second[r - 1])) {
+            page.label(at, "×", TICK_SIZE, Anchor::Middle, INK);
+        }
+    }
+}
+
+/// An axis over the whole range, logarithmic if the values are spaced logarithmically;
+/// values increase along it.
+fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) -> Axis {
+    let name = name(&boundary.keys[which].to_string());
+    let ends = boundary.ranges[which];
+    let sign = boundary.log[which].then(|| ends[0].signum());
+    Axis::covering(&name, values.chain(ends), sign)
+}
+
+fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
+    let mut key = Key::right_of(cell);
+    let curves = boundary.curves.iter().enumerate().map(|(c, curve)| {
+        let what = sides(curve).unwrap_or_else(|| "not verified".into());
+        (format!("curve {}", c + 1), what)
+    });
+    key.curves(page, curves);
+    if let Some(map) = &boundary.map {
+        let found = map.index.iter().flatten().flatten();
+        let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();
+        for index in indices {
+            let more = if index == DARKEST_INDEX {
+                " or more"
+            } else {
+                ""
+            };
+            let name = stable_or_index(index) + more;
+            key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));
+        }
+    }
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
+        if points().any(|point| point.kind == kind) {
+            key.marker(page, kind, "", marker, INK);
+        }
+    }
+}

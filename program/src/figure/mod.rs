@@ -1,0 +1,286 @@
+//! Figures, one file or few for the result of each verb.
+//!
+//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a
+//! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
+//! `png` write the same drawing in both formats.
+
+mod axes;
+mod axis;
+mod boundary;
+mod boundary_sides;
+mod chart;
+mod chart_panel;
+mod check;
+pub mod drawing;
+mod energy;
+mod film;
+mod filmstrip;
+mod fit;
+mod font;
+mod labels;
+mod leaf;
+mod map;
+mod markers;
+mod modes;
+mod page;
+mod panels;
+pub mod png;
+mod round;
+pub mod setting;
+mod small;
+mod space;
+pub mod svg;
+mod trace;
+pub mod veins;
+
+pub use boundary::draw as boundary;
+pub use chart::{draw_chart as chart, draw_scaling as scaling};
+pub use check::draw as check;
+pub use energy::draw as energy;
+pub use film::write as film;
+pub use filmstrip::draw as filmstrip;
+pub use fit::draw as fit;
+pub use leaf::{draw as leaf, draw_all as all, draw_sensitivity as sensitivity};
+pub use map::draw as map;
+pub use modes::draw as modes;
+pub use trace::draw as trace;
+
+pub use drawing::Drawing;
+
+use leafdyn::scenario::Scenario;
+
+/// What pictures are made of.
+mod kit {
+    pub use super::{axes::*, axis::*, drawing::*, font::*, labels::*, markers::*};
+    pub use super::{page::*, round::*, setting::*, small::*, space::*, veins::*};
+    pub use glam::{DVec2, DVec3};
+}
+
+/// Draws a result of a scenario.
+pub type Figure<R> = fn(&R, &Scenario) -> Drawing;
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+    use crate::report::sample;
+    use glam::DVec3;
+    use leafdyn::relax::Mode;
+    use leafdyn::scenario::Scenario;
+    use leafdyn::simulate::{Record, Stopped};
+
+    fn scenario() -> Scenario {
+        sample::scenario("fan", 5)
+    }
+
+    #[test]
+    fn every_picture_is_wide_enough_to_print() {
+        for drawing in [
+            leaf(&sample::fan(21, 32), &scenario()),
+            check(&sample::check(21, 32, 0.1), &scenario()),
+            chart(&sample::chart()),
+            scaling(&sample::scaling()),
+            map(&sample::map()),
+            energy(&sample::record(5, 16), &scenario()),
+            filmstrip(&sample::record(5, 16), &scenario()),
+        ] {
+            svg::text(&drawing);
+            let mut bytes = Vec::new();
+            png::write(&drawing, &mut bytes).unwrap();
+            let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
+            let reader = reader.unwrap();
+            assert_eq!(reader.info().width, 1800, "{}", drawing.description);
+            assert_eq!(reader.info().color_type, ::png::ColorType::Rgb);
+        }
+    }
+
+    /// A scenario with units.
+    fn in_cm() -> Scenario {
+        let mut scenario = scenario();
+        scenario.units.length = Some("cm".into());
+        scenario.units.force = Some("N".into());
+        scenario
+    }
+
+    #[test]
+    fn axes_are_in_the_units_of_the_scenario() {
+        let fan = sample::fan(5, 8);
+        let record = sample::record(5, 8);
+        let drawn = |scenario: &Scenario| {
+            [
+                leaf(&fan, scenario),
+                check(&sample::check(5, 8, 0.0), scenario),
+                filmstrip(&record, scenario),
+                energy(&record, scenario),
+            ]
+            .map(|drawing| svg::text(&drawing))
+        };
+        let [rest, checked, strip, energies] = drawn(&in_cm());
+        for svg in [&rest, &checked] {
+            // From above and from the side, and in space.
+            assert_eq!(svg.matches(">x / cm<").count(), 3);
+            assert!(!svg.contains('ξ'));
+        }
+        assert!(rest.contains("L = 1 cm") && rest.contains("cm</text>"));
+        assert!(strip.contains(" cm wide") && strip.contains(">x<"));
+        assert!(energies.contains(">tip / cm<") && energies.contains(">energy / N cm<"));
+        let [rest, _, strip, energies] = drawn(&scenario());
+        assert_eq!(rest.matches(">ξ = x/L<").count(), 2);
+        assert_eq!(rest.matches(">ξ<").count(), 1);
+        assert!(strip.contains(" L wide") && strip.contains(">ξ<"));
+        assert!(energies.contains(">tip<") && energies.contains(">energy<"));
+    }
+
+    #[test]
+    fn values_on_axes_are_those_of_the_scenario() {
+        // Ten times as long: the leaf is the same in lengths, its axes are not.
+        let mut fan = sample::fan(5, 8);
+        let mut large = in_cm();
+        for rod in &mut large.rods {
+            rod.length *= 10.0;
+        }
+        for rod in &mut fan.shape.rods {
+            rod.length *= 10.0;
+        }
+        for point in fan.shape.curves.iter_mut().flatten().chain(&mut fan.tips) {
+            *point *= 10.0;
+        }
+        let svg = svg::text(&leaf(&fan, &large));
+        assert!(svg.contains(">8</text>") && !svg.contains(">0.8</text>"));
+    }
+
+    #[test]
+    fn gravity_is_drawn_where_there_is_any() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let count = |scenario: &Scenario| {
+            [leaf(&fan, scenario), filmstrip(&record, scenario)]
+                .map(|drawing| svg::text(&drawing).matches(">gravity<").count())
+        };
+        assert_eq!(count(&scenario()), [4, 1]);
+        let mut without = scenario();
+        without.gravity = [0.0; 3];
+        assert_eq!(count(&without), [0, 0]);
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        let mut fan = sample::fan(5, 8);
+        fan.scenario = "a < b & \"c\"\u{1}".into();
+        let svg = svg::text(&leaf(&fan, &scenario()));
+        assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
+    }
+
+    fn motion(record: &Record) -> [String; 2] {
+        [energy(record, &scenario()), filmstrip(record, &scenario())]
+            .map(|drawing| svg::text(&drawing))
+    }
+
+    #[test]
+    fn an_early_end_is_reported() {
+        let mut record = sample::record(5, 8);
+        record.stopped = Some(Stopped::Diverged {
+            otherwise: "the semi-implicit method",
+            time: 10.1,
+            percent: 70.0,
+        });
+        let reported = |svg: String| svg.contains("ended early: diverged");
+        assert!(motion(&record).into_iter().all(reported));
+    }
+
+    #[test]
+    fn extreme_numbers_are_drawn_without_a_panic() {
+        let finite = [1e300, -1e300, -1e-300, 1e-310, -1.0, 0.0];
+        for value in finite.into_iter().chain([f64::NAN, f64::INFINITY]) {
+            draw_extreme_leaf(value);
+            draw_extreme_check(value);
+            draw_extreme_chart(value);
+            draw_extreme_motion(value);
+        }
+        draw_extreme_motion(1e308);
+    }
+
+    fn draw_extreme_leaf(value: f64) {
+        let mut fan = sample::fan(3, 8);
+        let shape = vec![vec![value * DVec3::Z; 9]; 3];
+        fan.stability.modes = Some(vec![Mode {
+            eigenvalue: value,
+            error: Some(1e-9),
+            displacement: shape.clone(),
+            rotation: shape,
+        }]);
+        svg::text(&modes(&fan, &scenario()));
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve[4].z = value);
+        fan.tips[0].x = value;
+        leaf(&fan, &scenario());
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve.fill(DVec3::splat(value)));
+        leaf(&fan, &scenario());
+        fan.shape.curves.clear();
+        leaf(&fan, &scenario());
+    }
+
+    fn draw_extreme_check(value: f64) {
+        let mut found = sample::check(3, 8, 0.0);
+        for difference in &mut found.along {
+            difference.position = value;
+            difference.moment = value;
+        }
+        found.along[3].force = value;
+        if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
+            solution.rods[1].nodes[4].position = DVec3::splat(value);
+        }
+        svg::text(&check(&found, &scenario()));
+        let worst = found.along[0];
+        found.along.fill(worst);
+        found.tolerance = value;
+        svg::text(&check(&found, &scenario()));
+    }
+
+    fn draw_extreme_chart(value: f64) {
+        let mut found = sample::chart();
+        found.rows[0].true_error = Some(value);
+        if let Some(spread) = &mut found.rows[1].seconds {
+            spread.median = value;
+        }
+        found.reference.as_mut().unwrap().known_within = value;
+        svg::text(&chart(&found));
+    }
+
+    fn draw_extreme_motion(value: f64) {
+        let mut record = sample::record(3, 8);
+        record.stills[3].curves[1][4].z = value;
+        record.moments[70].energy.kinetic = value;
+        record.moments[71].tip.x = value;
+        motion(&record);
+        for moment in &mut record.moments {
+            moment.energy.kinetic = value;
+            moment.energy.potential = -value;
+            moment.tip = DVec3::splat(value);
+        }
+        let curves = record.stills.iter_mut().flat_map(|still| &mut still.curves);
+        curves.for_each(|curve| curve.fill(DVec3::splat(value)));
+        motion(&record);
+    }
+
+    #[test]
+    fn one_output_only() {
+        let mut record = sample::record(3, 8);
+        record.moments.truncate(1);
+        record.stills.truncate(1);
+        motion(&record);
+    }
+
+    #[test]
+    fn a_long_record_makes_no_large_picture() {
+        let mut record = sample::record(3, 8);
+        record.moments = record.moments.repeat(2000);
+        for (i, moment) in record.moments.iter_mut().enumerate() {
+            moment.time = 1e-3 * i as f64;
+        }
+        for svg in motion(&record) {
+            assert!(svg.len() < 1_000_000, "{}", svg.len());
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The modes of a leaf at rest: each mode drawn over the leaf.
+
+use super::kit::*;
+use crate::report::numbers::short;
+use crate::report::words::verdict;
+use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::scenario::Scenario;
+
+const MOST: usize = 12;
+/// A motion towards the viewer in one view is visible in the other.
+const VIEWS: [View; 2] = [OBLIQUE, FRONT];
+/// Largest displacement drawn, as a fraction of the leaf's extent.
+const AMPLITUDE: f64 = 0.2;
+
+pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
+    let name = format!("{}: modes", equilibrium.scenario);
+    let rest = Veins::of(equilibrium);
+    let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
+    let drawn = &modes[..modes.len().min(MOST)];
+    let shapes = drawn.iter().map(|mode| displaced(equilibrium, &rest, mode));
+    let shapes: Vec<Veins> = shapes.collect();
+    // Every mode in two views.
+    let count = VIEWS.len() * drawn.len();
+    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting, HEADER);
+    let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
+    notes.push(match modes.len() {
+        count if count > MOST => format!("the lowest {MOST} of {count}"),
+        count => format!("the lowest {count}"),
+    });
+    notes.push("grey: at rest".into());
+    notes.extend(rest.notes(&setting));
+    let mut drawing = new_page(SIDE, &name, &notes, Some(&rest));
+    drawing.height = panels.end();
+    for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
+        drawing.group("mode", |page| {
+            let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
+            let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
+            for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
+                let scene = panels.begin(page, VIEWS.len() * index + k, view, caption);
+                let width = THINNER * veins.line_width();
+                for vein in &rest.veins {
+                    let path = vein.path(|point| scene.place(point));
+                    page.stroke(path, Stroke::new(FRAME, 0.6 * width));
+                }
+                scene.draw_leaf(page, veins, width);
+            }
+        });
+    }
+    drawing
+}
+
+/// The frequency of a mode or, if it is unstable, its growth rate in red.
+fn caption(mode: &Mode) -> (String, Color) {
+    match (mode.is_neutral(), mode.growth()) {
+        (true, _) => ("neutral: ω = 0".into(), NOTE),
+        (_, None) => {
+            let frequency = short(mode.frequency().unwrap_or_default());
+            (format!("ω = {frequency}"), NOTE)
+        }
+        (_, Some(growth)) => (format!("unstable: grows at {}", short(growth)), DOT),
+    }
+}
+
+fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
+    let most = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
+    let largest = mode.displacement.iter().fold(0.0, |m, d| most(d).max(m));
+    let size = match largest > 0.0 {
+        // Never magnified: displacements are small in a mode of rotation alone.
+        true => (AMPLITUDE * rest.extent() * rest.unit / largest).min(1.0),
+        false => 0.0,
+    };
+    let shape = &equilibrium.shape;
+    let moved = shape.curves.iter().zip(&mode.displacement);
+    let curves: Vec<Vec<DVec3>> = moved
+        .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
+        .collect();
+    Veins::through(&curves, &tips(&curves, shape.joined), rest.unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::svg::text;
+    use crate::report::sample;
+
+    #[test]
+    fn frequencies_growth_and_neutral_modes_are_captioned() {
+        for (eigenvalue, caption) in [
+            (4.0, "ω = 2<"),
+            (-9.0, "unstable: grows at 3<"),
+            (1e-10, "neutral"),
+        ] {
+            let mut leaf = sample::fan(3, 8);
+            let shape = vec![vec![DVec3::Z; 9]; 3];
+            let mode = Mode {
+                eigenvalue,
+                error: Some(1e-9),
+                displacement: shape.clone(),
+                rotation: shape,
+            };
+            leaf.stability.modes = Some(vec![mode; 14]);
+            let svg = text(&draw(&leaf, &sample::scenario("fan", 3)));
+            assert_eq!(svg.matches(caption).count(), MOST, "{caption}");
+            assert!(svg.contains("the lowest 12 of 14"));
+            // Every mode in a second view.
+            assert_eq!(svg.matches(">from the front<").count(), MOST);
+        }
+    }
+}

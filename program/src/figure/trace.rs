@@ -1,0 +1,321 @@
+//! Branches of equilibria: a coordinate of the tip against the number that
+//! varies, and the leaf at some of the points.
+
+use super::kit::*;
+use crate::report::numbers::{number_of_veins, power_of_ten, short};
+use crate::report::words::{branch_end, stable_or_index};
+use crate::report::{error_location, slope_unit};
+use leafdyn::scenario::Scenario;
+use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
+
+const DIAGRAM: f64 = 380.0;
+/// Height of the further panels.
+const MORE: f64 = 220.0;
+/// Right of the panel, for the key.
+const KEY: f64 = 190.0;
+const LAW: f64 = 240.0;
+const BETWEEN: f64 = 26.0;
+/// Most leaves drawn.
+const MOST_LEAVES: usize = 8;
+/// Smaller differences are invisible in small panels: in lengths, and as a fraction of
+/// the largest.
+const VISIBLE: f64 = 0.04;
+const VISIBLE_FRACTION: f64 = 0.25;
+/// Equal parts of each vein at whose ends leaves are compared.
+const PARTS: usize = 8;
+/// Index of the first component of the reaction in [`TraceShow::ALL`].
+const REACTION: usize = 3;
+/// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
+const ROUNDING: f64 = 1e-7;
+
+pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
+    let shown = shown(trace);
+    let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
+    let longest = longest(shown.iter().map(point).flat_map(|point| &point.curves));
+    let shapes: Vec<Veins> = (shown.iter().map(point))
+        .map(|point| Veins::through(&point.curves, &point.tips, longest))
+        .collect();
+    let quantities = match trace.show.as_slice() {
+        [] => vec![most_varying(trace)],
+        asked => asked.to_vec(),
+    };
+    let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
+    let mut drawing = new_page(LEFT, &name, &notes(trace), None);
+    let mut letters = letters();
+    let mut letter = || letters.next().unwrap_or_default();
+    let mut below = HEADER;
+    for (place, &quantity) in quantities.iter().enumerate() {
+        let height = if place == 0 { DIAGRAM } else { MORE };
+        let cell = Cell::left_of_key(below + PANEL_TITLE, height, KEY);
+        drawing.group("branches", |page| {
+            draw_branches(page, trace, quantity, &shown, cell, &letter());
+            if place == 0 {
+                draw_key(page, trace, cell);
+            }
+        });
+        below = cell.end().y + PANEL_AXIS;
+    }
+    if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
+        let cell = Cell::left_of_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
+        drawing.group("law", |page| {
+            draw_law(page, trace, law, branch, cell, &letter())
+        });
+        below = cell.end().y + PANEL_AXIS;
+    }
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, below);
+    drawing.height = panels.end();
+    drawing.group("leaves", |page| {
+        for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
+            let caption = format!("at {}", caption(point(at)));
+            panels.draw(page, index, veins, [&(index + 1).to_string(), &caption]);
+        }
+    });
+    drawing
+}
+
+fn notes(trace: &Trace) -> Vec<String> {
+    let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
+    let mut notes = vec![
+        number_of_veins(trace.rods),
+        match trace.branches.len() {
+            1 => format!("{points} points"),
+            branches => format!("{points} points on {branches} branches"),
+        },
+        format!("followed on {} segments a vein", trace.segments),
+    ];
+    let errors = trace.branches.iter().flat_map(|b| &b.points);
+    let worst = errors.filter_map(|p| p.error).fold(0.0, f64::max);
+    if worst > 0.0 {
+        let (what, worst) = (error_location(trace), power_of_ten(worst));
+        notes.push(format!("{what} within {worst}"));
+    }
+    notes
+}
+
+/// The points whose leaves are drawn: the ends of branches, points where the index
+/// changes, and the middles of branches; only the first of leaves that look the same.
+fn shown(trace: &Trace) -> Vec<[usize; 2]> {
+    let mut wanted: Vec<(usize, [usize; 2])> = Vec::new();
+    for (b, branch) in trace.branches.iter().enumerate() {
+        let Some(last) = branch.points.len().checked_sub(1) else {
+            continue;
+        };
+        if b == 0 {
+            wanted.push((0, [b, 0]));
+        }
+        wanted.push((1 + b.min(1), [b, last]));
+        wanted.extend(branch.critical().map(|(p, _)| (3, [b, p])));
+        wanted.push((4, [b, last / 2]));
+    }
+    wanted.sort_by_key(|&(rank, _)| rank);
+    let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
+    let first = wanted.first().map(|&(_, at)| at);
+    let distance = |at: [usize; 2]| first.map_or(0.0, |first| difference(point(at), point(first)));
+    let farthest = wanted.iter().map(|&(_, at)| distance(at));
+    let farthest = farthest.fold(0.0, f64::max);
+    let visible = VISIBLE.min(VISIBLE_FRACTION * farthest);
+    let mut shown: Vec<[usize; 2]> = Vec::new();
+    for (_, at) in wanted {
+        let alike = |&other: &[usize; 2]| difference(point(at), point(other)) <= visible;
+        if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
+            shown.push(at);
+        }
+    }
+    shown.sort_unstable();
+    shown
+}
+
+/// Largest distance between two leaves, in lengths; their grids may differ.
+fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
+    let at = |curve: &[DVec3], part: usize| {
+        let last = curve.len().saturating_sub(1);
+        curve.get((part * last + PARTS / 2) / PARTS).copied()
+    };
+    let pairs = || one.curves.iter().zip(&other.curves);
+    let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
+    let distances = points.flatten().map(|(a, b)| a.distance(b));
+    let size = longest(one.curves.iter().chain(&other.curves));
+    distances.fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
+}
+
+fn caption(point: &TracePoint) -> String {
+    let kind = match point.kind {
+        PointKind::Regular => stable_or_index(point.index),
+        kind => kind.word().replace('-', " "),
+    };
+    format!("{}, {kind}", short(point.value))
+}
+
+/// The coordinate of the tip that varies most; for a held tip the component of the
+/// reaction that does.
+fn most_varying(trace: &Trace) -> TraceShow {
+    let points = trace.branches.iter().flat_map(|branch| &branch.points);
+    let of = |point: &TracePoint| point.reaction.or(point.tips.first().copied());
+    let values = points.filter_map(|point| of(point).map(|it| (it, it)));
+    let extent = values.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = extent.unwrap_or_default();
+    let change = high - low;
+    let largest = (0..3).max_by(|&a, &b| change[a].total_cmp(&change[b]));
+    let first = if trace.held { REACTION } else { 0 };
+    TraceShow::ALL[first + largest.unwrap_or(2)]
+}
+
+/// The axis of a quantity with its unit, wide enough that rounding is invisible.
+fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
+    let points = || trace.branches.iter().flat_map(|branch| &branch.points);
+    let units = &trace.units;
+    let (name, least) = match quantity {
+        TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
+        TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
+        TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
+            let force = quantity.word().replace('_', ", ");
+            (with_unit(&force, units.force.as_deref()), 0.0)
+        }
+        tip => {
+            let longest = longest(points().take(1).flat_map(|point| &point.curves));
+            let name = with_unit(&format!("{tip} of the tip"), units.length.as_deref());
+            (name, ROUNDING * longest)
+        }
+    };
+    Axis::holding(&name, points().map(|point| quantity.of(point))).at_least(least)
+}
+
+fn tip(point: &TracePoint, axis: usize) -> f64 {
+    TraceShow::ALL[axis].of(point)
+}
+
+fn draw_branches(
+    page: &mut Drawing,
+    trace: &Trace,
+    quantity: TraceShow,
+    shown: &[[usize; 2]],
+    cell: Cell,
+    letter: &str,
+) {
+    let at = |point: &TracePoint| (point.value, quantity.of(point));
+    let all = || trace.branches.iter().flat_map(|branch| &branch.points);
+    let across = match trace.keys.to_string() {
+        force if force.starts_with("load.tip_force") => {
+            with_unit(&force, trace.units.force.as_deref())
+        }
+        other => other,
+    };
+    // Logarithmic if the values are spaced logarithmically; they increase along the axis.
+    let sign = trace.log.then(|| trace.range[0].signum());
+    let across = Axis::covering(&across, all().map(|point| at(point).0), sign);
+    // The title names only the kinds that occur.
+    let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
+    let what = match indices {
+        [true, true] => "equilibria: stable drawn solid, unstable dashed",
+        [false, true] => "unstable equilibria",
+        _ => "stable equilibria",
+    };
+    let axes = Axes::titled(page, cell, [letter, what], across, axis_of(trace, quantity));
+    let mut labels = Labels::within(cell);
+    for (b, branch) in trace.branches.iter().enumerate() {
+        let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
+        for (points, stable) in pieces(origin, branch) {
+            let line: Vec<(f64, f64)> = points.into_iter().map(at).collect();
+            let width = if stable { 2.0 } else { 1.2 };
+            let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
+            axes.curve(page, &line, stroke);
+            labels.avoid(&axes, &line);
+        }
+    }
+    for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
+        let critical = trace.branches.iter().flat_map(TraceBranch::critical);
+        let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
+        axes.markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
+    }
+    for (index, &[b, p]) in shown.iter().enumerate() {
+        if let Some(place) = axes.at(at(&trace.branches[b].points[p])) {
+            labels.add(place, &(index + 1).to_string());
+        }
+    }
+    labels.draw(page);
+}
+
+/// Draws the key: the branches, and the kinds of points that occur.
+fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
+    let mut key = Key::right_of(cell);
+    let branches = trace.branches.iter().enumerate().map(|(b, branch)| {
+        let name = match branch.from {
+            None => "first branch".into(),
+            Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
+        };
+        (name, branch_end(&branch.end).into())
+    });
+    key.curves(page, branches);
+    let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
+    let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
+    if critical().any(|point| !folds(point)) {
+        key.marker(page, "branches cross", "", Marker::Diamond, INK);
+    }
+    if critical().any(folds) {
+        key.marker(page, "fold", "", Marker::Ring, INK);
+    }
+}
+
+/// The points of a branch, after the one where it leaves another branch, split into pieces
+/// of equal stability; a piece begins where the one before it ends.
+fn pieces<'t>(
+    origin: Option<&'t TracePoint>,
+    branch: &'t TraceBranch,
+) -> Vec<(Vec<&'t TracePoint>, bool)> {
+    let mut pieces: Vec<(Vec<&TracePoint>, bool)> = Vec::new();
+    if let (Some(origin), Some(first)) = (origin, branch.points.first()) {
+        pieces.push((vec![origin, first], first.index == 0));
+    }
+    for pair in branch.points.windows(2) {
+        // The index of a critical point is the one after it.
+        let stable = pair[0].index == 0;
+        match pieces.last_mut() {
+            Some((points, same)) if *same == stable => points.push(&pair[1]),
+            _ => pieces.push((vec![&pair[0], &pair[1]], stable)),
+        }
+    }
+    pieces
+}
+
+/// Draws force against displacement of the tip, and the fitted line.
+fn draw_law(
+    page: &mut Drawing,
+    trace: &Trace,
+    law: &Law,
+    branch: &TraceBranch,
+    cell: Cell,
+    letter: &str,
+) {
+    let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
+    let points: Vec<(f64, f64)> = (branch.points.iter())
+        .map(|point| (tip(point, law.axis) - start, point.force_on_tip(law.axis)))
+        .collect();
+    let units = &trace.units;
+    let across = format!("displacement along {}", TraceShow::ALL[law.axis]);
+    let across = with_unit(&across, units.length.as_deref());
+    let up = with_unit("force", units.force.as_deref());
+    let count = points.len() as f64;
+    let x = points.iter().map(|p| p.0).sum::<f64>() / count;
+    let y = points.iter().map(|p| p.1).sum::<f64>() / count;
+    let ends = [points.first(), points.last()].map(|end| {
+        let across = end.map_or(0.0, |p| p.0);
+        (across, y + law.slope * (across - x))
+    });
+    // The line may leave the range of the points.
+    let drawn = || points.iter().chain(&ends);
+    let across = Axis::holding(&across, drawn().map(|p| p.0));
+    let up = Axis::holding(&up, drawn().map(|p| p.1));
+    let what = "force against displacement of the tip";
+    let axes = Axes::titled(page, cell, [letter, what], across, up);
+    let line = Stroke::new(CURVES[2], 1.4);
+    axes.curve(page, &ends, line);
+    axes.markers(page, points, Marker::Dot, CURVES[0]);
+    let mut key = Key::right_of(cell);
+    let which = "of the first branch";
+    key.marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
+    let slope = format!("slope {}{}", short(law.slope), slope_unit(units));
+    key.line(page, "line of least squares", &slope, line);
+    let off = format!("off by {} % at most", short(100.0 * law.deviation));
+    key.entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
+}

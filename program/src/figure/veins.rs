@@ -1,0 +1,319 @@
+//! Veins as smooth curves, in units of the largest rod length.
+
+use glam::{DVec2, DVec3};
+
+use super::drawing::{Color, Path, Step, color_of_vein};
+use super::setting::Setting;
+use leafdyn::relax::{Equilibrium, RodShape};
+use leafdyn::simulate::{Record, Still};
+
+/// Of a wider leaf only some veins are drawn: more could not be distinguished.
+const MOST_VEINS: usize = 200;
+/// Points farther away than this many lengths are diverged and not drawn.
+const FARTHEST: f64 = 1e4;
+/// Largest distance of a drawn curve from the computed points, in lengths: a
+/// quarter of a pixel.
+const MAX_DEVIATION: f64 = 3e-4;
+/// Curves are drawn with at least this many pieces, if they have as many segments.
+const FEWEST_PIECES: usize = 8;
+/// Dots of a second solution: about the most veins with dots, about the most dots in
+/// total, dots per extent of the leaf, and the fewest on a vein that has as many nodes.
+const MOST_DOTTED: usize = 24;
+const MOST_DOTS: usize = 160;
+const DOTS_PER_EXTENT: f64 = 14.0;
+const FEWEST_DOTS: usize = 8;
+
+pub type Piece = [DVec3; 4];
+
+pub struct Vein {
+    pub pieces: Vec<Piece>,
+    pub color: Color,
+}
+
+impl Vein {
+    pub fn path(&self, place: impl Fn(DVec3) -> DVec2) -> Path {
+        let start = self.pieces.first().map(|piece| Step::Move(place(piece[0])));
+        let pieces = self.pieces.iter();
+        let rest = pieces.map(|&[_, a, b, end]| Step::Cubic(place(a), place(b), place(end)));
+        start.into_iter().chain(rest).collect()
+    }
+}
+
+pub struct Veins {
+    pub veins: Vec<Vein>,
+    pub count: usize,
+    pub dots: Vec<DVec3>,
+    pub tips: Vec<(DVec3, Color)>,
+    /// Corners of the bounding box; the clamp is at the origin.
+    pub low: DVec3,
+    pub high: DVec3,
+    /// The largest rod length, in the scenario's units.
+    pub unit: f64,
+}
+
+impl Veins {
+    pub fn of(equilibrium: &Equilibrium) -> Self {
+        let shape = &equilibrium.shape;
+        Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
+    }
+
+    /// The veins of a moving leaf at one instant.
+    pub fn at_instant(record: &Record, still: &Still) -> Self {
+        let tips = tips(&still.curves, record.joined);
+        Veins::through(&still.curves, &tips, record.length)
+    }
+
+    /// Veins through these points, with the longest rod as the unit. Tips are extrapolated,
+    /// points need not be.
+    pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
+        let usable = longest.is_finite() && longest > 0.0;
+        let unit = if usable { longest } else { 1.0 };
+        let count = curves.len();
+        let drawn = (0..count).filter(|&index| is_drawn(index, count));
+        let veins: Vec<Vein> = drawn
+            .map(|index| Vein {
+                pieces: smooth(&drawable_part(&curves[index], unit)),
+                color: color_of_vein(index, count),
+            })
+            .collect();
+        let joined = tips.len() == 1;
+        let tips = (0..tips.len())
+            .filter(|&index| joined || is_drawn(index, count))
+            .map(|index| (tips[index] / unit, color_of_vein(index, count)))
+            .filter(|(tip, _)| is_drawable(*tip))
+            .collect();
+
+        let pieces = veins.iter().flat_map(|vein| &vein.pieces);
+        let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+        for piece in pieces {
+            (low, high) = (low.min(piece[3]), high.max(piece[3]));
+        }
+        Veins {
+            veins,
+            count,
+            dots: Vec::new(),
+            tips,
+            low,
+            high,
+            unit,
+        }
+    }
+
+    /// Adds a second solution as dots, on as many veins and at as many nodes as can be
+    /// distinguished.
+    pub fn add_dots(&mut self, rods: &[RodShape]) {
+        let every = self.count.div_ceil(MOST_DOTTED).max(1);
+        let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
+        // A coiled vein is longer than the leaf.
+        let lengths = 1.0 / self.extent();
+        let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
+        let dots = wanted.clamp(FEWEST_DOTS, most);
+        for rod in rods.iter().step_by(every) {
+            let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
+            // The base is under the clamp's marker.
+            let nodes = rod.nodes.iter().skip(stride).step_by(stride);
+            let points = nodes.map(|node| node.position / self.unit);
+            self.dots.extend(points.filter(|&point| is_drawable(point)));
+        }
+        for &point in &self.dots {
+            (self.low, self.high) = (self.low.min(point), self.high.max(point));
+        }
+    }
+
+    pub fn notes(&self, setting: &Setting) -> Vec<String> {
+        let mut notes = vec![format!("L = {}", setting.length())];
+        let every = stride(self.count);
+        if every > 1 {
+            notes.push(format!("1 vein in {every} drawn"));
+        }
+        notes
+    }
+
+    /// The ends of all pieces.
+    pub fn points(&self) -> impl Iterator<Item = DVec3> {
+        let pieces = self.veins.iter().flat_map(|vein| &vein.pieces);
+        pieces.flat_map(|piece| [piece[0], piece[3]])
+    }
+
+    /// The largest side of the box, or 1 if it is a point.
+    pub fn extent(&self) -> f64 {
+        let extent = (self.high - self.low).max_element();
+        if extent > 1e-9 { extent } else { 1.0 }
+    }
+
+    /// A line width that keeps neighbouring veins apart.
+    pub fn line_width(&self) -> f64 {
+        match self.veins.len() {
+            0..=2 => 2.0,
+            3..=8 => 1.7,
+            9..=30 => 1.25,
+            31..=60 => 0.9,
+            61..=120 => 0.65,
+            _ => 0.45,
+        }
+    }
+}
+
+fn stride(count: usize) -> usize {
+    count.div_ceil(MOST_VEINS).max(1)
+}
+
+/// Whether a vein is drawn: of a wide leaf only every n-th vein and the last are.
+pub fn is_drawn(index: usize, count: usize) -> bool {
+    index.is_multiple_of(stride(count)) || index + 1 == count
+}
+
+/// The last point of the first curve if the tips are joined, otherwise of all curves.
+pub fn tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
+    let count = if joined { 1 } else { curves.len() };
+    let ends = curves.iter().take(count);
+    ends.filter_map(|curve| curve.last()).copied().collect()
+}
+
+/// The length of the longest of these curves.
+pub fn longest<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f64 {
+    let length = |curve: &Vec<DVec3>| curve.windows(2).map(|w| w[0].distance(w[1])).sum();
+    curves.into_iter().map(length).fold(0.0, f64::max)
+}
+
+/// Whether a point, in lengths, is finite and not too far away to be drawn.
+pub fn is_drawable(point: DVec3) -> bool {
+    point.is_finite() && point.abs().max_element() < FARTHEST
+}
+
+/// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
+pub fn tamed(points: impl Iterator<Item = DVec3>, longest: f64) -> Vec<DVec3> {
+    let mut last = DVec3::ZERO;
+    let tame = points.map(|point| {
+        if is_drawable(point / longest) {
+            last = point;
+        }
+        last
+    });
+    tame.collect()
+}
+
+/// The smallest stride that leaves a vein of so many nodes its tip and at most so many segments.
+pub fn node_stride(nodes: usize, most: usize) -> usize {
+    let last = nodes.saturating_sub(1);
+    let mut strides = last.div_ceil(most).max(1)..=last;
+    let whole = strides.find(|stride| last.is_multiple_of(*stride));
+    whole.unwrap_or(1)
+}
+
+/// The points up to the first that cannot be drawn.
+fn drawable_part(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
+    let points = curve.iter().map(|&point| point / unit);
+    points.take_while(|&point| is_drawable(point)).collect()
+}
+
+/// Smooth pieces through every second, fourth, ... of the points, as long as the curve
+/// stays close to the others.
+fn smooth(points: &[DVec3]) -> Vec<Piece> {
+    let segments = points.len().saturating_sub(1);
+    let mut stride = 1;
+    while segments.is_multiple_of(2 * stride) && segments / (2 * stride) >= FEWEST_PIECES {
+        stride *= 2;
+    }
+    loop {
+        let kept: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
+        let pieces = through(&kept);
+        if stride == 1 || max_deviation(&pieces, points, stride) < MAX_DEVIATION {
+            return pieces;
+        }
+        stride /= 2;
+    }
+}
+
+fn max_deviation(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
+    let deviation = |(index, &point): (usize, &DVec3)| {
+        let place = (index / stride).min(pieces.len() - 1);
+        let t = index as f64 / stride as f64 - place as f64;
+        bezier(&pieces[place], t).distance(point)
+    };
+    points.iter().enumerate().map(deviation).fold(0.0, f64::max)
+}
+
+fn bezier(piece: &Piece, t: f64) -> DVec3 {
+    let [a, b, c, d] = *piece;
+    let s = 1.0 - t;
+    s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
+}
+
+/// One piece per segment through equally spaced points, with tangents from
+/// differences: of fourth order inside, of second order next to the ends.
+fn through(points: &[DVec3]) -> Vec<Piece> {
+    let p = points;
+    let last = p.len().saturating_sub(1);
+    let tangent = |i: usize| match (i, last) {
+        (_, 0) => DVec3::ZERO,
+        (_, 1) => p[1] - p[0],
+        (0, _) => 2.0 * p[1] - 1.5 * p[0] - 0.5 * p[2],
+        (i, _) if i == last => 1.5 * p[i] - 2.0 * p[i - 1] + 0.5 * p[i - 2],
+        (i, _) if i == 1 || i + 1 == last => 0.5 * (p[i + 1] - p[i - 1]),
+        (i, _) => (8.0 * (p[i + 1] - p[i - 1]) - (p[i + 2] - p[i - 2])) / 12.0,
+    };
+    let piece = |i: usize| {
+        let (start, end) = (tangent(i) / 3.0, tangent(i + 1) / 3.0);
+        [p[i], p[i] + start, p[i + 1] - end, p[i + 1]]
+    };
+    (0..last).map(piece).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_half_circle_is_drawn_round_with_few_pieces() {
+        let points: Vec<DVec3> = (0..=256)
+            .map(|i| DVec2::from_angle(PI * f64::from(i) / 256.0).extend(0.0) / PI)
+            .collect();
+        let pieces = smooth(&points);
+        assert!(pieces.len() <= 16, "{}", pieces.len());
+        for piece in &pieces {
+            for t in [0.25, 0.5, 0.75] {
+                assert!((bezier(piece, t).length() * PI - 1.0).abs() < 2e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn curves_of_no_one_and_two_points() {
+        assert!(smooth(&[]).is_empty());
+        assert!(smooth(&[DVec3::X]).is_empty());
+        assert_eq!(smooth(&[DVec3::ZERO, DVec3::X])[0][3], DVec3::X);
+    }
+
+    #[test]
+    fn a_thinned_vein_keeps_its_tip() {
+        for (nodes, kept) in [(65, 33), (33, 33), (61, 31), (2, 2), (1, 1), (0, 1)] {
+            let (last, stride) = (f64::max(nodes as f64 - 1.0, 0.0), node_stride(nodes, 32));
+            assert_eq!(last / stride as f64 + 1.0, f64::from(kept));
+        }
+    }
+
+    #[test]
+    fn dots_are_few_enough_to_be_distinguished() {
+        for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
+            let leaf = sample::fan(rods, 64);
+            let mut veins = Veins::of(&leaf);
+            veins.add_dots(&leaf.shape.rods);
+            assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
+            assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
+        }
+    }
+
+    #[test]
+    fn dots_away_from_the_leaf_are_in_the_box() {
+        let leaf = sample::fan(3, 8);
+        let mut veins = Veins::of(&leaf);
+        let mut rods = leaf.shape.rods.clone();
+        rods[1].nodes[8].position.z = 3.0;
+        veins.add_dots(&rods);
+        assert_eq!(veins.high.z, 3.0);
+    }
+}

@@ -1,0 +1,195 @@
+//! The data of the page: results, thinned to what is visible, with large arrays as
+//! base64 of little-endian numbers.
+
+use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::figure::veins::{node_stride, tamed};
+use leafdyn::relax::RodShape;
+
+/// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
+const STATE: usize = 16;
+
+/// Everything on a page.
+#[derive(Serialize)]
+pub struct View {
+    /// `leaf`, `motion`, `trace` or `equilibria`.
+    pub kind: &'static str,
+    pub title: String,
+    /// The result in a phrase, and whether it is a success.
+    pub verdict: String,
+    pub success: bool,
+    /// Names and texts of its numbers.
+    pub summary: Vec<(&'static str, String)>,
+    /// Names of the units of length and force, if there are any.
+    pub units: [Option<String>; 2],
+    /// Gravity per length of vein.
+    pub gravity: [f64; 3],
+    pub longest: f64,
+    pub joined: bool,
+    /// The number of veins, and the numbers from 1, lengths and colours of those that are
+    /// drawn.
+    pub rods: usize,
+    pub drawn: Vec<usize>,
+    pub lengths: Vec<f64>,
+    pub colors: Vec<String>,
+    /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
+    pub leaves: Vec<Leaf>,
+    pub modes: Vec<ModeShape>,
+    /// The chart next to the leaf of a motion or trace.
+    pub chart: Option<Chart>,
+}
+
+/// A shape of the leaf.
+#[derive(Default, Serialize)]
+pub struct Leaf {
+    /// A short description, and the numbers of this leaf alone.
+    pub label: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub summary: Vec<(&'static str, String)>,
+    /// Its time, in a motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// Fractions of the length, where they are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stations: Option<Vec<f64>>,
+    /// Nodes per vein.
+    pub nodes: usize,
+    /// Positions, vein by vein.
+    pub points: Points,
+    /// [`STATE`] numbers per node.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<String>,
+}
+
+/// Positions: in full, or rounded to 65,536 steps over their bounding box.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub enum Points {
+    Full { f32: String },
+    Coarse { u16: String, low: DVec3, size: f64 },
+}
+
+impl Default for Points {
+    fn default() -> Self {
+        Points::Full { f32: String::new() }
+    }
+}
+
+/// A mode of the leaf at rest.
+#[derive(Serialize)]
+pub struct ModeShape {
+    pub label: String,
+    /// Nodes per vein, their positions at rest, and their displacements.
+    pub nodes: usize,
+    pub rest: String,
+    pub displacement: String,
+}
+
+/// Curves of quantities, one of which is chosen.
+#[derive(Serialize)]
+pub struct Chart {
+    pub across: String,
+    pub log: bool,
+    /// Names of the quantities that can be drawn upwards.
+    pub choices: Vec<String>,
+    pub curves: Vec<Curve>,
+}
+
+#[derive(Default, Serialize)]
+pub struct Curve {
+    /// Which of the choices it belongs to.
+    pub choice: usize,
+    pub name: String,
+    pub color: usize,
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
+    /// The leaf that belongs to each point; empty: the nearest in time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub leaves: Vec<usize>,
+    /// Which points are unstable, and the indices and kinds of special ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unstable: Vec<bool>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub special: Vec<(usize, &'static str)>,
+}
+
+impl Leaf {
+    /// A leaf in full, with strains and forces.
+    pub fn full(label: String, stations: &[f64], rods: &[RodShape], view: &View) -> Self {
+        let shown = || view.drawn.iter().map(|&number| &rods[number - 1].nodes);
+        let points = shown().flat_map(|nodes| {
+            let points = nodes.iter().map(|node| node.position);
+            tamed(points, view.longest)
+        });
+        let mut state = Vec::with_capacity(STATE * stations.len() * view.drawn.len());
+        for node in shown().flatten() {
+            let q = node.rotation;
+            state.extend([q.w, q.x, q.y, q.z]);
+            let vectors = [node.v, node.u, node.n, node.m].map(|v| v.to_array());
+            state.extend(vectors.as_flattened());
+        }
+        Leaf {
+            label,
+            nodes: stations.len(),
+            stations: Some(stations.into()),
+            points: Points::Full {
+                f32: vectors(points),
+            },
+            state: Some(floats(state)),
+            ..Leaf::default()
+        }
+    }
+
+    /// A leaf as coarse centrelines, for one of many.
+    pub fn coarse(
+        label: String,
+        stations: &[f64],
+        curves: &[Vec<DVec3>],
+        view: &View,
+        most: usize,
+    ) -> Self {
+        let nodes = curves.first().map_or(0, Vec::len);
+        let stride = node_stride(nodes, most);
+        let curves = view.drawn.iter().map(|&number| &curves[number - 1]);
+        let shown = curves.flat_map(|it| tamed(it.iter().step_by(stride).copied(), view.longest));
+        let shown: Vec<DVec3> = shown.collect();
+        let all = || shown.iter().copied();
+        let low = all().reduce(DVec3::min).unwrap_or_default();
+        let high = all().reduce(DVec3::max).unwrap_or_default();
+        let size = (high - low).max_element().max(f64::MIN_POSITIVE);
+        let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
+        let steps = all().flat_map(step);
+        let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
+        Leaf {
+            label,
+            nodes: nodes.saturating_sub(1) / stride + 1,
+            stations: uneven(stations).then(|| stations.iter().step_by(stride).copied().collect()),
+            points: Points::Coarse {
+                u16: STANDARD.encode(steps.collect::<Vec<u8>>()),
+                low,
+                size,
+            },
+            ..Leaf::default()
+        }
+    }
+}
+
+/// Whether these are not equally spaced, which the page assumes by default.
+fn uneven(stations: &[f64]) -> bool {
+    let last = stations.len().saturating_sub(1).max(1) as f64;
+    let mut stations = stations.iter().enumerate();
+    stations.any(|(k, station)| (station - k as f64 / last).abs() > 1e-9)
+}
+
+/// Vectors as 32-bit numbers.
+pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
+    floats(vectors.flat_map(|vector| vector.to_array()))
+}
+
+fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
+    let bytes = numbers.into_iter();
+    let bytes = bytes.flat_map(|number| (number as f32).to_le_bytes());
+    STANDARD.encode(bytes.collect::<Vec<u8>>())
+}

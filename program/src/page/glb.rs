@@ -1,0 +1,300 @@
+//! Veins as tubes for Blender and other programs: binary glTF 2.0, with a motion as an
+//! animation of morph targets.
+//!
+//! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
+
+use std::io::{self, Write};
+
+use glam::{DVec3, Vec3};
+use serde_json::{Value, json};
+
+use crate::figure::drawing::{Color, color_of_vein};
+use crate::figure::veins::{node_stride, tamed};
+use leafdyn::relax::Equilibrium;
+use leafdyn::simulate::Record;
+
+/// Most shapes of a film: each has all vertices.
+const MOST_SHAPES: usize = 61;
+/// Most segments of a vein.
+const MOST_SEGMENTS: usize = 32;
+/// Length of a film in seconds, as the unit of time is not known.
+const SECONDS: f64 = 10.0;
+/// Radius of a vein, as a fraction of the longest.
+const RADIUS: f64 = 0.004;
+
+const FLOAT: u32 = 5126;
+const UNSIGNED_INT: u32 = 5125;
+const UNSIGNED_BYTE: u32 = 5121;
+const ARRAY: u32 = 34962;
+const ELEMENT_ARRAY: u32 = 34963;
+
+/// A leaf at rest.
+pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let shape = &equilibrium.shape;
+    let leaf = [(0.0, &shape.curves[..])];
+    write(&equilibrium.scenario, &leaf, shape.longest(), out)
+}
+
+/// A moving leaf.
+pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
+    let film = &record.film;
+    let last = film.len().saturating_sub(1);
+    let stride = last.div_ceil(MOST_SHAPES - 1).max(1);
+    let kept = (0..film.len()).filter(|&k| k.is_multiple_of(stride) || k == last);
+    let shape = |k: usize| (record.moments[film[k].moment].time, &film[k].curves[..]);
+    let shapes: Vec<(f64, &[Vec<DVec3>])> = kept.map(shape).collect();
+    write(&record.scenario, &shapes, record.length, out)
+}
+
+/// The buffer, with its views and accessors.
+#[derive(Default)]
+struct File {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl File {
+    /// Adds an array, and returns the index of its accessor.
+    fn add(
+        &mut self,
+        bytes: impl IntoIterator<Item = u8>,
+        target: Option<u32>,
+        mut accessor: Value,
+    ) -> usize {
+        let start = self.bytes.len();
+        self.bytes.extend(bytes);
+        let mut view =
+            json!({ "buffer": 0, "byteOffset": start, "byteLength": self.bytes.len() - start });
+        if let Some(target) = target {
+            view["target"] = json!(target);
+        }
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        accessor["bufferView"] = json!(self.views.len());
+        self.views.push(view);
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    /// Adds numbers one by one, or vectors for vertices, with their bounds.
+    fn floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> usize {
+        let bound = |of: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
+            let along = |k: usize| numbers.iter().map(move |it| it[k]).fold(start, of);
+            (0..N).map(along).collect()
+        };
+        let accessor = json!({
+            "componentType": FLOAT, "count": numbers.len(),
+            "type": if N == 3 { "VEC3" } else { "SCALAR" },
+            "min": bound(f32::min, f32::MAX), "max": bound(f32::max, f32::MIN),
+        });
+        let bytes = numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+        self.add(bytes, (N == 3).then_some(ARRAY), accessor)
+    }
+
+    fn vectors(&mut self, vectors: impl Iterator<Item = Vec3>) -> usize {
+        self.floats(&vectors.map(Vec3::into).collect::<Vec<[f32; 3]>>())
+    }
+}
+
+/// Writes shapes at times; the first is the base of the morph targets.
+fn write(
+    name: &str,
+    shapes: &[(f64, &[Vec<DVec3>])],
+    longest: f64,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let thin = |curve: &Vec<DVec3>| {
+        let stride = node_stride(curve.len(), MOST_SEGMENTS);
+        tamed(curve.iter().copied().step_by(stride), longest)
+    };
+    let thinned = shapes
+        .iter()
+        .map(|(_, curves)| curves.iter().map(thin).collect());
+    let thinned: Vec<Vec<Vec<DVec3>>> = thinned.collect();
+    let radius = RADIUS * longest;
+    let first = thinned.first();
+    let Some(first) = first.filter(|curves| curves.iter().any(|curve| curve.len() > 1)) else {
+        return finish(name, &File::default(), json!([]), None, out);
+    };
+    let (veins, points) = (first.len(), first[0].len());
+    let base = Tubes::around(first, radius);
+    let mut file = File::default();
+    let position = file.vectors(base.positions.iter().copied());
+    let normal = file.vectors(base.normals.iter().copied());
+    let colors = (0..veins).flat_map(|vein| {
+        let color = linear(color_of_vein(vein, veins));
+        std::iter::repeat_n(color, Tubes::vertices(points)).flatten()
+    });
+    let count = base.positions.len();
+    let accessor = json!({ "componentType": UNSIGNED_BYTE, "normalized": true, "count": count, "type": "VEC4" });
+    let color = file.add(colors, Some(ARRAY), accessor);
+    let corners = Tubes::triangles(veins, points);
+    let accessor =
+        json!({ "componentType": UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
+    let corners = corners.into_iter().flat_map(u32::to_le_bytes);
+    let indices = file.add(corners, Some(ELEMENT_ARRAY), accessor);
+
+    let mut targets = Vec::new();
+    for curves in &thinned[1..] {
+        let tubes = Tubes::around(curves, radius);
+        let mut moved = |of: fn(&Tubes) -> &Vec<Vec3>| {
+            file.vectors(of(&tubes).iter().zip(of(&base)).map(|(a, b)| a - b))
+        };
+        targets.push(json!({
+            "POSITION": moved(|tubes| &tubes.positions), "NORMAL": moved(|tubes| &tubes.normals),
+        }));
+    }
+    let mut mesh = json!([{ "name": "veins", "primitives": [{
+        "attributes": { "POSITION": position, "NORMAL": normal, "COLOR_0": color },
+        "indices": indices, "material": 0,
+    }]}]);
+    let mut animation = None;
+    if !targets.is_empty() {
+        mesh[0]["weights"] = json!(vec![0.0; targets.len()]);
+        animation = Some(animate(&mut file, shapes));
+        mesh[0]["primitives"][0]["targets"] = Value::Array(targets);
+    }
+    finish(name, &file, mesh, animation, out)
+}
+
+/// The animation: at the time of a shape its weight is one and all others are zero.
+fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
+    let (start, end) = (shapes[0].0, shapes[shapes.len() - 1].0);
+    let rate = if end > start {
+        SECONDS / (end - start)
+    } else {
+        1.0
+    };
+    let times = shapes
+        .iter()
+        .map(|(time, _)| [((time - start) * rate) as f32]);
+    let times: Vec<[f32; 1]> = times.collect();
+    let mut weights = vec![[0.0]; shapes.len() * (shapes.len() - 1)];
+    // The first shape is the base.
+    for shape in 1..shapes.len() {
+        weights[shape * (shapes.len() - 1) + shape - 1] = [1.0];
+    }
+    json!([{ "name": "motion",
+        "samplers": [{ "input": file.floats(&times), "output": file.floats(&weights), "interpolation": "LINEAR" }],
+        "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
+    }])
+}
+
+/// Writes the header, the document and the buffer.
+fn finish(
+    name: &str,
+    file: &File,
+    meshes: Value,
+    animations: Option<Value>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let generator = concat!("leafdyn ", env!("CARGO_PKG_VERSION"));
+    let mut document = json!({ "asset": { "version": "2.0", "generator": generator }, "scene": 0, "scenes": [{ "name": name }] });
+    if !file.accessors.is_empty() {
+        document["scenes"][0]["nodes"] = json!([0]);
+        // Up is y in this format.
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        document["nodes"] =
+            json!([{ "name": "leaf", "mesh": 0, "rotation": [-half, 0.0, 0.0, half] }]);
+        document["meshes"] = meshes;
+        document["materials"] = json!([{ "name": "vein", "doubleSided": true,
+            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.6 } }]);
+        document["buffers"] = json!([{ "byteLength": file.bytes.len() }]);
+        document["bufferViews"] = Value::Array(file.views.clone());
+        document["accessors"] = Value::Array(file.accessors.clone());
+    }
+    if let Some(animations) = animations {
+        document["animations"] = animations;
+    }
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut chunks = vec![(*b"JSON", &text)];
+    if !file.bytes.is_empty() {
+        chunks.push((*b"BIN\0", &file.bytes));
+    }
+    let size: usize = chunks.iter().map(|(_, chunk)| 8 + chunk.len()).sum();
+    let size = u32::try_from(12 + size).map_err(|_| io::ErrorKind::FileTooLarge)?;
+    out.write_all(b"glTF")?;
+    out.write_all([2, size].map(u32::to_le_bytes).as_flattened())?;
+    for (kind, chunk) in chunks {
+        out.write_all(&(chunk.len() as u32).to_le_bytes())?;
+        out.write_all(&kind)?;
+        out.write_all(chunk)?;
+    }
+    Ok(())
+}
+
+/// Converts a colour from sRGB to linear RGB, opaque.
+fn linear(Color(red, green, blue): Color) -> [u8; 4] {
+    let of = |value: u8| {
+        let value = f64::from(value) / 255.0;
+        let linear = if value <= 0.04045 {
+            value / 12.92
+        } else {
+            ((value + 0.055) / 1.055).powf(2.4)
+        };
+        (255.0 * linear).round() as u8
+    };
+    [of(red), of(green), of(blue), 255]
+}
+
+/// Corners of a tube's section.
+const SIDES: usize = 8;
+
+/// Surfaces of tubes around curves with equally many points.
+struct Tubes {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+}
+
+impl Tubes {
+    /// Tubes around `curves`, whose rings are transported along each curve without twist.
+    fn around(curves: &[Vec<DVec3>], radius: f64) -> Self {
+        let (mut positions, mut normals) = (Vec::new(), Vec::new());
+        for curve in curves {
+            let mut across = DVec3::Z;
+            for (i, &point) in curve.iter().enumerate() {
+                let (before, after) = (i.saturating_sub(1), (i + 1).min(curve.len() - 1));
+                let tangent = (curve[after] - curve[before]).normalize_or(DVec3::X);
+                across = across.reject_from_normalized(tangent);
+                if across.length() < 0.1 {
+                    // Vertical, or a sharp kink: any perpendicular direction will do.
+                    across = tangent.any_orthonormal_vector();
+                }
+                across = across.normalize();
+                let binormal = tangent.cross(across);
+                for side in 0..SIDES {
+                    let angle = std::f64::consts::TAU * side as f64 / SIDES as f64;
+                    let normal = angle.cos() * across + angle.sin() * binormal;
+                    positions.push((point + radius * normal).as_vec3());
+                    normals.push(normal.as_vec3().normalize_or(Vec3::X));
+                }
+            }
+        }
+        Tubes { positions, normals }
+    }
+
+    /// Corners of the triangles of `tubes` tubes around `points` points each, with open
+    /// ends.
+    fn triangles(tubes: usize, points: usize) -> Vec<u32> {
+        let ring = |tube: usize, point: usize| (tube * points + point) * SIDES;
+        let mut corners = Vec::new();
+        for tube in 0..tubes {
+            for point in 0..points.saturating_sub(1) {
+                let (here, next) = (ring(tube, point), ring(tube, point + 1));
+                for side in 0..SIDES {
+                    let other = (side + 1) % SIDES;
+                    let quad = [here + side, here + other, next + side, next + other];
+                    let [a, b, c, d] = quad.map(|corner| corner as u32);
+                    corners.extend([a, b, c, b, d, c]);
+                }
+            }
+        }
+        corners
+    }
+
+    /// Vertices of a tube around `points` points.
+    fn vertices(points: usize) -> usize {
+        points * SIDES
+    }
+}

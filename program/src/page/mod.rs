@@ -1,0 +1,260 @@
+//! Leaves in space for browsers ([`page`]), ParaView ([`vtk`]) and Blender ([`glb`]).
+//!
+//! The page shows a leaf that can be rotated, played and inspected, as one self-contained
+//! HTML file.
+//!
+//! ```
+//! use leafdyn::relax::{Options, relax};
+//! use leafdyn::scenario::Scenario;
+//! use leafdyn_program::page;
+//!
+//! let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+//! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
+//! let page = page::page(&leaf, &scenario);
+//! assert!(page.starts_with("<!DOCTYPE html>") && page.len() < 1_000_000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `data.rs` defines the data of the page, `results.rs` fills it in, and the scripts draw it.
+//! `three/` holds the part of three.js that is used, and how it is bundled.
+
+mod data;
+pub mod glb;
+mod results;
+pub mod vtk;
+
+use crate::figure::Figure;
+use crate::figure::drawing::{Drawing, color_of_vein};
+use crate::figure::svg::{self, hex};
+use crate::figure::veins::is_drawn;
+use crate::report::{Reported, json};
+use data::View;
+use glam::DVec3;
+use leafdyn::scenario::{self, Scenario, Units};
+use leafdyn::simulate::Record;
+use leafdyn::study::Trace;
+use std::io::{self, Write};
+
+const FRAME: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
+const THREE: &str = include_str!("three/three.min.js");
+const SCRIPTS: [&str; 5] = [
+    include_str!("data.js"),
+    include_str!("space.js"),
+    include_str!("axes.js"),
+    include_str!("chart.js"),
+    include_str!("page.js"),
+];
+
+/// A result that has a page.
+pub trait Viewed: Reported {
+    /// The figure that replaces it in a browser without 3D graphics.
+    #[doc(hidden)]
+    const STILL: Figure<Self>;
+
+    /// Fills in the data of the page.
+    #[doc(hidden)]
+    fn fill(&self, view: &mut View, units: &Units);
+}
+
+/// One of several shapes.
+pub struct Shape<'r> {
+    /// Its time, or its number.
+    pub time: f64,
+    /// Fractions of the length at which its nodes are.
+    pub stations: &'r [f64],
+    /// The centrelines of its veins.
+    pub curves: &'r [Vec<DVec3>],
+}
+
+/// The instants of a motion.
+pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
+    let film = record.film.iter();
+    film.map(|still| Shape {
+        time: record.moments[still.moment].time,
+        stations: &record.stations,
+        curves: &still.curves,
+    })
+    .collect()
+}
+
+/// All points of a trace, numbered branch after branch.
+pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
+    let points = trace.branches.iter().flat_map(|branch| &branch.points);
+    (points.enumerate())
+        .map(|(number, point)| Shape {
+            time: number as f64,
+            stations: &point.stations,
+            curves: &point.curves,
+        })
+        .collect()
+}
+
+/// Writes the page of a result.
+pub(crate) fn write<R: Viewed>(
+    result: &R,
+    input: &Scenario,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(page(result, input).as_bytes())
+}
+
+/// The page of a result of this scenario: a self-contained HTML file.
+pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
+    let count = scenario.rods.len();
+    let drawn: Vec<usize> = (1..=count)
+        .filter(|number| is_drawn(number - 1, count))
+        .collect();
+    let color = |&number: &usize| hex(color_of_vein(number - 1, count));
+    let mut view = View {
+        kind: "leaf",
+        title: scenario.name.clone(),
+        verdict: String::new(),
+        success: true,
+        summary: result.summary(),
+        units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
+        gravity: scenario.gravity,
+        longest: scenario::longest(&scenario.rods),
+        lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
+        joined: scenario.joined,
+        rods: count,
+        colors: drawn.iter().map(color).collect(),
+        drawn,
+        leaves: Vec::new(),
+        modes: Vec::new(),
+        chart: None,
+    };
+    result.fill(&mut view, &scenario.units);
+    assemble(&view, &R::STILL(result, scenario))
+}
+
+fn assemble(view: &View, still: &Drawing) -> String {
+    let (mut data, mut figure) = (Vec::new(), Vec::new());
+    // Writing to memory cannot fail.
+    let _ = json::write(view, &mut data);
+    let _ = svg::write(still, &mut figure);
+    // Within a script only `</script` and `<!--` are special.
+    let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
+    let figure = String::from_utf8_lossy(&figure).into_owned();
+    let scripts = SCRIPTS.concat();
+    let parts = [
+        ("TITLE", svg::escaped(&view.title)),
+        ("STYLE", STYLE.into()),
+        ("FIGURE", figure),
+        ("DATA", data),
+        ("THREE", THREE.into()),
+        ("SCRIPT", scripts),
+    ];
+    let size: usize = parts.iter().map(|(_, part)| part.len()).sum();
+    let mut page = String::with_capacity(FRAME.len() + size);
+    let mut rest = FRAME;
+    // Inserted text is not searched for placeholders.
+    while let Some((before, after)) = rest.split_once("{{") {
+        let Some((name, after)) = after.split_once("}}") else {
+            break;
+        };
+        page.push_str(before);
+        let part = parts.iter().find(|(part, _)| *part == name);
+        page.push_str(part.map_or("", |(_, text)| text));
+        rest = after;
+    }
+    page + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+    use serde_json::Value;
+
+    fn scenario(rods: usize) -> Scenario {
+        let mut scenario = sample::scenario("page", rods);
+        scenario.name = "a < b </script>".into();
+        scenario.units.length = Some("cm".into());
+        scenario
+    }
+
+    /// The data of a page.
+    fn data(page: &str) -> Value {
+        let (_, rest) = page.split_once("type=\"application/json\">").unwrap();
+        serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+    }
+
+    #[test]
+    fn the_bundle_is_the_one_that_was_made() {
+        let noted = include_str!("three/three.min.js.crc32");
+        let found = crc32fast::hash(THREE.as_bytes());
+        assert_eq!(format!("{found:08x}"), noted.trim());
+        assert!(THREE.contains("SPDX-License-Identifier: MIT"));
+        assert!(!THREE.contains("</script") && !THREE.contains("<!--"));
+    }
+
+    #[test]
+    fn a_page_is_whole_and_loads_nothing() {
+        let mut leaf = sample::fan(21, 32);
+        leaf.scenario = "a < b </script>".into();
+        let page = page(&leaf, &scenario(21));
+        assert!(page.len() < 1_000_000, "{}", page.len());
+        assert!(page.contains("<title>a &lt; b &lt;/script&gt;</title>"));
+        assert!(!page.contains("{{"));
+        let outside = page.replace(THREE, "");
+        for load in ["src=", "href=\"", "@import", "url(", "import("] {
+            assert!(!outside.contains(load), "{load}");
+        }
+        assert_eq!(outside.matches("</script>").count(), 3);
+        let data = data(&page);
+        assert_eq!(data["title"], "a < b </script>");
+        assert_eq!(data["units"], serde_json::json!(["cm", null]));
+        assert_eq!(data["leaves"][0]["nodes"], leaf.shape.stations.len());
+    }
+
+    /// A list of unknown length is no list of arguments: of 130,000 numbers browsers refuse.
+    #[test]
+    fn no_function_is_called_with_as_many_arguments_as_there_are_numbers() {
+        let scripts = SCRIPTS.concat();
+        for call in ["Math.max(...", "Math.min(...", "push(...", "fromCharCode("] {
+            for (at, _) in scripts.match_indices(call) {
+                let arguments = &scripts[at + call.len()..];
+                let line = arguments.lines().next().unwrap();
+                assert!(arguments.starts_with('['), "{call}{line}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_motion_has_its_instants_and_energies() {
+        let mut record = sample::record(5, 8);
+        record.film = record.stills.clone();
+        let data = data(&page(&record, &scenario(5)));
+        assert_eq!(data["leaves"].as_array().unwrap().len(), record.film.len());
+        let curves = data["chart"]["curves"].as_array().unwrap();
+        let names: Vec<&str> = curves.iter().filter_map(|c| c["name"].as_str()).collect();
+        assert!(names.contains(&"kinetic") && names.contains(&"tip z"));
+        assert!(!names.contains(&"work put in"), "{names:?}");
+        // In the unit of lengths; that of forces has no name.
+        let choices = &data["chart"]["choices"];
+        assert_eq!(*choices, serde_json::json!(["energy", "tip / cm"]));
+    }
+
+    #[test]
+    fn of_a_wide_leaf_some_veins_are_drawn() {
+        let data = data(&page(&sample::fan(401, 4), &scenario(401)));
+        let drawn = data["drawn"].as_array().unwrap();
+        assert!(drawn.len() <= 202 && drawn[0] == 1 && *drawn.last().unwrap() == 401);
+    }
+
+    #[test]
+    fn extreme_numbers_make_a_page() {
+        for value in [f64::NAN, f64::INFINITY, 1e300] {
+            let mut leaf = sample::fan(3, 8);
+            leaf.shape.rods[1].nodes[3].position.z = value;
+            leaf.energy = Some(value);
+            data(&page(&leaf, &scenario(3)));
+            let mut record = sample::record(3, 8);
+            record.moments[3].energy.kinetic = value;
+            record.film = record.stills.clone();
+            record.film[1].curves[0][2].x = value;
+            data(&page(&record, &scenario(3)));
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Veins as poly-lines for ParaView: VTK's XML format `.vtp` with numbers in base64,
+//! and `.pvd`, which lists several in time.
+//!
+//! Source: "VTK XML formats", version 1.0, of the VTK documentation.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
+use glam::DVec3;
+
+use super::Shape;
+use crate::figure::svg::escaped;
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Radii;
+use leafdyn::shape::NodeState;
+
+/// Values at all nodes, vein by vein: name, values per node, all values.
+struct Array<'a>(&'a str, usize, Vec<f64>);
+
+/// A leaf at rest: per node its vein, place along it, directors, strains, forces and
+/// moments, and the radius where sections are given.
+pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io::Result<()> {
+    let shape = &equilibrium.shape;
+    let nodes = || shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let along = |of: &dyn Fn(&NodeState) -> DVec3| vectors(nodes().map(of));
+    let lengths = shape.rods.iter().map(|rod| rod.length);
+    let s = lengths.flat_map(|length| shape.stations.iter().map(move |sigma| sigma * length));
+    let mut arrays = vec![
+        Array("s", 1, s.collect()),
+        Array("d1", 3, along(&|node| node.rotation * DVec3::X)),
+        Array("d2", 3, along(&|node| node.rotation * DVec3::Y)),
+        Array("d3", 3, along(&|node| node.rotation * DVec3::Z)),
+        Array("v", 3, along(&|node| node.v)),
+        Array("u", 3, along(&|node| node.u)),
+        Array("n", 3, along(&|node| node.n)),
+        Array("m", 3, along(&|node| node.m)),
+    ];
+    arrays.extend(radius(shape.rods.len(), &shape.stations, radii));
+    let points: Vec<Vec<DVec3>> = (shape.rods.iter())
+        .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
+        .collect();
+    write(&points, &shape.stations, &arrays, out)
+}
+
+/// Centrelines alone, with the vein, the place along it and the radius where sections
+/// are given.
+pub fn curves(
+    curves: &[Vec<DVec3>],
+    stations: &[f64],
+    radii: &Radii,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let radius = radius(curves.len(), stations, radii);
+    write(curves, stations, radius.as_slice(), out)
+}
+
+fn radius(rods: usize, stations: &[f64], radii: &Radii) -> Option<Array<'static>> {
+    let nodes = (0..rods).flat_map(|rod| stations.iter().map(move |&sigma| (rod, sigma)));
+    let radius: Option<Vec<f64>> = nodes.map(|(rod, sigma)| radii.at(rod, sigma)).collect();
+    radius.map(|radius| Array("radius", 1, radius))
+}
+
+/// The file of a shape in the list of this name.
+pub(crate) fn part(list: &str, number: usize) -> String {
+    let stem = Path::new(list).file_stem().unwrap_or_default();
+    format!("{}_vtp/{number:05}.vtp", stem.display())
+}
+
+/// The list of this name: shapes by time, or by a number that varies in its place.
+pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>"
+    )?;
+    for (k, shape) in shapes.iter().enumerate() {
+        let (time, file) = (shape.time, escaped(&part(name, k)));
+        writeln!(
+            out,
+            "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>"
+        )?;
+    }
+    writeln!(out, "</Collection>\n</VTKFile>")
+}
+
+fn vectors(vectors: impl Iterator<Item = DVec3>) -> Vec<f64> {
+    vectors.flat_map(|vector| vector.to_array()).collect()
+}
+
+fn write(
+    veins: &[Vec<DVec3>],
+    stations: &[f64],
+    arrays: &[Array],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let (count, nodes) = (veins.len(), veins.iter().map(Vec::len).sum::<usize>());
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
+         <PolyData>\n<Piece NumberOfPoints=\"{nodes}\" NumberOfVerts=\"0\" NumberOfLines=\"{count}\" \
+         NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<Points>"
+    )?;
+    floats("Points", 3, &vectors(veins.iter().flatten().copied()), out)?;
+    writeln!(out, "</Points>\n<Lines>")?;
+    integers("connectivity", 0..nodes, out)?;
+    let ends = veins.iter().scan(0, |end, vein| {
+        *end += vein.len();
+        Some(*end)
+    });
+    integers("offsets", ends, out)?;
+    writeln!(out, "</Lines>\n<PointData>")?;
+    let rods = veins.iter().enumerate();
+    let rods = rods.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1));
+    integers("rod", rods, out)?;
+    let lengths = veins.iter().map(Vec::len);
+    let sigma = lengths.flat_map(|nodes| stations.iter().copied().take(nodes));
+    floats("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
+    for Array(name, components, numbers) in arrays {
+        floats(name, *components, numbers, out)?;
+    }
+    writeln!(out, "</PointData>\n<CellData>")?;
+    integers("rod", 1..count + 1, out)?;
+    writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")
+}
+
+fn floats(name: &str, components: usize, numbers: &[f64], out: &mut dyn Write) -> io::Result<()> {
+    let bytes = numbers.iter().flat_map(|number| number.to_le_bytes());
+    array("Float64", name, components, bytes.collect(), out)
+}
+
+fn integers(
+    name: &str,
+    numbers: impl Iterator<Item = usize>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let bytes = numbers.flat_map(|number| (number as i64).to_le_bytes());
+    array("Int64", name, 1, bytes.collect(), out)
+}
+
+/// Writes the number of bytes and the bytes as one base64 text.
+fn array(
+    kind: &str,
+    name: &str,
+    components: usize,
+    bytes: Vec<u8>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let size = (bytes.len() as u64).to_le_bytes();
+    let text = STANDARD.encode([&size, &bytes[..]].concat());
+    writeln!(
+        out,
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">{text}</DataArray>"
+    )
+}

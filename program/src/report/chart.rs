@@ -1,0 +1,274 @@
+//! A chart as text, and as rows of `chart.csv` and `chart_rods.csv`, one per measurement;
+//! `chart.json` has the same values under the same names.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::kit::*;
+use leafdyn::study::{Chart, Decade, Peer, Reference, Row, Scaling};
+
+/// Names of the columns that both files have.
+const COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
+    factorizations,force_evaluations,true_error,error_estimate,outcome";
+
+impl Reported for Chart {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, speed against accuracy", self.scenario)
+    }
+
+    fn lines(&self) -> Lines {
+        let mut lines = labelled("errors", reference(self.reference.as_ref()));
+        lines.push(("measured", measured(self)));
+        lines.extend(labelled("front", front(self)));
+        lines.extend(labelled("fastest", fastest(self)));
+        lines.extend(labelled("failed", failed(self)));
+        lines.extend(labelled("peers", peers(self)));
+        lines.extend((self.scaling.iter()).flat_map(|it| labelled("veins", veins(it))));
+        lines.extend((self.remarks.iter()).map(|remark| ("remark", remark.clone())));
+        lines
+    }
+}
+
+fn reference(reference: Option<&Reference>) -> Vec<String> {
+    let Some(found) = reference else {
+        return vec!["not known: no equilibrium was found to measure them against".into()];
+    };
+    let within = power_of_ten(found.known_within);
+    let accuracy = match found.confirmed {
+        true => format!("against a solution known within {within} of the longest vein"),
+        false => format!(
+            "against a solution that is NOT CONFIRMED, taken to be within {within} of the longest vein"
+        ),
+    };
+    let agreement = match found.difference {
+        Some(difference) => {
+            let difference = power_of_ten(difference);
+            format!("{}; they differ by {difference}", found.told)
+        }
+        None => found.told.clone(),
+    };
+    vec![accuracy, agreement]
+}
+
+fn measured(chart: &Chart) -> String {
+    let spreads = || chart.rows.iter().filter_map(|row| row.seconds);
+    let runs: usize = spreads().map(|spread| spread.runs).sum();
+    let (settings, rounds) = (spreads().count(), chart.rounds);
+    format!(
+        "{runs} runs of {settings} settings in turns, {rounds} rounds, one thread; times are medians"
+    )
+}
+
+/// A line of a table: time, error, method and setting.
+fn entry((time, error): (f64, f64), method: &str, knob: &str) -> String {
+    let (time, error) = (seconds(time), power_of_ten(error));
+    format!("{time:>10}  {error:<9} {method}, {knob}")
+}
+
+fn front(chart: &Chart) -> Vec<String> {
+    let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
+    let rows = rows.filter_map(|row| {
+        let point = row.point()?;
+        let line = entry(point, contender(row.contender), &row.knob.to_string());
+        Some((point, line))
+    });
+    let peers = chart.peers.iter().filter(|peer| peer.pareto);
+    let peers = peers.filter_map(|peer| {
+        let point = peer.point()?;
+        Some((point, entry(point, &peer.name, &peer.knob)))
+    });
+    let mut entries: Vec<_> = rows.chain(peers).collect();
+    entries.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0));
+    entries.into_iter().map(|(_, line)| line).collect()
+}
+
+fn fastest(chart: &Chart) -> Vec<String> {
+    let line = |decade: &Decade| -> Option<String> {
+        let default = match (decade.factor, decade.default_knob) {
+            (Some(1.0), _) => "the default".to_string(),
+            (Some(factor), Some(knob)) => {
+                format!("the default ({knob}) takes {factor:.2} times as long")
+            }
+            _ => "the default does not get there".to_string(),
+        };
+        let (time, error) = (seconds(decade.seconds?), format!("{:e}", decade.error));
+        let (who, knob) = (contender(decade.contender?), decade.knob?);
+        Some(format!(
+            "{time:>10}  to {error:<7} {who}, {knob}; {default}"
+        ))
+    };
+    chart.decades.iter().filter_map(line).collect()
+}
+
+/// Failures, one line for each contender and kind of failure.
+fn failed(chart: &Chart) -> Vec<String> {
+    let mut kinds: Vec<(&Row, Vec<String>)> = Vec::new();
+    for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
+        let same = |other: &Row| other.contender == row.contender && other.ending == row.ending;
+        match kinds.iter_mut().find(|(other, _)| same(other)) {
+            Some((_, knobs)) => knobs.push(row.knob.to_string()),
+            None => kinds.push((row, vec![row.knob.to_string()])),
+        }
+    }
+    let line = |(row, knobs): (&Row, Vec<String>)| {
+        let why = row.remark.as_ref();
+        let why = why.map_or(String::new(), |why| format!(": {why}"));
+        let (who, knobs, end) = (contender(row.contender), listed(&knobs), row.ending.word());
+        format!("{who}, {knobs}, {end}{why}")
+    };
+    kinds.into_iter().map(line).collect()
+}
+
+/// Values of one setting, with its name only once.
+fn listed(knobs: &[String]) -> String {
+    let values = knobs.iter().map(|knob| match knob.split_once('=') {
+        Some((_, value)) => value,
+        None => knob,
+    });
+    let values: Vec<&str> = values.collect();
+    let name = knobs.first().and_then(|knob| knob.split_once('='));
+    match name {
+        Some((name, _)) => format!("{name}={}", values.join(",")),
+        None => values.join(","),
+    }
+}
+
+/// How many times longer each peer takes, from its largest error to its smallest.
+fn peers(chart: &Chart) -> Vec<String> {
+    let mut names: Vec<&str> = Vec::new();
+    for peer in &chart.peers {
+        if !names.contains(&peer.name.as_str()) {
+            names.push(&peer.name);
+        }
+    }
+    let mut lines = Vec::new();
+    for name in names {
+        let rows = || chart.peers.iter().filter(|peer| peer.name == name);
+        let measured = rows().filter_map(|peer| Some((peer, peer.true_error?)));
+        let mut measured: Vec<(&Peer, f64)> = measured.collect();
+        measured.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (peer, error) in measured {
+            let ratio = match peer.ratio {
+                Some(ratio) => format!("{} times the default's time", rounded(ratio)),
+                None => "the default is nowhere as accurate".into(),
+            };
+            let line = entry((peer.seconds.median, error), name, &peer.knob);
+            lines.push(format!("{line}: {ratio}"));
+        }
+        for peer in rows().filter(|peer| peer.true_error.is_none()) {
+            let time = seconds(peer.seconds.median);
+            let (knob, outcome) = (&peer.knob, &peer.outcome);
+            lines.push(format!("{time:>10}  {name}, {knob}, {outcome}"));
+        }
+    }
+    lines
+}
+
+/// Two digits, or all digits before the decimal point.
+fn rounded(ratio: f64) -> String {
+    match ratio {
+        ratio if ratio >= 10.0 => format!("{ratio:.0}"),
+        ratio => format!("{ratio:.1}"),
+    }
+}
+
+/// The time of each contender on each leaf.
+fn veins(scaling: &Scaling) -> Vec<String> {
+    let mut lines = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
+    if !scaling.unconfirmed.is_empty() {
+        let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
+        let rods = rods.join(", ");
+        lines.push(format!("reference NOT CONFIRMED for N = {rods}"));
+    }
+    let mut last = None;
+    for found in &scaling.rows {
+        let row = &found.row;
+        let what = match (row.point(), row.seconds) {
+            (Some((time, _)), _) => seconds(time),
+            (None, _) => row.ending.word().to_string(),
+        };
+        let cell = format!("N = {}: {what}", found.rods);
+        match lines.last_mut().filter(|_| last == Some(row.contender)) {
+            Some(line) => *line = format!("{line}, {cell}"),
+            None => lines.push(format!("{}, {cell}", contender(row.contender))),
+        }
+        last = Some(row.contender);
+    }
+    lines
+}
+
+/// `chart.csv`: one row per contender and setting, then those of the peers.
+pub fn chart_table(chart: &Chart, out: &mut dyn Write) -> io::Result<()> {
+    let rows = chart.rows.iter().map(object);
+    let peers = chart.peers.iter().map(|peer| {
+        let mut row = object(peer);
+        row["method"] = row["program"].take();
+        row
+    });
+    write_columns(&format!("{COLUMNS},pareto"), rows.chain(peers), out)
+}
+
+/// `chart_rods.csv`: one row per leaf and contender.
+pub fn scaling_table(scaling: &Scaling, out: &mut dyn Write) -> io::Result<()> {
+    let rows = scaling.rows.iter().map(object);
+    write_columns(&format!("rods,{COLUMNS}"), rows, out)
+}
+
+fn object(row: &impl Serialize) -> Value {
+    serde_json::to_value(row).unwrap_or_default()
+}
+
+/// Writes these columns; missing values, and numbers that are not finite, are empty cells.
+fn write_columns(
+    columns: &str,
+    rows: impl Iterator<Item = Value>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut table = csv::Writer::from_writer(out);
+    table.write_record(columns.split(','))?;
+    for row in rows {
+        let cell = |column: &str| match &row[column] {
+            Value::String(text) => text_cell(text).into(),
+            Value::Bool(yes) => yes.to_string(),
+            Value::Number(count) if count.is_u64() => match row["seconds"].is_null() {
+                // Nothing was measured.
+                true if column == "runs" => String::new(),
+                _ => count.to_string(),
+            },
+            Value::Number(number) => format!("{:e}", number.as_f64().unwrap_or(f64::NAN)),
+            _ => String::new(),
+        };
+        table.write_record(columns.split(',').map(cell))?;
+    }
+    table.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::report::sample;
+    use leafdyn::study::Ending;
+
+    use super::*;
+
+    #[test]
+    fn unconfirmed_references_are_reported_and_failures_of_a_kind_are_one_line() {
+        let mut chart = sample::chart();
+        if let Some(reference) = &mut chart.reference {
+            reference.confirmed = false;
+        }
+        for row in chart.rows.iter_mut().take(2) {
+            row.ending = Ending::OtherEquilibrium;
+        }
+        let text = chart.report(Vec::new());
+        assert!(text.contains("that is NOT CONFIRMED"), "{text}");
+        let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
+        assert!(text.contains(failed), "{text}");
+        chart.reference = None;
+        let text = chart.report(Vec::new());
+        let unknown = "  errors   not known: no equilibrium was found";
+        assert!(text.contains(unknown), "{text}");
+    }
+}

@@ -1,0 +1,156 @@
+//! The text report of a check.
+
+use glam::DVec3;
+
+use super::kit::*;
+use super::relax::found;
+use leafdyn::study::ShootingSolution as Solution;
+use leafdyn::study::{Check, Place, Quantity, Verdict};
+
+impl Reported for Check {
+    fn heading(&self) -> String {
+        let (name, veins) = (&self.relaxed.scenario, veins(&self.relaxed));
+        format!("{name}: {veins}, relaxed and by shooting")
+    }
+
+    fn lines(&self) -> Lines {
+        let mut lines = vec![("verdict", judgement(self))];
+        lines.extend(results(self));
+        lines.extend(labelled("differ", differences(self)));
+        lines.extend(labelled("error", errors(self)));
+        lines.extend(self.solution().into_iter().flat_map(shooting_details));
+        // Otherwise the verdict explains why the leaf is not at rest.
+        if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
+            lines.push(("remark", remark.clone()));
+        }
+        lines.extend(labelled("doubtful", self.relaxed.doubts.clone()));
+        lines
+    }
+}
+
+fn judgement(check: &Check) -> String {
+    let [position, rotation] = [check.allowed(), check.allowed_rotation()].map(power_of_ten);
+    let allowed = format!("positions within {position}, rotations within {rotation} rad");
+    let headline = headline(&check.verdict);
+    match &check.verdict {
+        Verdict::Agree => match check.indices() {
+            Some(_) => format!("{headline}: {allowed}, the same index"),
+            None => format!("{headline}: {allowed}; their indices are not compared"),
+        },
+        Verdict::Differ => format!("{headline}: to agree, {allowed}, the same index"),
+        Verdict::NotCompared(reason) => format!("{headline}: {reason}"),
+    }
+}
+
+/// The result and the time of each method.
+fn results(check: &Check) -> Lines {
+    let relaxed = &check.relaxed;
+    let found = format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds));
+    let mut lines = vec![("relaxed", found)];
+    let shot = check.shot.as_ref().map(|shot| {
+        let index = shot.negative_eigenvalues;
+        let found = match shot.found {
+            Ok(_) => equilibrium_of_index(index) + &eigenvalues(index),
+            Err(_) => "no solution".into(),
+        };
+        format!("{found} in {}", seconds(shot.wall_seconds))
+    });
+    lines.push(("shooting", shot.unwrap_or_else(|| "not tried".into())));
+    let place = |tip: &DVec3| point(tip.to_array(), decimals(relaxed));
+    if let [tip] = relaxed.tips.as_slice() {
+        lines.push(("tip", format!("{} relaxed", place(tip))));
+        if let Some([tip]) = check.shot.as_ref().map(|shot| shot.tips.as_slice()) {
+            lines.push(("", format!("{} by shooting", place(tip))));
+        }
+    }
+    let digits = |energy: f64| as_accurate(relaxed, energy, energy);
+    let mut energy = digits(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
+    if let Some(solution) = check.solution() {
+        energy += &format!(", {} by shooting", digits(solution.energy));
+    }
+    lines.push(("energy", energy));
+    lines
+}
+
+/// The largest differences, and where they are.
+fn differences(check: &Check) -> Vec<String> {
+    let Some(difference) = &check.difference else {
+        return Vec::new();
+    };
+    let line = |quantity: Quantity| {
+        let (word, largest) = (quantity.word(), quantity.of(difference));
+        let unit = match quantity {
+            Quantity::Rotation => " rad",
+            _ => "",
+        };
+        match check.farthest(quantity) {
+            Some(Place { rod, sigma }) if largest > 0.0 => {
+                let place = match check.relaxed.shape.rods.len() {
+                    1 => format!("at {sigma:.3} of the length"),
+                    _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
+                };
+                let largest = power_of_ten(largest);
+                format!("{word}s by {largest}{unit} at most, {place}")
+            }
+            _ => format!("{word}s not at all"),
+        }
+    };
+    Quantity::ALL.into_iter().map(line).collect()
+}
+
+/// The error estimates of both methods.
+fn errors(check: &Check) -> Vec<String> {
+    let relaxed = &check.relaxed;
+    let mut lines = vec![match relaxed.accuracy.error_estimate {
+        Some(error) => {
+            let (error, grids) = (bound(error), grids(relaxed));
+            format!("relaxed: positions within {error}, from {grids}")
+        }
+        None => "relaxed: not known".into(),
+    }];
+    if let Some(Solution { error, .. }) = check.solution() {
+        let unit = if error.rotation == 0.0 { "" } else { " rad" };
+        let [position, rotation, force, moment] =
+            [error.position, error.rotation, error.force, error.moment].map(bound);
+        lines.push(format!(
+            "shooting: positions within {position}, rotations {rotation}{unit}, forces {force}, moments {moment}"
+        ));
+    }
+    lines.extend(check.within_estimates.map(|within| {
+        let than = if within { "no more than" } else { "more than" };
+        format!("positions differ by {than} both errors")
+    }));
+    lines
+}
+
+/// Growth of perturbations, defect and conditioning of the shooting.
+fn shooting_details(solution: &Solution) -> Lines {
+    let (growth, method) = (solution.growth, shooting(solution.intervals.len() - 1));
+    let growth = format!("perturbations grow 10^{growth:.1} times from base to tip: {method}");
+    let (defect, ratio) = (power_of_ten(solution.defect), solution.condition);
+    let defect = format!("{defect}, ratio of singular values {ratio:.1e}");
+    let mut lines = vec![("growth", growth), ("defect", defect)];
+    lines.extend((solution.neutral.iter()).map(|neutral| ("neutral", neutral.to_string())));
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn another_equilibrium_is_called_unstable() {
+        let report = sample::check(1, 8, 0.1).report(Vec::new());
+        for part in [
+            "fan: 1 vein, relaxed and by shooting\n",
+            "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad, the same index\n",
+            "  shooting unstable equilibrium of index 2 (2 negative eigenvalues) in 20.00 ms\n",
+            "at 1.000 of the length\n           rotations by ",
+            "positions differ by more than both errors\n",
+            "  neutral  a bifurcation is near",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! The text report of a fit, and its table.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::kit::*;
+use leafdyn::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
+
+/// Most candidates that are listed.
+const CANDIDATES: usize = 5;
+
+impl Reported for Fit {
+    fn heading(&self) -> String {
+        let (name, count) = (&self.scenario, self.residuals.len());
+        let numbers = counted(self.parameters.len(), "number", "numbers");
+        format!("{name}: fit of {numbers} to {count} data")
+    }
+
+    fn lines(&self) -> Lines {
+        let found = match self.outcome {
+            FitOutcome::Converged => "a minimum; the data determine every free number",
+            FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
+            FitOutcome::Contradicted => "a minimum, at which the data contradict the model",
+            FitOutcome::NotConverged => "no minimum",
+        };
+        let mut lines: Lines = vec![("found", found.into())];
+        lines.extend(labelled("numbers", self.parameters.iter().map(number)));
+        lines.extend(labelled("data say", self.says.clone()));
+        lines.extend(labelled("data", self.files.iter().map(read)));
+        let (count, freedom) = (self.residuals.len(), self.degrees_of_freedom);
+        let misfit = match self.standard_deviation {
+            Some(sd) => format!("standard deviation {}", brief(sd)),
+            None => format!("chi squared {}", brief(self.chi_squared)),
+        };
+        let misfit = format!("{misfit} over {count} data, {freedom} degrees of freedom");
+        lines.push(("misfit", misfit));
+        let candidates = self.candidates.iter().take(CANDIDATES).map(|candidate| {
+            let (bits, part) = (candidate.bits, candidate.shrinks);
+            let text = match &candidate.remark {
+                Some(remark) => remark.clone(),
+                None => format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it"),
+            };
+            format!("{}: {text}", candidate.experiment)
+        });
+        lines.extend(labelled("measure", candidates));
+        let (evaluations, time) = (self.work.evaluations, seconds(self.wall_seconds));
+        let work = format!("all leaves brought to rest {evaluations} times in {time}");
+        lines.push(("work", work));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        labelled("remark", self.remarks.clone())
+    }
+}
+
+fn read(file: &DataFile) -> String {
+    let name = Path::new(&file.file).file_name();
+    let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());
+    let rows = counted(file.rows, "row", "rows");
+    match file.comments {
+        0 => format!("{name}: {rows}"),
+        count => {
+            let comments = counted(count, "line that is a comment", "lines that are comments");
+            format!("{name}: {rows}; {comments} left out")
+        }
+    }
+}
+
+fn number(parameter: &FitParameter) -> String {
+    // The interval has two digits.
+    let error = match (parameter.low, parameter.high) {
+        (Some(low), Some(high)) => 0.05 * (high - low),
+        _ => 0.0,
+    };
+    let digits = |value: f64| brief(rounded_to(value, error));
+    let end = |end: Option<f64>| end.map_or("?".into(), digits);
+    let (low, high) = (end(parameter.low), end(parameter.high));
+    let (key, value) = (&parameter.key, digits(parameter.value));
+    match parameter.determined {
+        true => format!("{key} = {value} (95 %: {low} to {high})"),
+        false => format!("{key} not determined (95 %: {low} to {high})"),
+    }
+}
+
+/// `fit.csv`: one row per datum.
+pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::Writer::from_writer(out);
+    for residual in &fit.residuals {
+        let experiment = text_cell(&residual.experiment).into();
+        table.serialize(FitResidual {
+            experiment,
+            ..residual.clone()
+        })?;
+    }
+    table.flush()
+}
+
+/// `fitted.toml`: the scenario with the fitted values.
+pub fn fitted(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(fit.fitted.as_bytes())
+}

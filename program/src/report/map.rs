@@ -1,0 +1,197 @@
+//! A map as text, and its rows as CSV, written and read.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+
+use csv::StringRecord;
+
+use super::FileError;
+use super::kit::*;
+use leafdyn::study::{Map, MapOutcome, MapRequest, MapRow};
+
+/// The columns after those of the varied keys.
+const COLUMNS: &str = "method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,\
+    error_estimate,margin_waves,margin_amplitude,twist,seconds,reference";
+
+/// Most jumps that are listed.
+const JUMPS: usize = 5;
+
+/// A map, and the work that was done for it.
+pub struct MapWork<'m> {
+    pub map: &'m Map,
+    /// Rows that were known before.
+    pub known: usize,
+    /// Rows that were computed.
+    pub computed: usize,
+    /// Total time.
+    pub seconds: f64,
+}
+
+impl Reported for MapWork<'_> {
+    fn heading(&self) -> String {
+        let name = &self.map.request.base.scenario().name;
+        format!("{name}: {}", map_shows(self.map.show))
+    }
+
+    fn lines(&self) -> Lines {
+        let request = &self.map.request;
+        let mut lines = Lines::new();
+        for axis in &request.axes {
+            let ends = [axis.values.first(), axis.values.last()];
+            let [from, to] = ends.map(|end| end.map_or(String::new(), |&v| axis.keys.text(v)));
+            let spacing = if axis.log { ", logarithmic" } else { "" };
+            let count = axis.values.len();
+            let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
+            lines.push(("vary", text));
+        }
+        let (known, confirmed) = self.map.known_and_confirmed();
+        let cells = request.cells();
+        let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
+        lines.push(("cells", cells));
+        let (known, computed, time) = (self.known, self.computed, seconds(self.seconds));
+        let rows = format!("{known} were there, {computed} computed in {time}");
+        lines.push(("rows", rows));
+        lines.extend(labelled("found", counts(self.map)));
+        lines.extend(labelled("jumps", jumps(self.map)));
+        lines
+    }
+}
+
+/// The first few pairs of cells between which the leaf jumps to another equilibrium.
+fn jumps(map: &Map) -> Vec<String> {
+    let all = map.jumps.as_deref().unwrap_or_default();
+    let mut lines: Vec<String> = (all.iter().take(JUMPS))
+        .map(|jump| {
+            let (from, to) = (jump.from.join(", "), jump.to.join(", "));
+            let key = &jump.key;
+            let between = jump.between.map(brief).join(" and ");
+            format!("from cell {from} to {to} to another equilibrium: {key} between {between}")
+        })
+        .collect();
+    if all.len() > JUMPS {
+        lines.push(format!("and {} more: map.json has all", all.len() - JUMPS));
+    }
+    lines
+}
+
+/// A table with the outcomes that occur.
+fn counts(map: &Map) -> Vec<String> {
+    let outcomes: Vec<MapOutcome> = (MapOutcome::ALL.into_iter())
+        .filter(|&outcome| map.rows.iter().any(|row| row.outcome == outcome))
+        .collect();
+    let mut lines = vec![format!("{:<18}", "")];
+    for outcome in &outcomes {
+        // Writing to a string cannot fail.
+        let _ = write!(lines[0], "  {outcome}");
+    }
+    for &method in &map.request.methods {
+        let mut line = format!("{:<18}", method.word());
+        for &outcome in &outcomes {
+            let count = match map.count(method, outcome) {
+                0 => "-".into(),
+                count => count.to_string(),
+            };
+            let _ = write!(line, "  {count:>0$}", outcome.word().len());
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// `map.csv`: one row per cell and method.
+pub fn map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
+    table(&map.request, &map.rows, out)
+}
+
+fn header(request: &MapRequest) -> StringRecord {
+    let keys = request.axes.iter().map(|axis| axis.keys.to_string());
+    keys.chain(COLUMNS.split(',').map(String::from)).collect()
+}
+
+/// The header and all rows.
+pub fn table(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
+    append_csv([header(request).iter().collect::<Vec<_>>()], out)?;
+    lines(request, rows, out)
+}
+
+/// The rows alone, each a whole line.
+pub fn lines(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
+    // The columns of the axes, then those of the row.
+    let rows = rows.iter().map(|row| {
+        let detail = text_cell(&row.detail).into();
+        let row = MapRow {
+            detail,
+            ..row.clone()
+        };
+        (request.texts(row.cell), row)
+    });
+    append_csv(rows, out)
+}
+
+/// Reads the rows of a file. Header lines may repeat, as in concatenated files. An
+/// unterminated last line, as left by a killed run, is ignored.
+pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileError> {
+    let bytes = fs::read(file).map_err(|reason| FileError::read(file, reason))?;
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n');
+    let bytes = &bytes[..whole.map_or(0, |end| end + 1)];
+    let cells: HashMap<Vec<String>, usize> = (0..request.cells())
+        .map(|cell| (request.texts(cell), cell))
+        .collect();
+    let header = header(request);
+    let mut table = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(bytes);
+    let mut rows = Vec::new();
+    for (count, record) in table.records().enumerate() {
+        let refuse = |line: u64, why: String| {
+            let change = "give the same --vary as when it was made, or another --out DIR";
+            let file = file.display();
+            FileError(format!(
+                "{file}:{line}: is no row of this map: {why}; {change}"
+            ))
+        };
+        let record = record.map_err(|error| refuse(count as u64 + 1, error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if record == header {
+            continue;
+        }
+        if count == 0 {
+            let wanted = header.iter().collect::<Vec<_>>().join(", ");
+            return Err(refuse(line, format!("the columns are not {wanted}")));
+        }
+        let row = row(&record, &header, request, &cells);
+        rows.push(row.map_err(|why| refuse(line, why))?);
+    }
+    Ok(rows)
+}
+
+fn row(
+    record: &StringRecord,
+    header: &StringRecord,
+    request: &MapRequest,
+    cells: &HashMap<Vec<String>, usize>,
+) -> Result<MapRow, String> {
+    if record.len() != header.len() {
+        return Err(format!("it has {} columns", record.len()));
+    }
+    let place = record.iter().take(request.axes.len());
+    let place: Vec<String> = place.map(String::from).collect();
+    let Some(&cell) = cells.get(&place) else {
+        return Err(format!("it has no cell {}", place.join(", ")));
+    };
+    match record.deserialize::<MapRow>(Some(header)) {
+        Ok(row) => Ok(MapRow {
+            cell,
+            detail: text_of_cell(&row.detail).into(),
+            ..row
+        }),
+        Err(error) => Err(match error.kind() {
+            csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
+            _ => error.to_string(),
+        }),
+    }
+}

@@ -1,0 +1,158 @@
+//! The text report of a simulation.
+
+use super::kit::*;
+use leafdyn::largest::{larger, largest};
+use leafdyn::simulate::{Reason, Record};
+
+/// What the rounding of many steps leaves of the largest energy in the others.
+const NOISE: f64 = 1e-13;
+
+/// Decimals of a position, relative to the longest rod.
+const DECIMALS: f64 = 7.0;
+
+impl Reported for Record {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, method {}", self.scenario, self.scheme)
+    }
+
+    fn lines(&self) -> Lines {
+        let mut lines = vec![
+            ("moved", moved(self)),
+            ("grid", format!("{} segments a vein", self.segments)),
+            ("step", step(self)),
+        ];
+        if self.choice.reason != Reason::Requested {
+            lines.push(("choice", self.choice.to_string()));
+        }
+        lines.extend(energy(self));
+        if let [tip] = self.tips.as_slice() {
+            let decimals = (DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
+            lines.push(("tip", point(tip.to_array(), decimals as usize)));
+        }
+        lines.push(("speed", speed(self)));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        let remark = labelled("remark", self.remark());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    }
+}
+
+fn moved(record: &Record) -> String {
+    let steps = record.moments.last().map_or(0, |moment| moment.steps);
+    let (time, outputs) = (brief(record.time), record.moments.len());
+    let reached = format!("t = {time} in {steps} steps, {outputs} outputs");
+    let (outcome, duration) = (record.outcome(), brief(record.duration));
+    match record.stopped {
+        None => format!("to {reached}"),
+        Some(_) => format!("{outcome}: only to {reached}, of t = {duration}"),
+    }
+}
+
+fn step(record: &Record) -> String {
+    let longest = match record.time_step {
+        Some(step) => format!("at most {step:.3e}"),
+        None => {
+            let error = power_of_ten(record.tolerance);
+            format!("so that its local error is within {error}")
+        }
+    };
+    match record.stable_step {
+        Some(bound) => {
+            let (step, limit) = (bound.step, bound.limit);
+            format!("{longest}, stable up to {step:.3e} ({limit})")
+        }
+        None => longest,
+    }
+}
+
+/// The energies at the end, and their balance, which should not have changed.
+fn energy(record: &Record) -> Lines {
+    let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
+        return Vec::new();
+    };
+    let e = &last.energy;
+    let parts = [
+        ("kinetic", e.kinetic),
+        ("elastic", e.elastic),
+        ("coupling", e.coupling),
+        ("potential", e.potential),
+        ("dissipated", e.dissipated),
+        ("work put in", e.work),
+    ];
+    let noise = NOISE * largest(parts.map(|(_, value)| value.abs()));
+    let digits = |value: f64| brief(rounded_to(value, noise));
+    let (start, end) = (first.energy.balance(), e.balance());
+    let change = end - start;
+    let [start, end] = [start, end].map(|value| known(value, larger(noise, change.abs())));
+    let change = digits(change);
+    let balance = format!("{start} at the start, {end} at the end: changed by {change}");
+    let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
+    vec![("energy", parts.join(", ")), ("balance", balance)]
+}
+
+fn speed(record: &Record) -> String {
+    let wall = record.wall_seconds;
+    let work = record.steps * record.rods * record.segments;
+    let all = format!("{} in all", seconds(wall));
+    if !(wall > 0.0 && work > 0) {
+        return all;
+    }
+    let (speed, each) = (brief(record.time / wall), 1e9 * wall / work as f64);
+    format!("{all}: {speed} of simulated time a second, {each:.0} ns a step and segment")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+    use leafdyn::simulate::Stopped;
+
+    /// The balance has the digits that its change leaves, and what is rounding is none.
+    #[test]
+    fn energies_have_the_digits_that_are_known() {
+        let mut record = sample::record(1, 4);
+        let last = record.moments.len() - 1;
+        let zero = record.moments[0].energy.map(|_| 0.0);
+        record.moments[0].energy = zero;
+        record.moments[0].energy.elastic = 4.068881005;
+        record.moments[last].energy = zero;
+        record.moments[last].energy.elastic = 4.076036413;
+        record.moments[last].energy.kinetic = 8.4e-30;
+        let report = record.report(Vec::new());
+        for part in [
+            "  energy   kinetic 0, elastic 4.076, ",
+            "  balance  4.07 at the start, 4.08 at the end: changed by 0.0071554\n",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+        record.moments[last].energy.elastic = 4.068881005 * (1.0 + 4e-16);
+        let report = record.report(Vec::new());
+        assert!(report.contains(": changed by 0\n"), "{report}");
+    }
+
+    #[test]
+    fn an_early_end_without_a_step_of_its_own() {
+        let mut record = sample::record(1, 4);
+        record.time_step = None;
+        record.stable_step = None;
+        record.stopped = Some(Stopped::Diverged {
+            otherwise: "another method",
+            time: 10.1,
+            percent: 70.0,
+        });
+        record.duration = 40.0;
+        let report = record.report(Vec::new());
+        for part in [
+            "swing: 1 vein, method explicit\n",
+            "  moved    diverged: only to t = 10 in ",
+            " steps, 101 outputs, of t = 40\n",
+            "  step     so that its local error is within 1.0×10⁻⁶\n",
+            "  remark   diverged at t = ",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+    }
+}

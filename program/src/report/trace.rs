@@ -1,0 +1,330 @@
+//! A trace, and a boundary, as text and as rows of CSV: every point of every branch or curve.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::kit::*;
+use super::numbers;
+use leafdyn::scenario::Units;
+use leafdyn::study::{
+    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,
+    Stuck, Trace, TraceBranch, TracePoint,
+};
+
+/// `value` is that of the varied number. Branches and points are numbered from 1. The tip is
+/// the joint one, or the first rod's.
+const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
+    negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
+
+/// Further columns if tips are held: the force on their holder.
+const REACTION: &str = ",reaction_x,reaction_y,reaction_z";
+
+impl Reported for Trace {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, followed", self.scenario)
+    }
+
+    fn lines(&self) -> Lines {
+        let [from, to] = self.range.map(|value| self.keys.text(value));
+        let mut lines = vec![("vary", format!("{} from {from} to {to}", self.keys))];
+        let branches = self.branches.iter().enumerate();
+        let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
+        lines.extend(labelled("branch", branches));
+        lines.extend(self.law.iter().map(|law| ("law", law_line(self, law))));
+        let errors = self.branches.iter().flat_map(|branch| &branch.points);
+        let errors = errors.filter_map(|point| point.error);
+        lines.extend(errors.reduce(f64::max).map(|worst| {
+            let (worst, segments) = (bound(worst), self.segments);
+            let what = error_location(self);
+            let error = format!("{what} within {worst}, followed on {segments} segments a vein");
+            ("error", error)
+        }));
+        let (count, time) = (self.factorizations, seconds(self.wall_seconds));
+        let work = format!("{count} factorisations to follow, {time} in all");
+        lines.push(("work", work));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    }
+}
+
+/// How a branch ended, its ends and its critical points.
+fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<String> {
+    let from = match branch.from {
+        Some([from, _]) => format!(", off branch {}", from + 1),
+        None => String::new(),
+    };
+    let (number, points) = (number + 1, branch.points.len());
+    let end = branch_end(&branch.end);
+    let mut lines = vec![format!("{number}{from}: {points} points, {end}")];
+    let first = branch.points.first();
+    lines.extend(first.map(|point| format!("  from {}", place(trace, point))));
+    let mut before = first.map_or(0, |point| point.index);
+    for (_, point) in branch.critical() {
+        lines.push(format!("  {}", critical(trace, point, before)));
+        before = point.index;
+    }
+    let last = branch.points.last();
+    lines.extend(last.map(|point| format!("  to {}", place(trace, point))));
+    lines.extend(branch.remark.iter().map(|remark| format!("  {remark}")));
+    lines
+}
+
+/// The fitted line of force against displacement.
+fn law_line(trace: &Trace, law: &Law) -> String {
+    let unit = slope_unit(&trace.units);
+    format!(
+        "force against displacement along {}: slope {}{unit}, R² = {:.7}, off the line by {:.2} % at most",
+        ['x', 'y', 'z'][law.axis],
+        brief(law.slope),
+        law.r_squared,
+        100.0 * law.deviation
+    )
+}
+
+/// The unit of force per displacement after a blank, or nothing if it is not known.
+pub fn slope_unit(units: &Units) -> String {
+    match (&units.force, &units.length) {
+        (Some(force), Some(length)) => format!(" {force}/{length}"),
+        _ => String::new(),
+    }
+}
+
+pub fn error_location(trace: &Trace) -> &'static str {
+    match trace.held {
+        true => "middles of the veins",
+        false => "tips",
+    }
+}
+
+fn place(trace: &Trace, point: &TracePoint) -> String {
+    let stability = stable_or_index(point.index);
+    let tip = match &point.tips[..] {
+        [tip] if point.reaction.is_none() => {
+            let error = point.error.unwrap_or(WITHOUT_ERROR * tip.length());
+            let decimals = decimals_within(error.max(ROUNDING * tip.length()));
+            format!(", tip {}", numbers::point(tip.to_array(), decimals))
+        }
+        _ => String::new(),
+    };
+    let reaction = point.reaction.map(|force| {
+        let error = trace.tolerance * force.length();
+        let [x, y, z] = force.to_array().map(|it| short(rounded_to(it, error)));
+        format!(", reaction ({x}, {y}, {z})")
+    });
+    let reaction = reaction.unwrap_or_default();
+    let value = value_of(trace, point);
+    format!("{value}: {stability}{tip}{reaction}")
+}
+
+/// The number that varies at a point: as it was prescribed, or with the digits that its error
+/// leaves.
+fn value_of(trace: &Trace, point: &TracePoint) -> String {
+    match point.value_error {
+        Some(error) => known(point.value, error),
+        None => trace.keys.text(point.value),
+    }
+}
+
+/// Part of its distance from the base to which a tip without an error is told.
+const WITHOUT_ERROR: f64 = 1e-3;
+
+fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
+    let what = match point.kind {
+        PointKind::Fold => "fold".into(),
+        PointKind::Branching(1) | PointKind::Regular => "branches cross".into(),
+        PointKind::Branching(modes) => format!("branches cross in {modes} directions"),
+    };
+    let within = match point.value_error {
+        Some(error) => format!(", within {}", power_of_ten(error)),
+        None => String::new(),
+    };
+    let (value, after) = (value_of(trace, point), point.index);
+    format!("{what} at {value}{within}: index {before} to {after}")
+}
+
+/// `trace.csv`: one row per branch and point.
+pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+    let (reaction, more) = if trace.held { (REACTION, 3) } else { ("", 0) };
+    out.write_all(&header(&[COLUMNS, reaction].concat()))?;
+    let mut table = csv_without_header(out);
+    for (number, branch) in trace.branches.iter().enumerate() {
+        for point in &branch.points {
+            let reaction = point.reaction.unwrap_or_default().to_array();
+            let reaction = reaction.map(|x| x + 0.0);
+            table.serialize((number + 1, point.point, cells(point), &reaction[..more]))?;
+        }
+    }
+    table.flush()
+}
+
+/// The columns from `kind` to `twist`.
+fn cells(point: &TracePoint) -> impl Serialize {
+    let tip = point.tips.first();
+    // Adding zero turns -0 into 0.
+    let tip = tip.map_or([f64::NAN; 3], |tip| tip.to_array().map(|x| x + 0.0));
+    let multiplicity = match point.kind {
+        PointKind::Branching(modes) => Some(modes),
+        _ => None,
+    };
+    let margin = point.undulation.margin();
+    (
+        (point.kind.word(), point.value, point.value_error),
+        (tip, point.error, point.energy),
+        (point.index, point.index == 0, multiplicity),
+        margin.map(|vein| vein.waves()),
+        margin.map(|vein| vein.amplitude),
+        point.undulation.twist() + 0.0,
+    )
+}
+
+impl Reported for Boundary {
+    fn heading(&self) -> String {
+        let veins = veins_of(self.rods, self.joined);
+        format!("{}: {veins}, the boundary", self.scenario)
+    }
+
+    fn lines(&self) -> Lines {
+        let vary = self.keys.iter().zip(self.ranges).map(|(keys, [from, to])| {
+            format!("{keys} from {} to {}", keys.text(from), keys.text(to))
+        });
+        let mut lines = labelled("vary", vary);
+        let second = &self.keys[1];
+        let start = format!("at {second} = {}", second.text(self.start));
+        lines.push(("begun", start));
+        let curves = self.curves.iter().enumerate();
+        let curves = curves.flat_map(|(number, curve)| curve_lines(self, number, curve));
+        lines.extend(labelled("curve", curves));
+        let points = self.curves.iter().flat_map(|curve| &curve.points);
+        let worst = points.map(|point| point.error).reduce(f64::max);
+        lines.extend(worst.map(|worst| ("error", format!("tips within {}", bound(worst)))));
+        lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
+        lines.push(("work", format!("{} in all", seconds(self.wall_seconds))));
+        lines
+    }
+
+    fn remarks(&self) -> Lines {
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("doubtful", self.doubts.clone())].concat()
+    }
+}
+
+/// The kind of a curve, its ends and its special points.
+fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec<String> {
+    let what = sides(curve).unwrap_or_else(|| "no point verified".into());
+    let (number, points) = (number + 1, curve.points.len());
+    let mut lines = vec![format!("{number}: {points} points, {what}")];
+    let end = |label: &str, point: Option<&BoundaryPoint>, end: usize| {
+        let phrase = curve_end(&curve.ends[end]);
+        let at = point.map_or(String::new(), |point| place_in_plane(boundary, point));
+        format!("  {label} {at}: {phrase}")
+    };
+    lines.push(end("from", curve.points.first(), 0));
+    let special = curve.points.iter().filter(|point| is_special(point));
+    lines.extend(
+        special.map(|point| format!("  {} at {}", point.kind, place_in_plane(boundary, point))),
+    );
+    lines.push(end("to", curve.points.last(), 1));
+    lines
+}
+
+/// How a curve ended on one of its sides, as a phrase.
+fn curve_end(end: &End) -> &'static str {
+    match end {
+        End::Reached | End::Returned => "the end of a range",
+        End::Closed => "closed",
+        End::Met => "on a curve above",
+        End::MostPoints | End::Enough => "goes on: allow more points",
+        End::Stuck(Stuck::Unfolded) => {
+            "the second number breaks the symmetry by which branches cross"
+        }
+        End::Stuck(Stuck::Separated) => "modes that become neutral together part",
+        End::Stuck(Stuck::OutOfRange(_)) => "no leaf is there",
+        End::Stuck(_) => "lost",
+        End::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
+        End::Unverified(Doubt::OtherIndex) => "not verified: finer grids have another index",
+        End::Unverified(Doubt::Inaccurate) => "not verified: the tolerance is not reached",
+        End::Unverified(_) => "not verified: finer grids have another curve",
+    }
+}
+
+/// Most disagreeing cells that are listed.
+const MOST_NAMED: usize = 5;
+
+/// Whether the map agrees with the curves.
+fn map_lines(map: &BoundaryMap) -> Vec<String> {
+    let (columns, rows) = (map.first.len(), map.second.len());
+    let verdict = match map.disagreeing.len() {
+        0 => "all as the curves say".into(),
+        count => format!("{count} not as the curves say: others may begin elsewhere"),
+    };
+    let known = format!("{} with an equilibrium of the branch", map.known());
+    let mut lines = vec![format!("{columns} x {rows} cells, {known}, {verdict}")];
+    let named = map.disagreeing.iter().take(MOST_NAMED);
+    lines.extend(named.map(|[column, row]| {
+        let (first, second) = (map.first[column - 1], map.second[row - 1]);
+        let what = map.index[row - 1][column - 1];
+        let what = what.map_or("none".into(), |index| format!("index {index}"));
+        format!("  at ({}, {}): {what}", brief(first), brief(second))
+    }));
+    lines
+}
+
+/// How the index changes across a curve.
+pub fn sides(curve: &BoundaryCurve) -> Option<String> {
+    let point = curve.points.first()?;
+    let what = match (point.kind, curve.multiplicity) {
+        ("fold" | "cusp", _) => "fold".into(),
+        (_, 1) => "branches cross".into(),
+        (_, modes) => format!("branches cross in {modes} directions"),
+    };
+    let (before, after) = (point.index_before, point.index_behind);
+    Some(format!("{what}: index {before} to {after}"))
+}
+
+/// Whether a point is a cusp or a crossing.
+pub fn is_special(point: &BoundaryPoint) -> bool {
+    matches!(point.kind, "cusp" | "crossing")
+}
+
+fn place_in_plane(boundary: &Boundary, point: &BoundaryPoint) -> String {
+    let number = |i: usize| match point.errors[i] {
+        0.0 => boundary.keys[i].text(point.values[i]),
+        error => {
+            let value = known(point.values[i], error);
+            format!("{value} within {}", power_of_ten(error))
+        }
+    };
+    format!("({}, {})", number(0), number(1))
+}
+
+/// `boundary.csv`: one row per curve and point, with columns named by the keys.
+pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()> {
+    let [first, second] = &boundary.keys;
+    let errors = "error_1,error_2,tip_x,tip_y,tip_z,error,index_before,index_behind";
+    out.write_all(&header(&format!(
+        "curve,point,kind,{first},{second},{errors}"
+    )))?;
+    let mut table = csv_without_header(out);
+    for (number, curve) in boundary.curves.iter().enumerate() {
+        for point in &curve.points {
+            // The joint tip, or the first rod's; adding zero turns -0 into 0.
+            let tip = point.tips.first();
+            let tip = tip.map_or([f64::NAN; 3], |tip| tip.to_array());
+            table.serialize((
+                (number + 1, point.point, point.kind),
+                point.values,
+                point.errors,
+                tip.map(|x| x + 0.0),
+                point.error,
+                (point.index_before, point.index_behind),
+            ))?;
+        }
+    }
+    table.flush()
+}

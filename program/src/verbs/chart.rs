@@ -1,0 +1,104 @@
+//! `leafdyn chart`: charts speed against accuracy.
+
+use std::path::PathBuf;
+
+use super::kit::*;
+use crate::files;
+use crate::report::words::contender;
+use leafdyn::relax;
+use leafdyn::study::{self, Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
+
+/// Measure every method over its own accuracy, and chart time against true error.
+///
+/// Exit status: 0 charted; 1 two independent methods do not confirm the
+/// reference that errors are measured against (the files are still written and
+/// say so); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct Chart {
+    #[command(flatten)]
+    request: Request,
+
+    /// About how long to measure; slow runs are made once whatever they take
+    #[arg(long, value_name = "S", default_value_t = ChartOptions::default().seconds, allow_negative_numbers = true)]
+    seconds: f64,
+
+    /// Chart these methods only
+    #[arg(long, value_name = "LIST", value_parser = words::<Contender>(Contender::ALL.map(Contender::word)), value_delimiter = ',')]
+    methods: Vec<Contender>,
+
+    /// Measurements of other programs, as benches/peers writes them; may repeat
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    peers: Vec<PathBuf>,
+
+    /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    rods: Vec<usize>,
+}
+
+impl Chart {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let traits = VerbTraits {
+            reads: &self.peers,
+            puts: Some("--rods"),
+            ..VerbTraits::default()
+        };
+        self.request.each::<Charted>(traits, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+        let scenario = &job.scenario;
+        if self.request.tolerance.is_some() && self.rods.is_empty() {
+            let why = "a chart runs over all tolerances; it is that of --rods";
+            return Err(format!("--tolerance: {why}").into());
+        }
+        let rods: Keys = "leaf.rods".parse()?;
+        let leaf = |&count: &usize| Ok(job.base.at(&[(&rods, count as f64)])?.scenario);
+        let leaves: Result<Vec<_>, VaryError> = self.rods.iter().map(leaf).collect();
+        let leaves = leaves?;
+        let mut options = ChartOptions {
+            seconds: self.seconds,
+            ..ChartOptions::default()
+        };
+        if !self.methods.is_empty() {
+            let wanted = |who: &Contender| self.methods.contains(who);
+            options.contenders.retain(wanted);
+        }
+        for file in &self.peers {
+            options.peers.extend(files::read_peers(file)?);
+        }
+        let mut line = job.progress();
+        let (mut rounds, mut first) = (0, 1);
+        let mut progress = |turn: &Turn| {
+            // All contenders run in the first rounds; later the number of rounds changes.
+            if turn.rounds != rounds {
+                (rounds, first) = (turn.rounds, turn.round);
+                line.next_phase();
+            }
+            let fraction = fraction_of(turn.round - first, rounds - first + 1);
+            line.update(fraction, || {
+                let Turn {
+                    rods, knob, round, ..
+                } = turn;
+                let who = contender(turn.contender);
+                format!("{rods} veins, {who}, {knob}, round {round} of {rounds}")
+            });
+        };
+        // The options of the scaling are checked before the chart is made.
+        let tolerance = self.request.tolerance.unwrap_or(scenario.tolerance);
+        relax::check_tolerance(tolerance)?;
+        let mut chart = study::chart(scenario, &options, &mut progress)?;
+        if !leaves.is_empty() {
+            chart.scaling = Some(study::scaling(&leaves, tolerance, &options, &mut progress)?);
+        }
+        drop(line);
+        for remark in &chart.remarks {
+            job.remark(Some(remark));
+        }
+        let scaling = chart.scaling.iter();
+        let mut confirmed = scaling.map(|scaling| scaling.unconfirmed.is_empty());
+        let success = chart.confirmed() && confirmed.all(|confirmed| confirmed);
+        let scaling = chart.scaling.iter().map(|scaling| job.write(scaling));
+        let written = [job.write(&chart)].into_iter().chain(scaling);
+        job.deliver_written(&chart, success, &chart, written)
+    }
+}

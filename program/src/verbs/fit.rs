@@ -1,0 +1,91 @@
+//! `leafdyn fit`: fits numbers of a scenario to measurements.
+
+use std::path::PathBuf;
+
+use super::kit::*;
+use leafdyn::relax::Limit;
+use leafdyn::scenario::text;
+use leafdyn::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
+
+/// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
+///
+/// Exit status: 0 a minimum at which the data determine every free number; 1 not
+/// (the files are still written and say which); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct Fit {
+    #[command(flatten)]
+    request: Request,
+
+    /// Measured data as CSV, with a header: experiments (keys of the scenario, results, their sd_), or points on veins (rod, sigma, x, y, z, sd, experiment); may repeat
+    #[arg(long, value_name = "FILE.csv", required = true, value_hint = ValueHint::FilePath)]
+    data: Vec<PathBuf>,
+
+    /// A number that is free, by its key as in --vary, and its bounds; of a list or a profile every entry; may repeat
+    #[arg(
+        long,
+        value_name = "KEY[=LOW..HIGH]",
+        required = true,
+        allow_negative_numbers = true
+    )]
+    free: Vec<Free>,
+
+    /// Let data far off the others count less
+    #[arg(long)]
+    robust: bool,
+
+    /// Experiments that could be made, as CSV like the data: which would say most?
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    candidates: Option<PathBuf>,
+}
+
+impl Fit {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let reads: Vec<_> = self.data.iter().chain(&self.candidates).cloned().collect();
+        let traits = VerbTraits {
+            varies: true,
+            reads: &reads,
+            ..VerbTraits::default()
+        };
+        self.request.each::<Fitted>(traits, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+        let base = job.base.clone();
+        let mut data = Data::default();
+        let rods = base.scenario().rods.len();
+        for file in &self.data {
+            data.read(&text(file)?, &file.display().to_string(), rods)?;
+        }
+        let candidates = match &self.candidates {
+            Some(file) => FitRequest::read_candidates(&text(file)?, &file.display().to_string())?,
+            None => Vec::new(),
+        };
+        let request = FitRequest {
+            base,
+            data,
+            free: self.free.clone(),
+            robust: self.robust,
+            candidates,
+            tolerance: self.request.tolerance,
+            limit: Limit::default(),
+        };
+        let mut line = job.progress();
+        let mut profiling = false;
+        let fit = study::fit(&request, &mut |now| {
+            let FitStep { step, sum, known } = *now;
+            if known.is_some() && !std::mem::replace(&mut profiling, true) {
+                line.next_phase();
+            }
+            let fraction = known.and_then(|(known, all)| fraction_of(known, all));
+            let intervals = known.map_or(String::new(), |(known, all)| {
+                format!("{known} of {all} intervals, ")
+            });
+            line.update(fraction, || {
+                format!("{intervals}step {step}, sum of squares {sum:.6e}")
+            });
+        })?;
+        drop(line);
+        job.remark(fit.remarks.first());
+        job.deliver(&fit, fit.is_success())
+    }
+}

@@ -1,0 +1,278 @@
+//! The command line, with one file per verb. All computations are in the library.
+
+mod chart;
+mod check;
+mod fit;
+mod help;
+mod job;
+mod map;
+mod progress;
+mod relax;
+mod request;
+mod simulate;
+mod trace;
+
+use std::env;
+use std::error::Error;
+use std::ffi::OsString;
+use std::io::{self, IsTerminal, Write};
+use std::process::{self, ExitCode};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use clap::{Parser, Subcommand};
+
+use crate::files::{self, Checkpointer};
+use crate::report::{FileError, Refused, json, numbers::brief};
+use leafdyn::relax::RelaxError;
+use leafdyn::scenario::printable;
+use leafdyn::study::{ChartError, MapRefused, TraceError};
+
+/// What verbs are made of.
+mod kit {
+    pub(super) use super::job::{Delivered, Job};
+    pub(super) use super::progress::{ProgressLine, duration, fraction_between, fraction_of};
+    pub(super) use super::request::{Request, VerbTraits, words};
+    pub(super) use super::{Refusal, Status};
+    pub(super) use clap::{Args, ValueHint};
+}
+
+/// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
+#[derive(Debug, Parser)]
+#[command(name = "leafdyn", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Relax(relax::Relax),
+    Check(check::Check),
+    Fit(fit::Fit),
+    Chart(chart::Chart),
+    Map(map::Map),
+    Simulate(simulate::Simulate),
+    Trace(trace::Trace),
+    New(help::New),
+    Schema(help::Schema),
+    Completions(help::Completions),
+    Man(help::Man),
+}
+
+impl Cli {
+    fn run(self) -> Result<Status, Refusal> {
+        let done = match self.verb {
+            Verb::Relax(relax) => relax.run(),
+            Verb::Check(check) => check.run(),
+            Verb::Fit(fit) => fit.run(),
+            Verb::Chart(chart) => chart.run(),
+            Verb::Map(map) => map.run(),
+            Verb::Simulate(simulate) => simulate.run(),
+            Verb::Trace(trace) => trace.run(),
+            Verb::New(new) => new.run(),
+            Verb::Schema(schema) => schema.run(),
+            Verb::Completions(completions) => completions.run(),
+            Verb::Man(man) => man.run(),
+        };
+        done.map_err(name_options)
+    }
+}
+
+/// Whether a refusal is one of the library about an option: others may begin with any words, such
+/// as the name of a file.
+fn is_about_an_option(refusal: &Refusal) -> bool {
+    let of_trace = refusal.downcast_ref::<TraceError>();
+    let of_chart = refusal.downcast_ref::<ChartError>();
+    refusal.is::<RelaxError>()
+        || refusal.is::<leafdyn::simulate::Refused>()
+        || refusal.is::<MapRefused>()
+        || matches!(of_trace, Some(TraceError::Relax(_) | TraceError::Option(_)))
+        || matches!(
+            of_chart,
+            Some(ChartError::Relax(_) | ChartError::Seconds(_))
+        )
+}
+
+/// Rewrites a message of the library about an option as the user types it:
+/// `segments = 2: ...` becomes `--segments 2: ...`.
+fn name_options(refusal: Refusal) -> Refusal {
+    const OPTIONS: [&str; 7] = [
+        "cell-seconds",
+        "intervals",
+        "method",
+        "modes",
+        "seconds",
+        "segments",
+        "step",
+    ];
+    let text = refusal.to_string();
+    if let Some(text) = text.strip_suffix("raise the limit on memory") {
+        return format!("{text}raise the limit with --memory").into();
+    }
+    match text.split_once(' ') {
+        Some((option, rest)) if OPTIONS.contains(&option) && is_about_an_option(&refusal) => {
+            format!("--{option} {}", rest.trim_start_matches("= ")).into()
+        }
+        _ => refusal,
+    }
+}
+
+/// Runs the program with the arguments of the process, and returns its exit status.
+pub fn main() -> ExitCode {
+    main_with(env::args_os().collect()).into()
+}
+
+/// Runs the program with these arguments, the first of which is its name.
+pub fn main_with(arguments: Vec<OsString>) -> u8 {
+    // Found before parsing, which may fail.
+    let json = arguments.iter().any(|argument| argument == "--json");
+    JSON.store(json, Ordering::Relaxed);
+    let command_line = match Cli::try_parse_from(arguments) {
+        Ok(command_line) => command_line,
+        Err(error) if error.use_stderr() => {
+            let message = error.render().to_string() + suggestion(&error);
+            let message = message.trim_start_matches("error: ").trim_end();
+            return refuse(message, json) as u8;
+        }
+        // Help, or the version.
+        Err(help) => help.exit(),
+    };
+    let interrupted = stop_at_once_on_interrupt();
+    let status = interrupted.and_then(|()| command_line.run());
+    status.unwrap_or_else(|refusal| refuse(&refusal.to_string(), json)) as u8
+}
+
+/// Whether standard output is JSON.
+static JSON: AtomicBool = AtomicBool::new(false);
+
+/// Reports an error on standard error and, with `json`, as JSON on standard output.
+fn refuse(error: &str, json: bool) -> Status {
+    note(&format!("error: {error}"));
+    if json {
+        show_refused(error, Status::Refused as i32);
+    }
+    Status::Refused
+}
+
+fn show_refused(error: &str, exit_status: i32) {
+    let mut bytes = Vec::new();
+    if json::write(&Refused::new(error, exit_status), &mut bytes).is_ok() {
+        // A failure to report the error cannot be reported.
+        let _ = show(&bytes);
+    }
+}
+
+/// How to get a scenario, if none is named.
+fn suggestion(error: &clap::Error) -> &'static str {
+    let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
+    match missing && error.to_string().contains("<SCENARIO>") {
+        false => "",
+        true => {
+            "\nA scenario says what the leaf is made of. To begin with one of your own:\n  \
+             leafdyn new leaf        writes leaf.toml; leafdyn new --help: what else there is\n  \
+             leafdyn relax leaf.toml"
+        }
+    }
+}
+
+/// Why a request was refused or failed: a message that says what to change.
+type Refusal = Box<dyn Error + Send + Sync>;
+
+/// Exit status of the process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Status {
+    /// At rest within the tolerance; of a check: both methods agree; of a
+    /// simulation: followed to its end; of a chart: its reference is confirmed.
+    Success = 0,
+    /// The run ended otherwise: not at rest within the tolerance; of a check:
+    /// the methods differ or could not be compared; of a simulation: it ended
+    /// early; of a chart: its reference is not confirmed. The results are written
+    /// in any case.
+    Failure = 1,
+    /// The request was refused, or its result could not be written.
+    Refused = 2,
+}
+
+impl Status {
+    fn of(success: bool) -> Self {
+        match success {
+            true => Status::Success,
+            false => Status::Failure,
+        }
+    }
+}
+
+/// Status of a run ended by Ctrl-C: 128 and the number of the signal.
+const INTERRUPTED: i32 = 130;
+
+/// Writes a checkpoint of the running simulation, if any, when the process is stopped.
+static CHECKPOINTER: Mutex<Option<Checkpointer>> = Mutex::new(None);
+
+/// Makes Ctrl-C end the process at once, without half-written files and with a
+/// checkpoint of a simulation.
+fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
+    ctrlc::set_handler(|| {
+        let kept = checkpointer()
+            .as_ref()
+            .and_then(Checkpointer::write_and_stop);
+        files::abandon_unfinished();
+        if io::stderr().is_terminal() {
+            // Clears the progress line.
+            let _ = write!(io::stderr(), "\r\x1b[2K");
+        }
+        let status = match kept {
+            Some(kept) if !show_checkpoint(&kept) => Status::Refused as i32,
+            _ => INTERRUPTED,
+        };
+        if JSON.load(Ordering::Relaxed) {
+            show_refused("stopped by Ctrl-C", status);
+        }
+        process::exit(status);
+    })?;
+    Ok(())
+}
+
+/// Makes Ctrl-C write a checkpoint from now on.
+fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
+    *self::checkpointer() = Some(checkpointer);
+}
+
+fn checkpointer() -> MutexGuard<'static, Option<Checkpointer>> {
+    // It is only replaced as a whole, so it is valid even if the lock is poisoned.
+    CHECKPOINTER.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Reports the time of a checkpoint, or why it could not be written; returns whether it was.
+fn show_checkpoint(kept: &Result<f64, FileError>) -> bool {
+    note(&match kept {
+        Ok(time) => format!("stopped at t = {}; go on with --resume", brief(*time)),
+        Err(error) => format!("error: {error}"),
+    });
+    kept.is_ok()
+}
+
+/// Prints a line to standard error; failures are ignored.
+fn note(line: &str) {
+    let _ = writeln!(io::stderr(), "{}", printable(line));
+}
+
+/// Prints a report to standard output.
+fn show_report(report: &str) -> Result<(), Refusal> {
+    show(printable(report).as_bytes())
+}
+
+/// Writes to standard output. Whoever reads a report may close it when he has seen enough
+/// (`| head`); of JSON half is of no use.
+fn show(bytes: &[u8]) -> Result<(), Refusal> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+        Err(error)
+            if error.kind() == io::ErrorKind::BrokenPipe && !JSON.load(Ordering::Relaxed) =>
+        {
+            Ok(())
+        }
+        Err(error) => Err(format!("cannot write to standard output: {error}").into()),
+        Ok(()) => Ok(()),
+    }
+}

@@ -1,0 +1,390 @@
+//! The options common to all verbs, and how a verb runs over its scenarios: folders,
+//! files and output.
+
+use std::collections::HashMap;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueHint};
+use rayon::prelude::*;
+
+use crate::files::{self, Kind, Selection, Written};
+use crate::report::table::{list_files, rows_of_json};
+use crate::report::{Refused, json};
+use leafdyn::memory;
+use leafdyn::scenario::Entries;
+use leafdyn::study::Base;
+use leafdyn::study::UnknownWord;
+
+use super::job::{Delivered, Job, attempt};
+use super::progress::{ProgressLine, fraction_of};
+use super::{Refusal, Status, name_options, note, refuse, show, show_report};
+
+/// What every verb is asked.
+#[derive(Debug, Args)]
+pub struct Request {
+    /// The leaf, as a TOML file, or JSON of a result; - is standard input; of several each has a folder of its own, and all one table
+    #[arg(value_name = "SCENARIO", required = true, value_hint = ValueHint::FilePath)]
+    scenarios: Vec<PathBuf>,
+
+    /// Wanted accuracy of the centerlines, relative to the largest rod length; in time, of a semi-implicit step; overrides the scenario's
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub tolerance: Option<f64>,
+
+    /// Override one entry of the scenario, as in --set load.gravity=[0,0,-0.5]; may repeat
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+
+    /// Where files go [default: out/<name of the scenario>]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    out: Option<PathBuf>,
+
+    /// Which files to write: some of json, csv, svg, png, html, vtk, glb, gif, or none [default: those of the first four that the verb has]
+    #[arg(long, value_name = "LIST", value_parser = kinds)]
+    write: Option<Kinds>,
+
+    /// Write K + 1 equally spaced stations of every vein [default: those of the finest grid, at least 17]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=MOST_STATIONS))]
+    stations: Option<u32>,
+
+    /// Most memory that the request may take, as in 2GB; what would take more is refused before it starts [default: half of what the machine has]
+    #[arg(long, value_name = "SIZE", value_parser = memory::parse)]
+    memory: Option<u64>,
+
+    /// Print the result as JSON on standard output and nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+/// Most stations that can be requested.
+const MOST_STATIONS: i64 = 1_000_000;
+
+/// A list of kinds of files.
+#[derive(Clone, Debug)]
+struct Kinds(Vec<Kind>);
+
+fn kinds(list: &str) -> Result<Kinds, String> {
+    if list.trim() == "none" {
+        return Ok(Kinds(Vec::new()));
+    }
+    let kind = |word: &str| {
+        word.trim().parse().map_err(|_| {
+            let words = Kind::ALL.map(Kind::word).join(", ");
+            format!("{word}: must be some of {words}, with commas between them, or none")
+        })
+    };
+    list.split(',')
+        .map(kind)
+        .collect::<Result<_, _>>()
+        .map(Kinds)
+}
+
+/// Parses one of these words.
+pub fn words<T>(words: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = UnknownWord> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
+}
+
+/// How a verb treats its scenarios.
+#[derive(Clone, Copy, Default)]
+pub struct VerbTraits<'f> {
+    /// Whether it varies numbers of the scenario and settings of methods.
+    pub varies: bool,
+    /// Whether the stations in its files can be chosen.
+    pub stations: bool,
+    /// Whether scenarios run in parallel; otherwise one after the other, each on all
+    /// cores.
+    pub parallel: bool,
+    /// Files that it reads besides its scenarios.
+    pub reads: &'f [PathBuf],
+    /// The option besides --set that puts values into its scenarios.
+    pub puts: Option<&'f str>,
+}
+
+impl Request {
+    /// Runs a verb whose results are `R` for every scenario.
+    pub fn each<R: Written>(
+        &self,
+        traits: VerbTraits,
+        run: impl Fn(&Job) -> Result<Delivered, Refusal> + Sync,
+    ) -> Result<Status, Refusal> {
+        self.memory.into_iter().for_each(memory::allow);
+        let selection = self.selection::<R>(traits)?;
+        self.check_scenarios::<R>(traits, &selection)?;
+        let job = |file: &Path| self.open::<R>(file, traits, &selection);
+        if let [file] = self.scenarios.as_slice() {
+            let done = attempt(&job(file)?, &run);
+            let done = done.map_err(|refusal| self.as_typed(traits, refusal))?;
+            match self.json {
+                true => show(&done.json)?,
+                false => show_report(&done.report)?,
+            }
+            // The JSON output includes an error.
+            let refused = done.error.map(|error| refuse(&error, false));
+            return Ok(refused.unwrap_or(done.status));
+        }
+        // All are checked before the first is solved.
+        let jobs: Vec<_> = self.scenarios.iter().map(|file| job(file)).collect();
+        let mut folders = HashMap::new();
+        for job in jobs.iter().flatten() {
+            if let Some(other) = folders.insert(&job.folder, &job.file) {
+                let (file, name) = (&job.file, &job.scenario.name);
+                let why = "give one of them another name";
+                return Err(format!("{other} and {file} are both named {name}: {why}").into());
+            }
+        }
+        let line = Mutex::new(ProgressLine::new("scenarios", true));
+        let finished = AtomicUsize::new(0);
+        let solve = |job: Result<Job, Refusal>| {
+            let done = job.and_then(|job| {
+                attempt(&job, &run).map_err(|refusal| self.as_typed(traits, refusal))
+            });
+            let done = done.map_err(|refusal| name_options(refusal).to_string());
+            let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
+            if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
+                let all = self.scenarios.len();
+                line.update(fraction_of(count, all), || format!("{count} of {all}"));
+            }
+            done
+        };
+        let done: Vec<_> = match traits.parallel {
+            true => jobs.into_par_iter().map(solve).collect(),
+            false => jobs.into_iter().map(solve).collect(),
+        };
+        self.finish::<R>(&selection, done)
+    }
+
+    /// Names the option that put a refused value into a scenario, if it was not --set.
+    fn as_typed(&self, traits: VerbTraits, refusal: Refusal) -> Refusal {
+        let text = refusal.to_string();
+        let said = (text.strip_prefix("--set ")).and_then(|rest| rest.split_once(": "));
+        match (traits.puts, said) {
+            (Some(option), Some((given, why))) if !self.overrides.iter().any(|it| it == given) => {
+                format!("{option}: with {given}: {why}").into()
+            }
+            _ => refusal,
+        }
+    }
+
+    /// Checks what the scenarios share: standard input, and the table of several.
+    fn check_scenarios<R: Written>(
+        &self,
+        traits: VerbTraits,
+        selection: &Selection,
+    ) -> Result<(), Refusal> {
+        let from_input = self.scenarios.iter().filter(|path| path.as_os_str() == "-");
+        if from_input.count() > 1 {
+            return Err("standard input can be read only once: name one - and files".into());
+        }
+        if !self.single() && selection.kinds.contains(&Kind::Csv) {
+            let (folder, name) = self.table::<R>();
+            files::check_inputs(folder, &[&name], self.inputs(traits))?;
+            if self.out.is_none() {
+                files::check_table(&folder.join(name), &self.scenarios)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All files that are read.
+    fn inputs<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
+        self.scenarios.iter().chain(traits.reads)
+    }
+
+    /// The folder and the name of the table of several scenarios.
+    fn table<R: Written>(&self) -> (&Path, String) {
+        let name = match R::JSON.and_then(|name| name.strip_suffix(".json")) {
+            None | Some("summary") => "table.csv".to_string(),
+            Some(verb) => format!("{verb}_table.csv"),
+        };
+        (self.out.as_deref().unwrap_or(Path::new("out")), name)
+    }
+
+    /// Outputs the results of several scenarios, and writes their table.
+    fn finish<R: Written>(
+        &self,
+        selection: &Selection,
+        all: Vec<Result<Delivered, String>>,
+    ) -> Result<Status, Refusal> {
+        let mut status = Status::Success;
+        let (mut documents, mut errors) = (Vec::new(), Vec::new());
+        for (done, file) in all.into_iter().zip(&self.scenarios) {
+            let (this, error, json) = match done {
+                Ok(done) => {
+                    if !self.json {
+                        show_report(&done.report)?;
+                    }
+                    (done.status, done.error, done.json)
+                }
+                Err(error) => {
+                    let mut json = Vec::new();
+                    json::write(&Refused::new(&error, 2), &mut json)?;
+                    (Status::Refused, Some(error), json)
+                }
+            };
+            let refused = error.is_some();
+            errors.extend(error);
+            status = status.max(if refused { Status::Refused } else { this });
+            documents.push((file.display().to_string(), this as i32, json));
+        }
+        for error in errors {
+            note(&format!("error: {error}"));
+        }
+        if selection.kinds.contains(&Kind::Csv) {
+            let (out, name) = self.table::<R>();
+            let rows = rows_of_json(&documents)?;
+            let file = files::write_table(out, &name, &rows)?;
+            if !self.json {
+                show_report(&format!("table      {}\n", list_files(out, &[file])))?;
+            }
+        }
+        if self.json {
+            let texts = documents.iter().map(|(_, _, json)| json.trim_ascii());
+            let texts: Vec<_> = texts.collect();
+            show(&[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat())?;
+        }
+        Ok(status)
+    }
+
+    /// The files to write; refused if the verb has no such files.
+    fn selection<R: Written>(&self, traits: VerbTraits) -> Result<Selection, Refusal> {
+        let has: Vec<Kind> = R::names().map(Kind::of).collect();
+        let has = |kind: &Kind| has.contains(kind) || !self.single() && *kind == Kind::Csv;
+        let stations = self.stations.map(|count| count as usize);
+        if let (Some(count), false) = (stations, traits.stations) {
+            return Err(format!("--stations {count}: the files of this verb have none").into());
+        }
+        let kinds = match &self.write {
+            Some(Kinds(kinds)) => kinds.clone(),
+            None => Kind::USUAL.into_iter().filter(has).collect(),
+        };
+        if let Some(kind) = kinds.iter().find(|kind| !has(kind)) {
+            let all = Kind::ALL.into_iter().filter(has).map(Kind::word);
+            let (word, all) = (kind.word(), all.collect::<Vec<_>>().join(", "));
+            return Err(format!("--write {word}: this verb writes {all}").into());
+        }
+        Ok(Selection { kinds, stations })
+    }
+
+    /// Opens a scenario and chooses the folder for its files; refused before the run if
+    /// the folder is not writable.
+    fn open<R: Written>(
+        &self,
+        path: &Path,
+        traits: VerbTraits,
+        selection: &Selection,
+    ) -> Result<Job, Refusal> {
+        let (file, text) = match path.to_str() {
+            Some("-") => ("standard input".into(), standard_input()?),
+            _ => (path.display().to_string(), leafdyn::scenario::text(path)?),
+        };
+        let base = Base::new(
+            &Entries::of_text(&text, &file)?,
+            &self.overrides,
+            traits.varies,
+        )?;
+        let scenario = base.scenario().clone();
+        if let Some(stations) = selection.stations {
+            memory::stations(scenario.rods.len(), stations)?;
+        }
+        let folder = match &self.out {
+            Some(out) if self.single() => out.clone(),
+            out => {
+                // Names of scenarios are names of folders.
+                let out = out.as_deref().unwrap_or(Path::new("out"));
+                out.join(&scenario.name)
+            }
+        };
+        let source = match path.to_str() {
+            Some("-") => "-".into(),
+            _ => files::source(&folder, path),
+        };
+        if !selection.kinds.is_empty() {
+            files::check_writable(&folder)?;
+            files::check_inputs(&folder, &R::replaced(&selection.kinds), self.inputs(traits))?;
+            if self.out.is_none() || !self.single() {
+                files::check_source(&folder, &source)?;
+            }
+        }
+        Ok(Job {
+            json: self.json,
+            single: self.single(),
+            scenario,
+            base,
+            folder,
+            selection: selection.clone(),
+            file,
+            source,
+            parallel: traits.parallel && !self.single(),
+        })
+    }
+
+    /// Whether it is about one scenario only.
+    fn single(&self) -> bool {
+        self.scenarios.len() == 1
+    }
+}
+
+fn standard_input() -> Result<String, Refusal> {
+    let mut bytes = Vec::new();
+    io::stdin()
+        .lock()
+        .take(leafdyn::scenario::MOST_BYTES + 1)
+        .read_to_end(&mut bytes)?;
+    Ok(leafdyn::scenario::utf8(bytes, "standard input")?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use leafdyn::relax::Equilibrium;
+    use std::fs;
+
+    #[derive(Parser)]
+    struct Verb {
+        #[command(flatten)]
+        request: Request,
+    }
+
+    /// Whichever of several scenarios ends in a panic, the table has a row for each.
+    #[test]
+    fn a_panic_fails_its_scenario_alone() {
+        const LEAF: &str = include_str!("../../scenarios/paper/fig13.toml");
+        for parallel in [true, false] {
+            let folder = tempfile::tempdir().unwrap();
+            let file = |name: &str| folder.path().join(format!("{name}.toml"));
+            let (names, out) = (["first", "second", "third"], folder.path().join("out"));
+            let mut arguments = vec!["relax".into(), "--write".into(), "csv".into()];
+            arguments.extend(["--out".into(), out.clone().into_os_string()]);
+            for name in names {
+                fs::write(file(name), LEAF.replace("fig13", name)).unwrap();
+                arguments.push(file(name).into_os_string());
+            }
+            let verb = Verb::try_parse_from(arguments).unwrap();
+            let traits = VerbTraits {
+                parallel,
+                ..VerbTraits::default()
+            };
+            let run = |job: &Job| match &*job.scenario.name {
+                "first" => panic!("index {} out of bounds", 43),
+                _ => job.deliver(&job.scenario.relax()?, true),
+            };
+            let status = verb.request.each::<Equilibrium>(traits, run).unwrap();
+            assert_eq!(status, Status::Refused);
+            let table = fs::read_to_string(out.join("table.csv")).unwrap();
+            let rows: Vec<&str> = table.lines().skip(1).collect();
+            assert_eq!(rows.len(), names.len(), "{table}");
+            assert!(rows[0].contains("index 43 out of bounds"), "{table}");
+            for (row, status) in rows.iter().zip([",2,", ",0,", ",0,"]) {
+                assert!(row.contains(status), "{table}");
+            }
+        }
+    }
+}
