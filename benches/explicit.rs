@@ -1,14 +1,12 @@
 //! How fast the explicit method steps, and how the explicit relaxation compares
 //! with the semi-implicit one. `cargo bench --bench explicit`.
 
-mod shared;
-
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
 use leafdyn::internals::motion::{Explicit, Method, Physics};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::{self, Options, relax};
 use leafdyn::scenario::Scenario;
-use shared::{figure, median, print_head};
+use leafdyn_testing::bench::{figure, median, print_head};
 use std::time::Instant;
 
 /// Veins and segments a vein.

@@ -2,11 +2,9 @@
 //! On one thread, which shows the cost per unknown, and on all there are.
 //! `cargo bench --bench growth`.
 
-mod shared;
-
 use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
-use shared::{figure, print_head, to};
+use leafdyn_testing::bench::{figure, print_head, to};
 
 const RODS: [usize; 6] = [35, 100, 350, 1000, 3500, 10_000];
 

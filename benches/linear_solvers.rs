@@ -2,13 +2,11 @@
 //! where the time of a whole run goes. One thread, all in the same run:
 //! `cargo bench --bench linear_solvers`.
 
-mod shared;
-
 use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Grid, Leaf, Solved, State, System};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::{Equilibrium, Progress, relax};
 use leafdyn::scenario::Scenario;
-use shared::{figure, on_one_thread, print_head, to};
+use leafdyn_testing::bench::{figure, on_one_thread, print_head, to};
 use std::collections::BTreeMap;
 use std::time::Instant;
 

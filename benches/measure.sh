@@ -12,9 +12,9 @@ source target/peers/bin/activate
 pip install scipy
 pip install pyelastica exudyn
 
-cargo test --release --test error_estimate -- --nocapture
-LEAFDYN_LEAVES=1000 cargo test --release --test fit_coverage -- --nocapture
-LEAFDYN_LEAVES=143 cargo test --release --test fit_undetermined_family
+cargo test --release --test statics error_estimate:: -- --nocapture
+LEAFDYN_LEAVES=1000 cargo test --release --test fits coverage:: -- --nocapture
+LEAFDYN_LEAVES=143 cargo test --release --test fits undetermined_family::
 cargo bench --bench relax
 cargo bench --bench real_leaves
 cargo bench --bench growth

@@ -5,18 +5,14 @@
 //! `cargo bench --bench real_leaves -- write FOLDER COUNT [FIRST]` writes them
 //! as scenarios instead.
 
-#[path = "../tests/common/real.rs"]
-#[allow(dead_code)]
-mod real;
-mod shared;
-
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use leafdyn::relax::{Equilibrium, Options, relax};
 use leafdyn::scenario::Scenario;
-use shared::{figure, on_one_thread, print_head, to};
+use leafdyn_testing::bench::{figure, on_one_thread, print_head, to};
+use leafdyn_testing::real;
 
 /// A leaf is relaxed again and again for so long; its fastest run counts.
 const LEAST: Duration = Duration::from_millis(20);
@@ -79,7 +75,7 @@ fn measure(count: u64, first: u64) {
         ),
         (
             "`leafdyn new leaf`",
-            parse(include_str!("../src/cli/examples/leaf.toml")),
+            parse(include_str!("../program/src/verbs/examples/leaf.toml")),
         ),
         ("Fig. 4, N = 5", figure("fig04", 5)),
         ("Fig. 4, N = 21", figure("fig04", 21)),

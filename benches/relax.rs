@@ -2,11 +2,9 @@
 //! One thread, in process, without reading and writing:
 //! `cargo bench --bench relax`. The medians are printed as a table at the end.
 
-mod shared;
-
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use leafdyn::relax::relax;
-use shared::{figure, on_one_thread, print_head, to};
+use leafdyn_testing::bench::{figure, on_one_thread, print_head, to};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 

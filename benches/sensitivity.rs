@@ -3,11 +3,9 @@
 //! `cargo bench --bench sensitivity`. Relaxations with and without derivatives run in
 //! turns, and the medians are printed.
 
-mod shared;
-
 use leafdyn::relax::{Options, relax};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
-use shared::{median, on_one_thread, print_head, to};
+use leafdyn_testing::bench::{median, on_one_thread, print_head, to};
 use std::time::Instant;
 
 const TURNS: usize = 101;

@@ -2,13 +2,11 @@
 //! that grows with the number of veins: Fig. 4's leaf to 1e-10.
 //! `cargo bench --bench shooting`.
 
-mod shared;
-
 use leafdyn::internals::bvp::{self, Solution, Start};
 use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
-use shared::{figure, print_head, to};
+use leafdyn_testing::bench::{figure, print_head, to};
 use std::time::Instant;
 
 const RODS: [usize; 7] = [1, 5, 10, 21, 35, 70, 140];

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use leafdyn::files::{Recording, Selection, read_peers};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
 use leafdyn::study::{Base, Data, FitRequest, Vary};
+use leafdyn_program::files::{Recording, Selection, read_peers};
 use tempfile::TempDir;
 
 /// A leaf with something of everything.

@@ -107,9 +107,6 @@ mod modes;
 mod motion;
 mod newton;
 pub mod numbers;
-#[cfg(test)]
-#[path = "../tests/common/pairs.rs"]
-mod pairs;
 pub mod relax;
 mod rod;
 mod rotation;

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use leafdyn::files::{Document, Recording, Selection};
 use leafdyn::scenario;
 use leafdyn::simulate::{
     Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, film, stills,
 };
-use leafdyn::view;
+use leafdyn_program::files::{Document, Recording, Selection};
+use leafdyn_program::page;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -200,7 +200,7 @@ impl Motion {
 
     /// The page that plays them in space.
     fn page(&self, py: Python) -> String {
-        py.detach(|| view::page(&self.record(&self.state(), true), &self.scenario))
+        py.detach(|| page::page(&self.record(&self.state(), true), &self.scenario))
     }
 
     /// Writes the files of the program of these kinds into a folder.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::files::{self, Document, FileError, Kind, Written};
 use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
+use leafdyn_program::files::{self, Document, FileError, Kind, Written};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::intern;
 use pyo3::prelude::*;

@@ -4,11 +4,11 @@ use std::ffi::OsString;
 use std::time::Instant;
 
 use leafdyn::relax::SemiImplicit;
+use leafdyn::scenario;
 use leafdyn::study::{
     self, BoundaryRequest, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender,
     MOST_POINTS, Map, MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn, Vary,
 };
-use leafdyn::{cli, scenario};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, curves, nodes};
@@ -316,5 +316,5 @@ pub fn chart(
 #[pyfunction]
 #[pyo3(name = "main")]
 pub fn program(py: Python, arguments: Vec<OsString>) -> PyResult<u8> {
-    on_pool(py, || cli::main_with(arguments))
+    on_pool(py, || leafdyn_program::verbs::main_with(arguments))
 }

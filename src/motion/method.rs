@@ -44,7 +44,7 @@ impl Energy {
     }
 
     /// Applies a function to all of them.
-    pub(crate) fn map(self, change: impl Fn(f64) -> f64) -> Self {
+    pub fn map(self, change: impl Fn(f64) -> f64) -> Self {
         Energy {
             kinetic: change(self.kinetic),
             elastic: change(self.elastic),

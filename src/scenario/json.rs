@@ -221,7 +221,7 @@ fn in_time<T: Copy + PartialEq>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pairs::pairs;
+    use leafdyn_testing::pairs;
 
     /// Uses every feature of the format.
     const FULL: &str = r#"

@@ -113,7 +113,7 @@ pub struct Check {
 
 impl Check {
     /// From a relaxed leaf and the shooting solution started from it.
-    pub(crate) fn new(relaxed: Equilibrium, shot: Option<Shot>) -> Self {
+    pub fn new(relaxed: Equilibrium, shot: Option<Shot>) -> Self {
         let mut check = Check {
             scenario: relaxed.scenario.clone(),
             verdict: Verdict::Differ,

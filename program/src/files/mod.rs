@@ -175,7 +175,7 @@ pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
 ///
 /// ```
 /// # use leafdyn::{files::{self, Document}, scenario::Scenario};
-/// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+/// let scenario = Scenario::read("../scenarios/paper/fig04.toml")?;
 /// let leaf = scenario.relax()?;
 /// let document = Document::new(&leaf, &scenario, None);
 /// let picture = files::contents(&document, "figure.svg").unwrap_or_default();

@@ -8,7 +8,7 @@
 //! use leafdyn::scenario::Scenario;
 //! use leafdyn_program::page;
 //!
-//! let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+//! let scenario = Scenario::read("../scenarios/paper/fig04.toml")?;
 //! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
 //! let page = page::page(&leaf, &scenario);
 //! assert!(page.starts_with("<!DOCTYPE html>") && page.len() < 1_000_000);

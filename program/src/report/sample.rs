@@ -73,7 +73,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
             displacement: vec![zero; rods],
         }),
         unsharpened: None,
-        work: bvp::Work::default(),
+        work: Default::default(),
     };
     let shot = Shot {
         tips: vec![turn * relaxed.tips[0]],

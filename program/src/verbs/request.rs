@@ -356,7 +356,7 @@ mod tests {
     /// Whichever of several scenarios ends in a panic, the table has a row for each.
     #[test]
     fn a_panic_fails_its_scenario_alone() {
-        const LEAF: &str = include_str!("../../scenarios/paper/fig13.toml");
+        const LEAF: &str = include_str!("../../../scenarios/paper/fig13.toml");
         for parallel in [true, false] {
             let folder = tempfile::tempdir().unwrap();
             let file = |name: &str| folder.path().join(format!("{name}.toml"));

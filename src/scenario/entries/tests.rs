@@ -1,6 +1,6 @@
 use super::*;
-use crate::pairs::pairs;
 use crate::scenario::Scenario;
+use leafdyn_testing::pairs;
 
 const TEXT: &str = r#"
     name = "three"

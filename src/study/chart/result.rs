@@ -174,7 +174,7 @@ impl Chart {
     }
 
     /// The chart with its Pareto front, the ratios of its peers, and the fastest contenders.
-    pub(crate) fn compared(mut self) -> Self {
+    pub fn compared(mut self) -> Self {
         self.mark_front();
         let floor = self.floor();
         let ratio = |peer: &Peer| {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::pairs::pairs;
+use leafdyn_testing::pairs;
 
 fn vary(given: &str) -> Vary {
     let vary = given.parse();

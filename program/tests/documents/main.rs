@@ -1,0 +1,14 @@
+//! Documents, files and figures say what the program does.
+
+mod documented_commands;
+mod figure_trace;
+mod first_minute;
+mod fit_figure;
+mod help;
+mod refusals;
+mod relax_cli;
+mod report_digits;
+mod scenario_files;
+mod several_leaves;
+mod view_files;
+mod written_files;

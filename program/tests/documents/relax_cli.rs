@@ -1,0 +1,307 @@
+//! What scripts rely on when they relax a leaf: streams, files and exit
+//! statuses of the command line, by either method, with modes and without.
+
+use std::fs;
+
+use leafdyn_testing::workplace::{Json, Run, Workplace, contains, floats, leaf, tells};
+use serde_json::{Value, json};
+
+const FILES: &str = "centerlines.csv figure.png figure.svg summary.json";
+
+const MODES: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
+
+fn with_modes() -> String {
+    FILES.replace("summary", "modes.csv modes.png modes.svg summary")
+}
+
+#[test]
+fn a_leaf_comes_to_rest_and_is_written_down() {
+    let place = Workplace::new();
+    let parts = "small: 5 veins|stable equilibrium|tip|energy|error|out/small";
+    let parts: Vec<&str> = parts.split('|').collect();
+    place.ok("relax leaf.toml").says(&parts);
+    place.holds("out/small", FILES);
+    let csv = place.read("out/small/centerlines.csv");
+    assert!(csv.starts_with("rod,sigma,s,x,y,z,qw,"));
+    place.picture("out/small/figure");
+    let summary = place.json("out/small/summary.json");
+    let stations = summary["stations"].list().len();
+    assert_eq!(csv.lines().count(), 1 + 5 * stations);
+    let tip = csv.lines().nth(stations).unwrap().split(',').skip(3);
+    let tip: Vec<f64> = tip.take(3).map(|cell| cell.parse().unwrap()).collect();
+    assert_eq!(summary["tip"], json!(tip));
+}
+
+#[test]
+fn json_is_alone_on_standard_output() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --json --out here/below").ends(0);
+    let summary = run.json();
+    let found = "scenario=small method=semi-implicit outcome=converged rods=5 stable=true";
+    tells(&summary, found);
+    assert_eq!(summary["positions"].list().len(), 5);
+    assert_eq!(run.out, place.read("here/below/summary.json"));
+}
+
+#[test]
+fn requests_reach_the_solver() {
+    leafdyn_testing::workplace::all_tell(
+        0,
+        "
+        relax leaf.toml --set leaf.rods=3 --tolerance 1e-5 => rods=3 tolerance=1e-5
+        relax leaf.toml --method shooting --intervals 4 => intervals=4; by multiple shooting over 4 intervals
+        relax scenarios/paper/fig10.toml --set leaf.rods=5 --method shooting => outcome=saddle stable=false negative_eigenvalues=18; unstable equilibrium of index 18
+        ",
+    );
+}
+
+#[test]
+fn a_single_grid_claims_no_accuracy() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --json --segments 8 --modes 2");
+    let summary = run.json();
+    let told = "segments=[8] error_estimate=null eigenvalue_errors=null";
+    tells(&summary, told);
+    assert_eq!(floats(&summary["lowest_eigenvalues"]).len(), 2);
+    assert_eq!(place.table("out/small/modes.csv", MODES)[0][2], "");
+    let success = summary["outcome"] == "converged";
+    assert_eq!(run.status, Some(if success { 0 } else { 1 }));
+    // A remark goes to standard error.
+    assert!(success || !run.err.is_empty());
+    // Written all the same.
+    place.holds("out/small", &with_modes());
+}
+
+#[test]
+fn a_folder_that_is_a_file_is_refused() {
+    let place = Workplace::new();
+    place.write("plain", "a file");
+    let message = "error: cannot write to the folder plain/out: plain is not a folder";
+    let refused = place.refuses("relax leaf.toml --out plain/out", message);
+    contains(&refused.err, &["--out DIR"]);
+    place.refuses("relax leaf.toml --json --out plain", "is not a folder");
+}
+
+/// A run by shooting into `out`: its report and `summary.json`.
+fn shoot(place: &Workplace, arguments: &str, status: i32) -> (String, Value) {
+    let run = place.run(format!("relax {arguments} --method shooting --out out"));
+    let Run { out, err, .. } = run.ends(status);
+    assert_eq!(err, "");
+    place.holds("out", FILES);
+    (out, place.json("out/summary.json"))
+}
+
+#[test]
+fn shooting_finds_a_stable_leaf() {
+    let place = Workplace::new();
+    let (report, summary) = shoot(&place, "leaf.toml", 0);
+    let (found, how) = ("found    stable equilibrium", ", by single shooting");
+    contains(&report, &["method shooting", found, how, " corrections, "]);
+    let told = "method=shooting outcome=converged segments=[] intervals=1 stable=true";
+    tells(&summary, told);
+    contains(&place.picture("out/figure"), &["by single shooting"]);
+}
+
+#[test]
+fn a_failure_of_shooting_shows_no_numbers_that_are_none() {
+    let place = Workplace::new();
+    let column = "scenarios/classic/cantilever_tip.toml --set load.tip_force=[1e5,0,1]";
+    let (report, summary) = shoot(&place, &format!("{column} --intervals 1"), 1);
+    let parts = ["found    no equilibrium\n", "use more intervals"];
+    contains(&report, &parts);
+    for part in ["NaN", "inf", "residual", "energy", "tip  "] {
+        assert!(!report.contains(part), "{part} in {report}");
+    }
+    assert_eq!(summary["outcome"], "not-at-rest");
+    let told = "residual=null energy=null error_estimate=null stable=null";
+    tells(&summary, told);
+    contains(&place.picture("out/figure"), &["how far shooting came"]);
+}
+
+fn summary(place: &Workplace, arguments: &str) -> Value {
+    place.told(0, format!("relax leaf.toml {arguments}"))
+}
+
+#[test]
+fn three_eigenvalues_are_told_unasked() {
+    let place = Workplace::new();
+    let summary = summary(&place, "");
+    let eigenvalues = floats(&summary["lowest_eigenvalues"]);
+    assert_eq!(eigenvalues.len(), 3);
+    assert!(eigenvalues[0] > 0.0 && eigenvalues.is_sorted());
+    let errors = floats(&summary["eigenvalue_errors"]);
+    assert!(errors.iter().zip(&eigenvalues).all(|(e, l)| *e < 1e-3 * l));
+    place.holds("out/small", FILES);
+
+    let wanted = format!("modes    lowest frequencies {:.4}", eigenvalues[0].sqrt());
+    let report = place.run("relax leaf.toml");
+    // No more digits are told than the error leaves.
+    report.says(&[&wanted[..wanted.len() - 3]]);
+}
+
+#[test]
+fn modes_are_written_and_drawn_on_request() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --modes 4").ends(0);
+    run.says(&["figure.png, modes.csv, modes.svg, modes.png"]);
+    place.holds("out/small", &with_modes());
+
+    let summary = place.json("out/small/summary.json");
+    let eigenvalues = floats(&summary["lowest_eigenvalues"]);
+    let stations = summary["stations"].list().len();
+    let rows = place.numbers("out/small/modes.csv", MODES);
+    assert_eq!(rows.len(), 4 * 5 * stations);
+    for (k, rows) in rows.chunks(5 * stations).enumerate() {
+        for row in rows {
+            assert_eq!(row[0], (k + 1) as f64);
+            assert_eq!(row[1], eigenvalues[k]);
+            assert_eq!(row[3], eigenvalues[k].sqrt());
+            // The base is clamped.
+            assert!(row[5] > 0.0 || row[6..].iter().all(|value| *value == 0.0));
+        }
+        let far = |row: &Vec<f64>| row[6..9].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let largest = rows.iter().map(far).fold(0.0, f64::max);
+        // On the finest grid it is 1.
+        assert!((0.7..1.0 + 1e-12).contains(&largest), "{largest}");
+    }
+    let svg = place.picture("out/small/modes");
+    assert_eq!(svg.matches("<g class=\"mode\">").count(), 4);
+    assert_eq!(svg.matches("ω = ").count(), 4);
+    assert!(!svg.contains("NaN") && !svg.contains("unstable"));
+
+    // Of the leaf that is there now nothing like it is known.
+    place.run("relax leaf.toml");
+    place.holds("out/small", FILES);
+}
+
+#[test]
+fn no_modes_are_null() {
+    let place = Workplace::new();
+    for arguments in [
+        "--modes 0",
+        "--method shooting",
+        "--set leaf.rods=1 --set load.tip_moment=[0,0,1]",
+    ] {
+        let summary = summary(&place, arguments);
+        tells(&summary, "lowest_eigenvalues=null eigenvalue_errors=null");
+        place.holds("out/small", FILES);
+    }
+    let run = place.run("relax leaf.toml --modes 0");
+    assert!(!run.out.contains("modes"));
+}
+
+/// A column at the load under which its own weight makes it buckle (Greenhill 1881).
+#[test]
+fn a_frequency_of_zero_is_told_with_what_it_means() {
+    let place = Workplace::new();
+    let column = r#"
+        name = "column"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 2.0, axial = inf, shear_2 = inf, shear_3 = inf }
+        load = { gravity = [-7.8373474, 0.0, 0.0] }"#;
+    place.write("column.toml", column);
+    let run = place.run("relax column.toml --write none --modes 3");
+    let parts = [
+        "modes    lowest frequencies 0, ",
+        "; zero within its error: ",
+    ];
+    run.ends(0).says(&parts);
+}
+
+/// The flat shape of this soft leaf is a saddle.
+#[test]
+fn unstable_modes_are_told_and_marked() {
+    let place = Workplace::new();
+    let soft = "--set leaf.rods=1 --set leaf.fan=[0.0] --set load.gravity=[0,0,0]";
+    let pushed = "--set load.tip_force=[-3,0,0] --keep-unstable --modes 3";
+    let run = place.run(format!("relax leaf.toml {soft} {pushed}"));
+    let rates = ["modes    growth rates ", "; lowest frequencies "];
+    run.says(&["2 negative eigenvalues"]).says(&rates);
+    let svg = place.read("out/small/modes.svg");
+    assert_eq!(svg.matches("unstable: grows at ").count(), 2);
+    assert_eq!(svg.matches("ω = ").count(), 1);
+    let cells = &place.table("out/small/modes.csv", MODES)[0];
+    assert!(cells[1].starts_with('-') && cells[3].is_empty());
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::process::{Child, Stdio};
+    use std::time::{Duration, Instant};
+    use std::{io, thread};
+
+    use super::*;
+    use leafdyn_testing::workplace::interrupt;
+
+    /// A run whose standard output nobody reads.
+    fn unread(place: &Workplace, arguments: &str) -> Run {
+        let (reader, writer) = io::pipe().unwrap();
+        drop(reader);
+        let output = place.command(arguments).stdout(writer).output();
+        Run::from(output.unwrap())
+    }
+
+    /// A reader that has gone must not make the program panic. Of a report he may have read
+    /// enough; JSON that was not delivered is no success.
+    #[test]
+    fn closed_standard_output_is_an_error_for_json_alone() {
+        let place = Workplace::new();
+        unread(&place, "relax leaf.toml").ok();
+        place.holds("out/small", FILES);
+        let run = unread(&place, "relax leaf.toml --json").ends(2);
+        contains(&run.err, &["cannot write to standard output"]);
+        place.holds("out/small", FILES);
+    }
+
+    #[test]
+    fn full_standard_output_is_an_error() {
+        let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+            return;
+        };
+        let place = Workplace::new();
+        let mut command = place.command("relax leaf.toml --json");
+        let run = Run::from(command.stdout(full).output().unwrap()).ends(2);
+        contains(&run.err, &["cannot write to standard output"]);
+    }
+
+    /// A leaf so wide that nobody waits for it.
+    fn start_long_run(place: &Workplace) -> Child {
+        place.write("leaf.toml", leaf("wide", 20_000));
+        place.start("relax leaf.toml --tolerance 1e-10")
+    }
+
+    #[test]
+    fn an_interrupt_stops_at_once_and_leaves_nothing() {
+        let place = Workplace::new();
+        let child = start_long_run(&place);
+        // Long enough to be in the solver, short enough not to be done.
+        thread::sleep(Duration::from_millis(700));
+        interrupt(&child);
+        let run = Run::from(child.wait_with_output().unwrap()).ends(130);
+        assert_eq!(run.out, "");
+        place.holds(".", "leaf.toml");
+    }
+
+    #[test]
+    fn an_interrupt_while_writing_leaves_only_whole_files() {
+        let place = Workplace::new();
+        // Many rods on a fine grid: a large table, which takes a while to write.
+        place.write("leaf.toml", leaf("large", 500));
+        let mut command = place.command("relax leaf.toml --segments 256");
+        let child = command.stdout(Stdio::null()).spawn().unwrap();
+        let folder = place.path("out/large");
+        let unfinished = |name: &String| name.ends_with(".part");
+        let start = Instant::now();
+        while !folder.is_dir() || !place.names("out/large").iter().any(unfinished) {
+            let waited = start.elapsed();
+            assert!(waited < Duration::from_secs(60), "nothing is written");
+            thread::sleep(Duration::from_millis(1));
+        }
+        interrupt(&child);
+        Run::from(child.wait_with_output().unwrap()).ends(130);
+        let names = place.names("out/large");
+        assert!(names.len() < 4, "{names:?}: interrupted too late");
+        let whole = |name: &String| FILES.split(' ').any(|file| file == name);
+        assert!(names.iter().all(whole), "{names:?}");
+    }
+}

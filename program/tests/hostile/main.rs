@@ -1,0 +1,10 @@
+//! What is wrong, too large, damaged or interrupted ends with a message.
+
+mod dynamics;
+mod ends;
+mod mutations;
+mod options;
+mod overrides;
+mod requests;
+mod scenarios;
+mod sizes;

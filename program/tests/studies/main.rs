@@ -1,0 +1,14 @@
+//! The verbs that compare, follow and vary.
+
+mod all_shapes;
+mod boundary_map;
+mod chart_cli;
+mod check_cli;
+mod map_cli;
+mod map_outcomes;
+mod margin;
+mod simulate_choice;
+mod simulate_cli;
+mod simulate_doubts;
+mod simulate_resume;
+mod trace_cli;

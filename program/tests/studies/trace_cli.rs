@@ -1,0 +1,223 @@
+//! What scripts rely on when they follow an equilibrium, and boundaries: files, exit statuses,
+//! messages, and results that do not depend on the threads.
+
+use leafdyn_testing::workplace::{
+    Json, Workplace, all_tell, contains, near, pairs, tells, timeless,
+};
+use serde_json::Value;
+
+const FILES: &str = "trace.csv trace.json trace.png trace.svg";
+
+const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,\
+    negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist";
+
+const BOUNDARY: &str = "curve,point,kind,load.tip_force[0],stiffness.bending_3,error_1,error_2,\
+    tip_x,tip_y,tip_z,error,index_before,index_behind";
+
+/// A column that buckles in one plane alone.
+const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+    --set stiffness.bending_2=1000 --vary load.tip_force[0]=0..-6";
+
+#[test]
+fn a_trace_is_a_table_a_summary_and_a_figure() {
+    let place = Workplace::new();
+    let run = place.run("trace leaf.toml --vary load.gravity[2]=0..-3");
+    let range = "load.gravity[2] from 0.0 to -3.0";
+    run.ends(0)
+        .says(&[range, "to the end of the range", "stable", "written"]);
+    place.holds("out/small", FILES);
+    place.picture("out/small/trace");
+    let rows = place.table("out/small/trace.csv", COLUMNS);
+    assert!(rows.len() > 9);
+    assert_eq!(rows[0][..5], ["1", "1", "regular", "0.0", ""]);
+    let last = rows.last().unwrap();
+    assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
+}
+
+#[test]
+fn a_boundary_is_a_table_a_summary_and_a_figure() {
+    let place = Workplace::new();
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let run = place.run(format!("trace leaf.toml {COLUMN} {bending}"));
+    run.ends(0).says(&[
+        "load.tip_force[0] from 0.0 to -6.0",
+        "stiffness.bending_3 from 0.5 to 2.0",
+        "at stiffness.bending_3 = 1.0",
+        "branches cross: index 0 to 1",
+        "the end of a range",
+        "written",
+    ]);
+    let files = "boundary.csv boundary.json boundary.png boundary.svg";
+    place.holds("out/small", files);
+    let picture = place.picture("out/small/boundary");
+    let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
+    contains(&picture, &parts);
+    let rows = place.table("out/small/boundary.csv", BOUNDARY);
+    assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);
+    assert_eq!(rows[0][4], "0.5");
+    assert_eq!(rows.last().unwrap()[4], "2.0");
+    let json = place.json("out/small/boundary.json");
+    assert_eq!(json["complete"], true);
+    assert_eq!(json["curves"][0]["ends"][1], "reached");
+    assert_eq!(json["curves"][0]["points"].list().len(), rows.len());
+}
+
+/// A leaf without weight, soft across, loses its flatness at a fork; both its
+/// sides are followed.
+#[test]
+fn a_fork_is_found_and_both_its_sides() {
+    let place = Workplace::new();
+    let fork = "trace leaf.toml --set load.gravity=[0,0,0] --set leaf.rods=3 \
+                --vary stiffness.bending_2=1..0.3:20 --switch --json";
+    let trace = timeless(place.run_on("1", fork).ends(0).json());
+    let two = timeless(place.run_on("2", fork).json());
+    assert_eq!(trace, two, "threads change nothing");
+    let branches = trace["branches"].list();
+    assert!(branches.len() >= 3, "{trace}");
+    let first = &branches[0]["critical"][0];
+    tells(first, "kind=branch-point negative_eigenvalues=1");
+    assert!(first["value_error"].number() < 1e-8);
+    let [one, other] = [1, 2].map(|b| branches[b]["last"]["tip"][2].number());
+    let mirrored = (one + other).abs() < 1e-7;
+    assert!(one.abs() > 1e-3 && mirrored, "{one} {other}");
+    let stable = |b: usize| branches[b]["first"]["stable"].as_bool().unwrap();
+    assert!(stable(1) && stable(2), "what leaves the fork is stable");
+}
+
+/// The paper's Fig. 7: Hooke's law is a very good approximation.
+#[test]
+fn a_leaf_that_is_pulled_obeys_hookes_law() {
+    let place = Workplace::new();
+    for (name, axial, length) in [("fig07a", 9.0, 1.5), ("fig07b", 10.29, 1.0)] {
+        let vary = "--vary load.tip_force[0]=0..20 --out h";
+        let trace = place.told(0, format!("trace scenarios/paper/{name}.toml {vary}"));
+        let number = |key: &str| trace["law"][key].number();
+        assert!(number("r_squared") > 0.99999 && number("deviation") < 1e-3);
+        // The veins lie askew and shear, which takes a part of their stiffness.
+        let straight = 21.0 * axial / length;
+        assert!(number("slope") < straight && number("slope") > 0.7 * straight);
+        let parts = ["displacement along x / cm", "force / N", "slope", "N/cm"];
+        contains(&place.picture("h/trace"), &parts);
+    }
+}
+
+/// What ends early is said, with what was found until then.
+#[test]
+fn what_goes_on_is_an_outcome() {
+    let bending = "--vary stiffness.bending_3=0.5..2";
+    let short = COLUMN.replace("0..-6", "0..-1");
+    let table = format!(
+        "
+        trace leaf.toml --vary load.gravity[2]=0..-3:100 --points 5 => complete=false branches.0.end=most-points branches.0.points=5; allow more
+        trace leaf.toml {COLUMN} {bending}:100 --points 20 => complete=false curves.0.ends.1=most-points
+        trace leaf.toml {short} {bending} => complete=false; changes nowhere
+        "
+    );
+    all_tell(1, &table);
+}
+
+/// On the grid that is enough at its start, this branch would go over to one that only
+/// that grid has.
+#[test]
+fn a_branch_that_needs_finer_grids_gets_them() {
+    let place = Workplace::new();
+    let leaf = "scenarios/paper/fig10.toml --set leaf.rods=5 --keep-unstable --tolerance 1e-4";
+    let trace = place.told(0, format!("trace {leaf} --vary load.gravity[2]=0..-0.5"));
+    let branch = &trace["branches"][0];
+    assert_eq!(branch["end"], "returned");
+    assert_eq!(trace["complete"], true);
+    for row in place.table("out/fig10/trace.csv", COLUMNS) {
+        let error: f64 = row[8].parse().expect("a bound");
+        assert!(error <= 1e-4, "{row:?}");
+    }
+    let fold = branch["critical"].only();
+    assert_eq!(fold["kind"], "fold");
+    assert!(fold["value_error"].number() < 1e-6, "{fold}");
+    let index = |point: &str| branch[point]["negative_eigenvalues"].count();
+    assert_eq!(index("first"), index("last") + 1);
+}
+
+/// One load, the rest length of one vein, and coupling, which may end where leaves do: no step
+/// leads beyond it.
+#[test]
+fn a_branch_ends_in_the_leaf_that_relax_finds_there() {
+    let place = Workplace::new();
+    let table = "
+        load.gravity[2]=0..-3 => load.gravity=[0,0,-3]
+        rest.stretch[0]=1..1.2 => rest.stretch=[1.2,1,1,1,1]
+        coupling.z=0..40 => coupling.z=40
+        coupling.z=40..0 => coupling.z=0
+        coupling.z=2..1e-9 => coupling.z=1e-9
+    ";
+    for (varied, there) in pairs(table) {
+        let follow = format!("trace leaf.toml --vary {varied} --tolerance 1e-8 --out t");
+        let trace = place.told(0, follow);
+        let (branch, last) = (&trace["branches"][0], &trace["branches"][0]["last"]);
+        assert_eq!(branch["end"], "reached", "{trace}");
+        assert!(branch["points"].count() < 40, "{branch}");
+        let end = varied.rsplit("..").next().unwrap();
+        assert_eq!(last["value"].as_f64(), end.parse().ok());
+        let relax = format!("relax leaf.toml --set {there} --tolerance 1e-9 --out r");
+        let leaf = place.told(0, relax);
+        near(&last["tip"], &leaf["tip"], 2e-8);
+        let row = place.table("t/trace.csv", COLUMNS).pop().unwrap();
+        let numbers: Vec<f64> = row[5..9].iter().map(|cell| cell.parse().unwrap()).collect();
+        near(&numbers[..3].into(), &leaf["tip"], 2e-8);
+        assert!(numbers[3] <= 1e-8, "{row:?}");
+    }
+}
+
+/// A rod along e1, bending up and down, with these entries besides.
+fn rod(place: &Workplace, couple: [f64; 3], entries: &str) {
+    let [torsion, bending_2, bending_3] = couple;
+    let text = format!(
+        "name = \"rod\"\nleaf = {{ rods = 1, length = 1.0, fan = [0.0] }}\n\
+         stiffness = {{ torsion = {torsion}, bending_2 = {bending_2}, bending_3 = {bending_3}, \
+         axial = 1000.0, shear_2 = 1000.0, shear_3 = 1000.0 }}\n{entries}\n"
+    );
+    place.write("rod.toml", text);
+}
+
+/// A column that is turned from lying to standing to lying buckles sideways where it
+/// stands: both its sides are one loop through the two crossings.
+#[test]
+fn a_loop_is_closed() {
+    let place = Workplace::new();
+    rod(&place, [50.0, 1.0, 50.0], "load = { gravity = [-9, 0, 0] }");
+    let run = place.run("trace rod.toml --vary leaf.fan[0]=-1..1 --switch");
+    run.ends(0).says(&["branches cross at", "points, closed"]);
+    place.holds("out/rod", FILES);
+    let trace = place.json("out/rod/trace.json");
+    assert_eq!(trace["complete"], true);
+    let branches = trace["branches"].list();
+    let ends: Vec<&Value> = branches.iter().map(|branch| &branch["end"]).collect();
+    assert_eq!(ends, ["reached", "closed", "closed", "closed", "closed"]);
+    for branch in &branches[1..] {
+        let [first, last] = ["first", "last"].map(|end| &branch[end]);
+        let [a, b] = [first, last].map(|point| point["value"].number());
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+        near(&first["tip"], &last["tip"], 2e-6);
+        // It goes through both crossings and to both sides.
+        let number = branch["points"].count();
+        assert!(number > 20, "{number}");
+    }
+}
+
+/// A vein that winds up more than the finest grid resolves.
+#[test]
+fn a_spiral_is_wound_up_until_no_grid_resolves_it() {
+    let place = Workplace::new();
+    rod(&place, [1.0; 3], "rest = { bend_2 = 20.0 }");
+    let run = place.run("trace rod.toml --vary rest.bend_2=20..900 --tolerance 1e-4");
+    let bends = "a vein bends by more than a right angle within one segment";
+    run.ends(1).says(&["ends: grid too coarse", bends]);
+    place.holds("out/rod", FILES);
+    let trace = place.json("out/rod/trace.json");
+    assert_eq!(trace["complete"], false);
+    let branch = &trace["branches"][0];
+    assert_eq!(branch["end"], "unresolved");
+    contains(branch["remark"].text(), &["right angle"]);
+    // 512 segments that turn by 1.6 each.
+    let last = branch["last"]["value"].number();
+    assert!((last - 819.2).abs() < 1.0, "{last}");
+}

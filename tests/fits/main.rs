@@ -1,0 +1,11 @@
+//! Stiffnesses from measurements.
+
+mod coverage;
+mod ends;
+mod hanging;
+mod next;
+mod numbers;
+mod refusals;
+mod starts;
+mod undetermined_family;
+mod work;

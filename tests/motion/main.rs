@@ -1,0 +1,11 @@
+//! Motion in time: orders, energies, momenta, stiff leaves.
+
+mod damping;
+mod energy;
+mod momentum;
+mod order;
+mod pulses;
+mod released_rigid;
+mod released_stiff;
+mod stability;
+mod stiff;

@@ -1,0 +1,13 @@
+//! What is stable: modes, Morse indices, branches and their critical points, boundaries.
+
+mod beside_bifurcations;
+mod bifurcations;
+mod boundary;
+mod boundary_random;
+mod lateral_buckling;
+mod map_jumps;
+mod margin_random;
+mod mode_shapes;
+mod modes;
+mod trace_consistent;
+mod trace_verified;

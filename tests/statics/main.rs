@@ -1,0 +1,34 @@
+//! Equilibria: their equations, closed forms, published ones, and the errors that are stated.
+
+mod arch;
+mod balance;
+mod coming_to_rest;
+mod corrections;
+mod derivatives;
+mod doubts;
+mod elastica;
+mod error_estimate;
+mod every_tolerance;
+mod explicit_relaxation;
+mod extreme_leaves;
+mod growth;
+mod held_tips;
+mod helix;
+mod lens;
+mod linear_theory;
+mod measured_leaves;
+mod objectivity;
+mod order;
+mod path;
+mod published;
+mod real_leaves;
+mod reductions;
+mod reference_leaves;
+mod rollup;
+mod section;
+mod sensitivities;
+mod soft_leaves;
+mod stiffness;
+mod threads;
+mod turning;
+mod undulation;

@@ -1,0 +1,167 @@
+//! Where slow loading leads: a leaf as people measure it comes to rest in the same equilibrium on
+//! all grids, at all tolerances, by all methods, in all units, and however its veins are
+//! numbered; where the path loses its stability is where theory says. `LEAVES` is how many real
+//! leaves are tried, `SEED` the first.
+
+use leafdyn::relax::{Event, Happening, Path, Route, Stage, relax};
+use leafdyn_testing::real;
+use leafdyn_testing::*;
+
+/// Tips nearer to each other than this part of the length are one, on fixed grids and at loose
+/// tolerances.
+const SAME: f64 = 0.03;
+
+/// The tip in lengths of the longest vein.
+fn tip_in_lengths(scenario: &Scenario, options: &Options) -> DVec3 {
+    let leaf = relax(scenario, options, &mut |_| {}).unwrap();
+    assert!(
+        leaf.outcome.is_success(),
+        "{}: {:?}",
+        scenario.name,
+        leaf.remark
+    );
+    tip(&leaf) / leaf.shape.longest()
+}
+
+fn to(tolerance: f64) -> Options {
+    Options {
+        tolerance: Some(tolerance),
+        ..Options::default()
+    }
+}
+
+fn on(segments: usize) -> Options {
+    Options {
+        method: Method::default().on_grid(Some(segments)),
+        ..Options::default()
+    }
+}
+
+/// What happened to a leaf on its path.
+#[track_caller]
+fn events(leaf: &Equilibrium) -> &[Event] {
+    match leaf.path.as_ref() {
+        Some(Path::Loaded { events, confirmed }) => {
+            assert!(confirmed, "{}", leaf.scenario);
+            events
+        }
+        other => panic!("{}: {other:?}", leaf.scenario),
+    }
+}
+
+#[test]
+fn real_leaves_rest_in_one_equilibrium_whatever_the_numerics() {
+    let (count, first) = (asked("LEAVES", 25), asked("SEED", 1) as u64);
+    let (mut elsewhere, mut uncertain) = (Vec::new(), 0);
+    for seed in first..first + count as u64 {
+        let leaf = parse(&real::leaf(seed));
+        let found = relax(&leaf, &to(1e-6), &mut |_| {}).unwrap();
+        assert!(found.outcome.is_success(), "{seed}");
+        uncertain += usize::from(!found.doubts.is_empty());
+        let reference = tip(&found) / found.shape.longest();
+        let mirrored = DVec3::new(reference.x, -reference.y, reference.z);
+        let others = [
+            tip_in_lengths(&leaf, &to(1e-3)),
+            tip_in_lengths(&leaf, &to(1e-9)),
+            tip_in_lengths(&leaf, &on(32)),
+            tip_in_lengths(&leaf, &on(64)),
+            tip_in_lengths(&parse(&real::in_metres(seed)), &to(1e-6)),
+            tip_in_lengths(&parse(&real::in_millimetres(seed)), &to(1e-6)),
+            tip_in_lengths(&parse(&real::backwards(seed)), &to(1e-6)),
+        ];
+        let off = others.map(|other| other.distance(reference));
+        if off.iter().any(|off| *off > SAME) {
+            println!(
+                "seed {seed}: {off:?}, mirrored {}",
+                others[6].distance(mirrored)
+            );
+            elsewhere.push(seed);
+        }
+    }
+    println!(
+        "{} of {count} elsewhere, {uncertain} uncertain",
+        elsewhere.len()
+    );
+    assert!(elsewhere.len() <= count / 1000, "{elsewhere:?}");
+    assert!(uncertain <= count / 50, "{uncertain}");
+}
+
+#[test]
+fn threads_do_not_matter() {
+    for seed in 1..8 {
+        let leaf = parse(&real::leaf(seed));
+        let [one, two] = [1, 2].map(|threads| on_threads(threads, || leaf.relax().unwrap()));
+        assert_eq!(one.shape, two.shape, "{seed}");
+        assert_eq!((one.path, one.work), (two.path, two.work));
+    }
+}
+
+/// Newton's method from arcs is tried first by the semi-implicit method, never by the explicit
+/// one: both end in the same equilibrium.
+#[test]
+fn methods_agree() {
+    let explicit = Options {
+        method: Method::Explicit { segments: None },
+        ..to(1e-3)
+    };
+    for name in [
+        "paper/fig04",
+        "paper/fig06",
+        "paper/fig10",
+        "paper/fig13",
+        "classic/fan_3",
+    ] {
+        let leaf = scenario(name, "leaf.rods=3");
+        let [a, b] = [to(1e-3), explicit.clone()].map(|options| tip_in_lengths(&leaf, &options));
+        assert!(a.distance(b) < SAME, "{name}: {a} {b}");
+    }
+}
+
+/// An upright column buckles at Greenhill's weight, 7.837 A/L^3, to one of two equal sides
+/// (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+#[test]
+fn a_column_turns_aside_at_its_critical_load() {
+    let weight = 12.0;
+    let column = rod(&format!(
+        "{RIGID}; stiffness.bending_3=2; load.gravity=[{}, 0, 0]",
+        -weight
+    ));
+    let found = column.relax().unwrap();
+    let event = only(events(&found));
+    assert_eq!(event.stage, Stage::Loading);
+    assert_eq!(event.happening, Happening::Branched { equally_open: true });
+    close("part", event.part, 7.83734744 / weight, 1.0 / 512.0);
+    assert!(tip(&found).z < -0.1, "{}", tip(&found));
+    assert_eq!(found.stability.negative_eigenvalues, Some(0));
+    assert_eq!(found.path.unwrap().word(), "branched");
+}
+
+/// Of the paper's Fig. 10 two equilibria are nearly mirror images. Slowly loaded the leaf sags;
+/// released from its flat arcs it ends above them, with more energy.
+#[test]
+fn a_released_leaf_may_end_elsewhere() {
+    let leaf = scenario("paper/fig10", "leaf.rods=5");
+    let released = Options {
+        route: Route::Release,
+        ..Options::default()
+    };
+    let [slow, released] =
+        [Options::default(), released].map(|options| relax(&leaf, &options, &mut |_| {}).unwrap());
+    assert_eq!(events(&slow), []);
+    assert_eq!(released.path, Some(Path::Released));
+    assert!(tip(&slow).z < -0.1 && tip(&released).z > 0.1);
+    assert!(slow.energy < released.energy);
+}
+
+/// Work of typical leaves: Newton's method at once, and a walk.
+#[test]
+fn counts_of_factorisations() {
+    let count = |leaf: &Scenario| leaf.relax().unwrap().work.factorizations;
+    assert_eq!(count(&scenario("paper/fig04", "")), 6);
+    let real: Vec<usize> = (1..12)
+        .map(|seed| count(&parse(&real::leaf(seed))))
+        .collect();
+    let mut sorted = real.clone();
+    sorted.sort_unstable();
+    assert!(sorted[sorted.len() / 2] <= 60, "{real:?}");
+}

@@ -1,0 +1,71 @@
+//! A straight rod rolled up by a dead moment on its tip; by relaxation and by
+//! shooting.
+
+use leafdyn_testing::*;
+
+/// An arc of the angle M L/EI, with no force in it, whatever its stretch and
+/// shear stiffness (closed form).
+#[test]
+fn every_station_lies_on_the_arc() {
+    for moment in [0.5, 1.5, PI, -2.0, 2.0 * PI, 4.0 * PI, 7.0 * PI] {
+        for (axial, shear) in [(1000.0, 400.0), (f64::INFINITY, f64::INFINITY), (2.0, 1.0)] {
+            let stiffness = set_stiffness(axial, shear);
+            let entries = format!("{stiffness}; load.tip_moment=[0, 0, {moment:?}]");
+            let leaf = Both::solve("classic/rollup", &entries);
+            let what = format!("M = {moment}, EA = {axial}");
+            let estimate = leaf.relaxed.accuracy.error_estimate.unwrap();
+            let relaxed = (estimate.min(1e-11), 1e-11);
+            let shapes = leaf.shapes().into_iter().zip([relaxed, (TIGHT, TIGHT)]);
+            for (rods, (within, turned)) in shapes {
+                for (&sigma, node) in leaf.relaxed.shape.stations.iter().zip(&rods[0].nodes) {
+                    let angle = moment * sigma;
+                    let arc = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / moment;
+                    let error = (node.position - arc).length();
+                    assert!(error <= within, "{what}: {error:.1e} at {sigma}");
+                    // The angles are exact on any grid, full turns included; what is integrated
+                    // between them is as good as the steps.
+                    let tangent = node.rotation * DVec3::X;
+                    let exact = DVec3::new(angle.cos(), angle.sin(), 0.0);
+                    assert!((tangent - exact).length() < turned, "{what}");
+                    // Turned by 2 pi, a quaternion has gone to the other sheet.
+                    close(&what, node.rotation.w, (0.5 * angle).cos(), turned);
+                    assert!(node.n.length() < 1e-11 * moment.abs(), "{what}: {}", node.n);
+                    assert!((node.m - moment * DVec3::Z).length() < TIGHT, "{what}");
+                    assert!((node.u - moment * DVec3::Z).length() < TIGHT, "{what}");
+                }
+            }
+            // Strain energy M^2 L/(2 EI) less the work M theta of the dead moment
+            // would be the potential; without one, the energy is that of strain.
+            for energy in [leaf.relaxed.energy.unwrap(), leaf.shot.energy] {
+                close(&what, energy, 0.5 * moment * moment, 1e-10);
+            }
+        }
+    }
+}
+
+/// More turns than are applied by steps: from the shape of the moment alone.
+#[test]
+fn hundreds_of_turns_are_found() {
+    for moment in [300.0_f64, 1500.0] {
+        let leaf = settle(&rod(&format!("load.tip_moment=[0, 0, {moment:?}]")), 1e-6);
+        let arc = DVec3::new(moment.sin(), 1.0 - moment.cos(), 0.0) / moment;
+        let off = (tip(&leaf) - arc).length();
+        assert!(off <= estimate(&leaf), "{moment}: {off:.1e}");
+    }
+}
+
+/// A section that is hardly stiff against twist, and no twist; more turns than any
+/// grid resolves.
+#[test]
+fn no_twist_where_there_is_none_and_too_many_turns_are_refused() {
+    let soft = rod("stiffness.torsion=1e-8; load.tip_moment=[0, 0, 1]");
+    let leaf = settle(&soft, 1e-6);
+    let arc = DVec3::new(1.0_f64.sin(), 1.0 - 1.0_f64.cos(), 0.0);
+    assert!((tip(&leaf) - arc).length() <= estimate(&leaf));
+    for moment in ["[0, 0, 1e5]", "[1e7, 0, 1e7]"] {
+        let turned = rod(&format!("load.tip_moment={moment}"));
+        let lost = relaxed(&turned, &Options::default());
+        assert_eq!(lost.outcome, Outcome::NotAtRest);
+        assert!(lost.remark.unwrap().contains("lower load.tip_moment"));
+    }
+}

@@ -1,0 +1,102 @@
+//! Stiffnesses and masses from a section: `[section]` in place of `[stiffness]`.
+
+use leafdyn_testing::*;
+
+fn with(section: &str) -> Result<Scenario, String> {
+    let text = format!(
+        r#"
+        name = "vein"
+        leaf = {{ rods = 2, length = [1.0, 0.9], fan = "symmetric" }}
+        coupling = {{ z = 1e-3 }}
+        load = {{ gravity = [0.0, 0.0, -1e-5] }}
+        {section}
+        "#
+    );
+    Scenario::from_toml(&text).map_err(|refused| refused.to_string())
+}
+
+/// The paper, section 2.2: veins of 0.1 mm and a Young's modulus of a few tenths of
+/// N/mm^2 have E I of the order of 1e-6 N mm^2.
+#[test]
+fn the_papers_estimate() {
+    let section = r#"section = { shape = "circle", diameter = 0.1, young = 0.2 }"#;
+    let scenario = with(section).unwrap();
+    let bending = scenario.rods[1].couple_stiffness[1].at(0.3);
+    leafdyn_testing::close("E I", bending, 0.2 * PI * 1e-4 / 64.0, 1e-20);
+    assert!((bending / 1e-6 - 1.0).abs() < 0.05);
+}
+
+/// A leaf with a section is the leaf with its stiffnesses, to the last bit.
+#[test]
+fn the_same_leaf_with_its_stiffnesses_written_out() {
+    let section = r#"section = { shape = "rectangle", width = [0.2, 0.3], thickness = 0.05, young = 3.0, poisson = 0.25, mass_density = 2.0 }"#;
+    let leaf = with(section).unwrap();
+    let list = |key: &str, profiles: Vec<&Profile>| {
+        let values: Vec<f64> = profiles.iter().map(|profile| profile.at(0.5)).collect();
+        format!("{key} = {values:?}\n")
+    };
+    let keys = "torsion bending_2 bending_3 axial shear_2 shear_3".split(' ');
+    let mut text = String::from("[stiffness]\n");
+    for (k, key) in keys.enumerate() {
+        let profiles = leaf.rods.iter().map(|rod| match k {
+            0..3 => &rod.couple_stiffness[k],
+            _ => &rod.force_stiffness[k - 3],
+        });
+        text += &list(key, profiles.collect());
+    }
+    text += "[dynamics]\n";
+    let dynamics = &leaf.dynamics;
+    text += &list("density", dynamics.density.iter().collect());
+    text += &list("rotary_inertia", dynamics.rotary_inertia.iter().collect());
+    assert_eq!(with(&text).unwrap(), leaf);
+    // Mass of the first vein per length: 2 times 0.2 times 0.05.
+    leafdyn_testing::close("density", leaf.dynamics.density[0].at(0.1), 0.02, 1e-16);
+}
+
+/// Along a tapering vein stiffnesses follow the diameter to the fourth power, not
+/// the line between their values at the ends; two methods agree on the leaf.
+#[test]
+fn a_taper_is_followed_exactly() {
+    let taper = r#"section = { shape = "circle", diameter = { at = [0.0, 0.4, 1.0], value = [0.1, 0.08, 0.02] }, young = 0.3 }"#;
+    let leaf = with(taper).unwrap();
+    let bending = &leaf.rods[0].couple_stiffness[1];
+    let second = PI / 64.0 * 0.05_f64.powi(4);
+    leafdyn_testing::close("in the middle", bending.at(0.7), 0.3 * second, 1e-20);
+    let cubed = |d: f64| d.powi(5) / 5.0;
+    let integral = (cubed(0.1) - cubed(0.08)) / 0.05 + (cubed(0.08) - cubed(0.02)) / 0.1;
+    let integral = 0.3 * PI / 64.0 * integral;
+    leafdyn_testing::close("integral", bending.integral(1.0) / integral, 1.0, 1e-13);
+    let relaxed = settle(&leaf, 1e-9);
+    let shooting = Method::Shooting { intervals: None };
+    let shot = leafdyn_testing::relaxed(&leaf, &by(shooting, to(1e-9)));
+    let apart = (tip(&relaxed) - tip(&shot)).length();
+    assert!(apart < 2e-9 && tip(&relaxed).z < -0.01, "{apart:e}");
+}
+
+#[test]
+fn what_cannot_be_a_section_is_refused() {
+    let table = r#"
+        shape = "circle", young = 1 => section.diameter is missing
+        diameter = 0.1, young = 1 => section.shape is missing
+        shape = "oval", diameter = 0.1, young = 1 => must be "circle", "ellipse" or "rectangle"
+        shape = "circle", diameter = 0.1, width = 1, young = 1 => a circle has a diameter
+        shape = "ellipse", diameter = 0.1, young = 1 => width (along d2)
+        shape = "circle", diameter = -0.1, young = 1 => must be greater than 0
+        shape = "circle", diameter = 0.1, young = 1, poisson = 0.6 => at most 0.5
+        shape = "circle", diameter = 0.1, young = 1, poisson = -1 => greater than -1
+        shape = "ellipse", width = 0.4, thickness = 0.1, poisson = -0.44, young = 1 => section.poisson = -0.44: gives a shear factor
+        shape = "circle", diameter = 1e-20, young = 1e-10 => choose other units
+        shape = "circle", diameter = [0.1], young = 1 => must have 2
+        shape = "circle", diameter = [0.1, 1e5], young = 1 => A_max/A
+    "#;
+    for (section, said) in pairs(table) {
+        let refused = with(&format!("section = {{ {section} }}")).unwrap_err();
+        assert!(refused.contains(said), "{section}: {refused}");
+    }
+    let both = r#"
+        section = { shape = "circle", diameter = 0.1, young = 1, mass_density = 1 }
+        stiffness = { torsion = 1.0 }"#;
+    assert!(with(both).unwrap_err().contains("leave out either"));
+    let masses = both.replace("stiffness = { torsion", "dynamics = { density");
+    assert!(with(&masses).unwrap_err().contains("section.mass_density"));
+}

@@ -1,0 +1,306 @@
+//! Derivatives of a leaf at rest by numbers of its scenario, against differences of
+//! whole relaxations.
+
+use std::f64::consts::TAU;
+
+use leafdyn::relax::{Mode, Reaction, Sensitivity};
+use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+use leafdyn_testing::random::Draw;
+use leafdyn_testing::*;
+
+/// Leaves to be tried; `LEAFDYN_LEAVES` in the environment asks for more.
+const LEAVES: usize = 24;
+
+/// A part of a scenario, and the keys that it has, between blanks.
+type Part = (String, &'static str);
+
+/// Stiffnesses, or a section.
+fn stiffness(draw: &mut Draw, number: usize, rods: usize) -> Part {
+    match number % 5 {
+        // Nearly rigid: forces are condensed out with less than the stiffness.
+        4 => (
+            format!(
+                "stiffness = {{ torsion = 1.0, bending_2 = 2.0, bending_3 = 1.5, axial = 3e7, shear_2 = 1e9, shear_3 = {:?} }}",
+                draw.uniform(20.0, 100.0)
+            ),
+            "stiffness.torsion stiffness.bending_2 stiffness.axial stiffness.shear_3",
+        ),
+        3 => (
+            "section = { shape = \"rectangle\", width = 0.2, thickness = 0.1, young = 2e4, poisson = 0.3 }".into(),
+            "section.young section.width section.thickness section.poisson",
+        ),
+        2 => (
+            format!(
+                "section = {{ shape = \"circle\", diameter = {:?}, young = 1e4 }}",
+                draw.list(rods, 0.15, 0.2)
+            ),
+            "section.young section.diameter[0] section.poisson",
+        ),
+        _ => (
+            format!(
+                "stiffness = {{ torsion = {:?}, bending_2 = {{ at = [0.0, 0.4, 1.0], value = [2.0, 1.5, 0.7] }}, bending_3 = 1.5, axial = 50.0, shear_2 = {:?}, shear_3 = 80.0 }}",
+                draw.list(rods, 0.5, 2.0),
+                draw.uniform(20.0, 100.0),
+            ),
+            "stiffness.torsion[0] stiffness.bending_3 stiffness.axial+stiffness.axial stiffness.shear_2",
+        ),
+    }
+}
+
+/// A moment on a single rod, or what couples several.
+fn coupling(draw: &mut Draw, number: usize, rods: usize) -> Part {
+    match rods {
+        1 => {
+            let moment = if number.is_multiple_of(8) { 0.3 } else { 0.0 };
+            let moment = format!("load.tip_moment = [0.0, {moment:?}, 0.0]");
+            (moment, "load.tip_moment[1]")
+        }
+        // Coupling may be zero, and not below.
+        _ => {
+            let z = draw.list(rods - 1, 0.5, 3.0);
+            let coupling = format!("coupling = {{ x = 0.0, y = 1.0, z = {z:?} }}");
+            (coupling, "coupling.x coupling.z[0]")
+        }
+    }
+}
+
+/// A joint tip that is held, pinned or clamped.
+fn held_tip(draw: &mut Draw, number: usize, rods: usize) -> Part {
+    match number % 6 {
+        1 | 3 => {
+            let tip = "tip = { held = \"pinned\", position = [0.7, 0.05, -0.2] }";
+            (tip.into(), "tip.position[0] tip.position[2]")
+        }
+        2 | 5 => {
+            let (angles, twist) = (draw.list(rods, -0.2, 0.2), draw.list(rods, -0.3, 0.3));
+            let place = "held = \"clamped\", position = [0.8, 0.02, -0.1]";
+            let tip = format!("tip = {{ {place}, angles = {angles:?}, twist = {twist:?} }}");
+            (tip, "tip.position[1] tip.angles[0] tip.twist[0]")
+        }
+        _ => (String::new(), ""),
+    }
+}
+
+/// A random leaf, and keys of all kinds of it.
+fn random(number: usize) -> (String, Vec<&'static str>) {
+    let mut draw = Draw(number as u64);
+    let rods = 1 + number % 4;
+    let joined = !number.is_multiple_of(3);
+    let (stiffness, its_keys) = stiffness(&mut draw, number, rods);
+    let (coupling, coupling_keys) = coupling(&mut draw, number, rods);
+    let (tip, tip_keys) = match rods > 1 && joined {
+        true => held_tip(&mut draw, number, rods),
+        false => (String::new(), ""),
+    };
+    let all = "rest.twist[0] rest.bend_2[0] rest.bend_3[0] rest.stretch load.gravity[0] \
+               load.gravity[2] load.tip_force[1] leaf.length[0] leaf.fan[0] dynamics.density";
+    let keys = [all, its_keys, coupling_keys, tip_keys];
+    let text = format!(
+        r#"
+        name = "leaf{number}"
+        {tip}
+        {coupling}
+        leaf.rods = {rods}
+        leaf.joined = {joined}
+        leaf.length = {:?}
+        leaf.fan = {:?}
+        {stiffness}
+        rest = {{ twist = {:?}, bend_2 = {:?}, bend_3 = {:?}, stretch = 1.1 }}
+        load.gravity = [{:?}, 0.0, {:?}]
+        load.tip_force = {:?}
+        dynamics = {{ density = 1.3, rotary_inertia = 0.01 }}
+        "#,
+        draw.list(rods, 0.8, 1.2),
+        draw.list(rods, -0.7, 0.7),
+        draw.list(rods, -0.5, 0.5),
+        draw.list(rods, -0.8, 0.8),
+        draw.list(rods, -0.5, 0.5),
+        draw.uniform(-0.5, 0.5),
+        draw.uniform(-1.0, -0.2),
+        draw.list(3, -0.5, 0.5),
+    );
+    let keys = keys.iter().flat_map(|keys| keys.split_whitespace());
+    (text, keys.collect())
+}
+
+fn keys(keys: &[&str]) -> Vec<Keys> {
+    keys.iter().map(|key| key.parse().unwrap()).collect()
+}
+
+fn derivatives(base: &Base, wanted: &[&str], options: &Options) -> (Equilibrium, Vec<Sensitivity>) {
+    let leaf = relax_with_sensitivities(base, &keys(wanted), options, &mut |_| {}).unwrap();
+    let (remark, text) = (&leaf.remark, base.text());
+    assert_eq!(leaf.outcome, Outcome::Converged, "{remark:?}\n{text}");
+    let found = leaf.sensitivities.clone().unwrap();
+    (leaf, found)
+}
+
+/// What the holder of a tip feels.
+fn felt(held: &Option<Reaction>) -> impl Iterator<Item = DVec3> {
+    held.iter().flat_map(|held| {
+        let moments = held.moments.iter().flatten().copied();
+        [held.force].into_iter().chain(moments)
+    })
+}
+
+/// Tips, places of the stations, energy, what the holder of the tip feels, the lowest
+/// eigenvalue and the frequencies; and how many of them are not of modes.
+fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
+    let places = leaf.tips.iter().copied();
+    let places = places.chain(nodes(&leaf.shape.rods).map(|node| node.position));
+    let mut all: Vec<f64> = places.flat_map(|it| it.to_array()).collect();
+    all.extend(leaf.energy);
+    all.extend(felt(&leaf.reaction).flat_map(|it| it.to_array()));
+    let count = all.len();
+    let modes = leaf.stability.modes.as_deref().unwrap_or_default();
+    all.extend(modes.iter().take(1).map(|mode| mode.eigenvalue));
+    let hertz = |mode: &Mode| mode.frequency().unwrap_or(f64::NAN) / TAU;
+    all.extend(modes.iter().map(hertz));
+    (all, count)
+}
+
+/// The same derivatives from eight relaxations, and how far those of four are off: much
+/// where modes come close to each other.
+fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
+    let value = base.value(key).unwrap();
+    let size = if value == 0.0 { 1.0 } else { value.abs() };
+    let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
+        let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
+        Some(results(&leafdyn_testing::relaxed(&scenario, options)).0)
+    };
+    let central = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].as_slice();
+    let forward = [-25.0, 48.0, -36.0, 16.0, -3.0];
+    let forward: Vec<_> = [0.0, 1.0, 2.0, 3.0, 4.0].into_iter().zip(forward).collect();
+    let by = |rule: &[(f64, f64)], step: f64| -> Option<Vec<f64>> {
+        let mut sums: Vec<f64> = Vec::new();
+        for (steps, weight) in rule {
+            let values = at(*steps, step)?;
+            sums.resize(values.len(), 0.0);
+            let terms = sums.iter_mut().zip(values);
+            terms.for_each(|(sum, value)| *sum += weight * value / (12.0 * step));
+        }
+        Some(sums)
+    };
+    // With half the step, of the error of the fourth order a sixteenth is left.
+    let (Some(coarse), Some(fine)) = (by(central, 3e-3 * size), by(central, 1.5e-3 * size)) else {
+        let found = by(&forward, 1e-3 * size).unwrap().into_iter();
+        return found.map(|value| (value, 0.0)).collect();
+    };
+    let both = fine.iter().zip(coarse);
+    both.map(|(fine, coarse)| (fine + (fine - coarse) / 15.0, (fine - coarse).abs() / 15.0))
+        .collect()
+}
+
+fn of(found: &Sensitivity) -> Vec<f64> {
+    let places = found.tips.iter().chain(found.positions.iter().flatten());
+    let places = places.flat_map(|it: &DVec3| it.to_array());
+    places
+        .chain([found.energy])
+        .chain(felt(&found.reaction).flat_map(|it| it.to_array()))
+        .chain(found.lowest_eigenvalue)
+        .chain(found.frequencies.iter().map(|it| it.unwrap_or(f64::NAN)))
+        .collect()
+}
+
+/// Every key, on one grid, which leaves no doubt about what is differenced.
+#[test]
+fn they_are_those_of_whole_relaxations() {
+    for number in 0..asked("LEAFDYN_LEAVES", LEAVES) {
+        let (text, wanted) = random(number);
+        let base = base(&text, "");
+        let options = with_modes(2, iterated(1e-9, 12));
+        let (leaf, found) = derivatives(&base, &wanted, &options);
+        assert_eq!(found.len(), wanted.len());
+        for (key, found) in keys(&wanted).iter().zip(&found) {
+            let value = base.value(key).unwrap().abs();
+            let size = if value == 0.0 { 1.0 } else { value };
+            let (ours, mut theirs) = (of(found), differenced(&base, key, &options));
+            let (units, count) = results(&leaf);
+            if key.to_string().starts_with("load.tip_moment") {
+                // With a moment there are no modes.
+                theirs.truncate(count);
+            }
+            assert_eq!(ours.len(), theirs.len(), "{number} {key}");
+            for (k, (ours, (theirs, unsure))) in ours.iter().zip(&theirs).enumerate() {
+                // What a change by the whole number would change, against the result.
+                let unit = units[k].abs().max(1.0);
+                let off = (ours - theirs).abs() - 4.0 * unsure;
+                let error = off * size / (unit + theirs.abs() * size);
+                // Eigenvalues are differenced to the second order.
+                let allowed = if k < count { 1e-7 } else { 1e-6 };
+                let what = format!("leaf {number}, {key}, result {k}: {ours} {theirs}");
+                assert!(error < allowed, "{what}\n{text}");
+            }
+        }
+    }
+}
+
+/// Over several grids they are as accurate as they say, by one solution for each
+/// number or for each result.
+#[test]
+fn their_errors_are_bounds() {
+    for number in [1, 2, 7] {
+        let (text, wanted) = random(number);
+        let base = base(&text, "");
+        for count in [2, wanted.len()] {
+            let rough = derivatives(&base, &wanted[..count], &leafdyn_testing::to(1e-5)).1;
+            let fine = derivatives(&base, &wanted[..count], &leafdyn_testing::to(1e-10)).1;
+            for (rough, fine) in rough.iter().zip(&fine) {
+                let key = &rough.key;
+                let tips = rough.tips.iter().zip(&fine.tips);
+                let apart = largest(tips.map(|(a, b)| a.distance(*b)));
+                let [error, least] = [rough, fine].map(|found| found.tip_error.unwrap());
+                let what = format!("{number} {key}: {apart:e} {error:e}");
+                assert!(apart <= error + least, "{what}");
+                assert!(least < 1e-3 * error + 1e-8);
+                let error = rough.energy_error.unwrap() + fine.energy_error.unwrap();
+                close(&format!("{number} {key}"), rough.energy, fine.energy, error);
+            }
+        }
+    }
+}
+
+/// A round rod vibrates alike in all directions. Other bending in one of them splits
+/// the lowest eigenvalue, which has no derivative then; weight along the rod does not.
+#[test]
+fn an_eigenvalue_that_splits_has_no_derivative() {
+    let round = format!("{}; load.gravity=[-1.0, 0.0, 0.0]", set_stiffness(1e3, 1e3));
+    let wanted = [
+        "stiffness.bending_2",
+        "load.gravity[0]",
+        "stiffness.torsion",
+    ];
+    let base = base(ROD, &round);
+    let options = with_modes(3, leafdyn_testing::to(1e-8));
+    let found = derivatives(&base, &wanted, &options).1;
+    let [bending, weight, torsion] = [0, 1, 2].map(|k| &found[k]);
+    assert_eq!(bending.lowest_eigenvalue, None);
+    assert_eq!(bending.lowest_eigenvalue_error, None);
+    assert_eq!(bending.frequencies[..2], [None, None]);
+    assert!(bending.frequencies[2].is_some());
+    let differenced = differenced(&base, &keys(&wanted)[1], &options);
+    let lowest = weight.lowest_eigenvalue.unwrap();
+    let same = |(value, _): &(f64, f64)| (value - lowest).abs() < 1e-6;
+    assert!(differenced.iter().any(same), "{lowest} {differenced:?}");
+    assert!(torsion.lowest_eigenvalue.unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn what_has_no_derivative_is_refused() {
+    let (text, _) = random(4);
+    let base = base(&text.replace("axial = 3e7", "axial = inf"), "");
+    for (key, said) in [
+        ("stiffness.axial", "is infinite"),
+        ("leaf.rods", "whole number"),
+        ("method.step", "setting of a method"),
+        ("leaf.length", "name one of its entries"),
+        ("leaf.length[7]", "count from 0"),
+        ("dynamics.duration", "write it there first"),
+        ("stiffness.torsion+stiffness.bending_2", "another value"),
+    ] {
+        let keys = keys(&[key]);
+        let refused = relax_with_sensitivities(&base, &keys, &Options::default(), &mut |_| {});
+        let refused = refused.map(|leaf| leaf.outcome).unwrap_err().to_string();
+        assert!(refused.contains(said), "{key}: {refused}");
+    }
+}

@@ -1,0 +1,233 @@
+//! Waves and twist as numbers: of surfaces whose waves are known, and of the
+//! paper's leaves.
+
+use glam::{DMat3, DQuat};
+use leafdyn::undulation::{Hand, Undulation, Vein};
+use leafdyn_testing::*;
+
+const SEGMENTS: usize = 64;
+
+/// Five veins, one beside the other, through the given points.
+fn sheet(point: impl Fn(f64, f64) -> DVec3) -> Vec<RodShape> {
+    let node = |sigma: f64, across: f64| NodeState {
+        position: point(sigma, across),
+        rotation: DQuat::IDENTITY,
+        v: DVec3::X,
+        u: DVec3::ZERO,
+        n: DVec3::ZERO,
+        m: DVec3::ZERO,
+    };
+    let rod = |j: i32| {
+        let along = stations().into_iter();
+        let nodes = along.map(|sigma| node(sigma, 0.5 * f64::from(j) - 1.0));
+        let (length, nodes) = (1.0, nodes.collect());
+        RodShape { length, nodes }
+    };
+    (0..5).map(rod).collect()
+}
+
+fn stations() -> Vec<f64> {
+    (0..=SEGMENTS).map(|i| i as f64 / SEGMENTS as f64).collect()
+}
+
+fn flat(sigma: f64, across: f64) -> DVec3 {
+    // Wide in the middle, and one point at the base and at the tip.
+    DVec3::new(sigma, 0.2 * across * (PI * sigma).sin(), 0.0)
+}
+
+fn measure(scenario: &Scenario, rods: &[RodShape]) -> Undulation {
+    Undulation::at_stations(scenario, &stations(), rods, Some(1e-6))
+}
+
+/// The margins wave, the midrib does not.
+fn wavy(waves: f64, height: f64) -> Vec<RodShape> {
+    sheet(|sigma, across| {
+        let up = height * across * across * (2.0 * PI * waves * sigma).sin();
+        flat(sigma, across) + DVec3::Z * up
+    })
+}
+
+#[test]
+fn waves_of_a_sine_are_counted_and_measured() {
+    let leaf = fig04(5);
+    for waves in [1.0, 1.5, 2.0, 3.5] {
+        for height in [0.005, 0.03] {
+            let found = measure(&leaf, &wavy(waves, height));
+            for vein in found.margins().unwrap() {
+                assert_eq!(vein.waves(), waves, "{height}: {vein:?}");
+                assert!((vein.amplitude / height - 1.0).abs() < 0.05, "{vein:?}");
+                let length = vein.wavelength.unwrap() * waves;
+                assert!((0.95..1.3).contains(&length), "{waves}, {height}: {length}");
+            }
+            let still = Vein {
+                half_waves: 0,
+                ..Vein::default()
+            };
+            assert_eq!(found.veins[2], still);
+        }
+    }
+}
+
+#[test]
+fn droop_and_domes_are_no_waves() {
+    let leaf = fig04(5);
+    let droops: [fn(f64) -> f64; 3] = [
+        |s| -0.3 * s * s * (6.0 - 4.0 * s + s * s) / 3.0,
+        // A bend next to the clamp, as under tension.
+        |s| -0.5 * (s - (1.0 - (-20.0 * s).exp()) / 20.0),
+        |_| 0.0,
+    ];
+    for droop in droops {
+        // Margins that arch the other way than they droop would be an S.
+        for dome in [0.0, 0.03, 0.1] {
+            let rods = sheet(|sigma, across| {
+                let over = dome * across * across * (PI * sigma).sin();
+                flat(sigma, across) + DVec3::Z * (droop(sigma) + over)
+            });
+            for vein in &measure(&leaf, &rods).veins {
+                assert_eq!((vein.waves(), vein.amplitude), (0.0, 0.0), "{vein:?}");
+                assert_eq!(vein.wavelength, None);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_below_the_noise_is_no_wave() {
+    let leaf = fig04(5);
+    let low = measure(&leaf, &wavy(2.0, 8e-4));
+    assert_eq!(low.margin().unwrap().waves(), 0.0);
+    let rods = wavy(2.0, 5e-3);
+    let unsure = Undulation::at_stations(&leaf, &stations(), &rods, Some(2e-3));
+    assert_eq!(unsure.margin().unwrap().waves(), 0.0);
+    assert_eq!(measure(&leaf, &rods).margin().unwrap().waves(), 2.0);
+}
+
+#[test]
+fn it_does_not_matter_where_the_leaf_lies_and_how_large_it_is() {
+    let leaf = fig04(5);
+    let rods = wavy(2.5, 0.02);
+    let found = measure(&leaf, &rods);
+    let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.3, -1.2, 2.0)));
+    let mirror = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+    let (one, still) = (DMat3::IDENTITY, DVec3::ZERO);
+    for (matrix, shift, scale, reversed) in [
+        (turn, DVec3::new(5.0, -2.0, 1.0), 1.0, false),
+        (mirror, still, 1.0, false),
+        (one, still, 1.0, true),
+        (one, still, 1e3, false),
+    ] {
+        let mut moved = rods.clone();
+        for rod in &mut moved {
+            rod.length *= scale;
+            let places = rod.nodes.iter_mut().map(|node| &mut node.position);
+            places.for_each(|x| *x = scale * (matrix * *x) + shift);
+        }
+        if reversed {
+            moved.reverse();
+        }
+        let mut moved = measure(&leaf, &moved).veins;
+        if reversed {
+            moved.reverse();
+        }
+        for (a, b) in moved.iter().zip(&found.veins) {
+            assert_eq!(a.half_waves, b.half_waves);
+            assert!((a.amplitude - scale * b.amplitude).abs() < 1e-12);
+            let lengths = a.wavelength.zip(b.wavelength);
+            assert!(lengths.is_none_or(|(a, b)| (a - scale * b).abs() < 1e-12));
+        }
+    }
+}
+
+#[test]
+fn the_papers_smooth_leaves_do_not_wave() {
+    for figure in ["fig04", "fig05", "fig06"] {
+        let leaf = settle(&scenario(&format!("paper/{figure}"), "leaf.rods=5"), 1e-6);
+        for vein in &leaf.undulation.veins {
+            assert_eq!(vein.waves(), 0.0, "{figure}: {vein:?}");
+        }
+    }
+}
+
+/// A rod at rest is twisted by u0 L, and seen from the base turns as told.
+#[test]
+fn the_twist_of_a_rod_is_that_of_its_section() {
+    for (twist, hand) in [(2.0, Hand::Right), (-1.5, Hand::Left), (0.0, Hand::None)] {
+        let twisted = format!("leaf.length=2.0; leaf.fan=[0.4]; rest.twist={twist:?}");
+        let leaf = settle(&rod(&twisted), 1e-9);
+        assert!((leaf.undulation.twist() - 2.0 * twist).abs() < 1e-9);
+        assert_eq!(leaf.undulation.hand(), hand);
+    }
+}
+
+/// The mirror image of a leaf turns the other way, and a symmetric leaf has no
+/// hand: its margins turn against each other.
+#[test]
+fn mirror_images_turn_the_other_way() {
+    let leaf = |twist: f64| {
+        let entries = format!("leaf.rods=5; leaf.fan='symmetric'; rest.twist={twist:?}");
+        settle(&scenario("paper/fig13", &entries), 1e-8).undulation
+    };
+    let (one, other, none) = (leaf(0.7), leaf(-0.7), leaf(0.0));
+    assert!((one.twist() + other.twist()).abs() < 1e-6);
+    assert!(one.twist() > 0.1, "{}", one.twist());
+    assert_eq!((one.hand(), other.hand()), (Hand::Right, Hand::Left));
+    assert_eq!(none.hand(), Hand::None);
+    let [first, last] = none.margins().unwrap().map(|vein| vein.twist);
+    assert!((first + last).abs() < 1e-6 && first.abs() > 0.1, "{first}");
+}
+
+/// The leaf of docs/undulation.md: what waves, and what does not.
+#[test]
+fn long_margins_on_a_stiff_midrib_wave_and_are_stable() {
+    let relaxed = |entries: &str| settle(&scenario("study/undulation", entries), 1e-5);
+    let leaf = relaxed("");
+    assert_eq!(leaf.stable(), Some(true));
+    let margin = leaf.undulation.margin().unwrap();
+    assert_eq!(margin.waves(), 2.0);
+    assert!(margin.amplitude > 0.05 && margin.tension < 0.0);
+    assert!((margin.predicted_waves() - 2.0).abs() < 1.0, "{margin:?}");
+    // Not without excess length, nor where the veins bend up and down as hard
+    // as sideways.
+    let stiff = "stiffness.bending_2=[1, 1, 1, 1, 1, 1000, 1, 1, 1, 1, 1]";
+    for entry in ["rest.stretch=1.0", stiff] {
+        let leaf = relaxed(entry);
+        assert_eq!(leaf.stable(), Some(true), "{entry}");
+        assert_eq!(leaf.undulation.margin().unwrap().waves(), 0.0, "{entry}");
+    }
+    // A soft midrib gives way, and the leaf folds up.
+    let folded = relaxed("stiffness.bending_2=0.01; stiffness.bending_3=1.0");
+    assert!(folded.tips[0].x < 0.1 && folded.tips[0].z.abs() > 0.5);
+}
+
+/// Without their weight the paper's soft leaves have a flat equilibrium: a
+/// saddle, whose index no longer changes with the grid.
+#[test]
+fn the_papers_soft_leaves_are_saddles_when_flat() {
+    for (figure, index) in [("fig08", 45), ("fig09", 6), ("fig10", 18)] {
+        let entries = "leaf.rods=5; load.gravity=[0, 0, 0]";
+        let flat = scenario(&format!("paper/{figure}"), entries);
+        for segments in [160, 320] {
+            let leaf = settle_on(&flat, segments, true);
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{figure}");
+            assert!(leaf.tips[0].z.abs() < 1e-12);
+        }
+    }
+}
+
+/// Where the flat leaf has just lost its stability, it leaves that saddle on the grid on
+/// which it is told, and is pushed no more than a few times.
+#[test]
+fn a_leaf_that_has_just_buckled_leaves_its_plane_soon() {
+    for (bending, torsion) in [(0.27, 1.46), (0.15, 1.84), (0.37, 1.2)] {
+        let overrides = leafdyn_testing::branch::weightless(bending, torsion);
+        let leaf = settle(&scenario("study/undulation", &overrides), 1e-4);
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+        let left = leaf.stability.saddle.map(|it| it.negative_eigenvalues);
+        assert!(left.is_some_and(|index| index > 0), "{bending}: {left:?}");
+        let height = leaf.tips[0].z.abs();
+        assert!(height > 1e-3, "{bending}: {height}");
+        let factorizations = leaf.work.factorizations;
+        assert!(factorizations <= 121, "{bending}: {factorizations}");
+    }
+}
