@@ -72,7 +72,7 @@ fn milliseconds(scenario: &Scenario, method: relax::Method) -> (f64, usize) {
 
 fn main() {
     let threads = rayon::current_num_threads();
-    let pools = [1, threads].map(shared::threads);
+    let pools = [1, threads].map(leafdyn_testing::bench::threads);
     println!("Fig. 4's leaf, explicit: nanoseconds per segment and step, looks at the energy");
     println!("included, median of {REPEATS}.");
     println!();

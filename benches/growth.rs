@@ -24,7 +24,7 @@ fn peak_memory() -> Option<f64> {
 
 /// The fastest of several runs on so many threads.
 fn fastest(leaf: &Scenario, threads: usize) -> Equilibrium {
-    let pool = shared::threads(threads);
+    let pool = leafdyn_testing::bench::threads(threads);
     let runs = (RODS_IN_ALL / leaf.rods.len()).clamp(FEWEST_RUNS, MOST_RUNS);
     let best = (0..runs)
         .map(|_| pool.install(|| relax(leaf, &to(1e-6), &mut |_| {}).expect("a valid request")))

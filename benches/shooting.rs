@@ -18,7 +18,7 @@ const RODS_IN_ALL: usize = 140;
 
 /// The fastest of several runs on so many threads, in milliseconds.
 fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solution) {
-    let pool = shared::threads(threads);
+    let pool = leafdyn_testing::bench::threads(threads);
     let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
     let start = Start::Leaf { stations, rods };
     let options = bvp::Options::new(start, stations, bvp::Precision::Error(ACCURACY));

@@ -4,47 +4,11 @@
 //! `LEAVES=1000 SEED=7 FAILED=folder cargo test --release --test statics coming_to_rest:: -- --nocapture`.
 
 use std::cell::Cell;
-use std::fmt::{Display, Write};
+use std::fmt::Write;
 use std::time::Instant;
 
-use leafdyn_testing::random::Draw;
+use leafdyn_testing::random::{Draw, list};
 use leafdyn_testing::*;
-
-impl Draw {
-    fn chance(&mut self, part: f64) -> bool {
-        self.uniform(0.0, 1.0) < part
-    }
-
-    /// A vector of a random direction, of a length up to `most`, over all its `decades`.
-    fn vector(&mut self, most: f64, decades: i32) -> Vec<f64> {
-        let length = self.log(most * 0.1_f64.powi(decades), most);
-        let (z, turn) = (self.uniform(-1.0, 1.0), self.uniform(-3.2, 3.2));
-        let (sin, cos) = turn.sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        vec![length * across * cos, length * across * sin, length * z]
-    }
-
-    /// A quantity: alike in all rods, each rod's own, or profiles.
-    fn quantity(&mut self, rods: usize, next: impl Fn(&mut Self) -> f64) -> String {
-        match self.uniform(0.0, 1.0) {
-            kind if kind < 0.4 => next(self).to_string(),
-            kind if kind < 0.8 => list((0..rods).map(|_| next(self)).collect()),
-            _ => {
-                let (value, knot) = (next(self), self.uniform(0.1, 0.9));
-                let values: Vec<f64> = (0..3).map(|_| value * self.uniform(0.3, 1.0)).collect();
-                match value.is_finite() {
-                    true => format!("{{ at = [0.0, {knot}, 1.0], value = {} }}", list(values)),
-                    false => "inf".into(),
-                }
-            }
-        }
-    }
-}
-
-fn list<T: Display>(values: Vec<T>) -> String {
-    let values: Vec<String> = values.iter().map(T::to_string).collect();
-    format!("[{}]", values.join(", "))
-}
 
 /// Leaves that take longer, in seconds, are told, as those that fail.
 const SLOW: f64 = 5.0;

@@ -267,7 +267,7 @@ fn a_run_goes_on_when_there_is_room_on_the_disk_again() {
         );
         let mut shell = Command::new("sh");
         let shell = shell.current_dir(place.path(".")).args(["-c", &script]);
-        shell.arg(program).output().unwrap().into()
+        shell.arg(&program).output().unwrap().into()
     };
     // Blocks are of 512 or of 1024 bytes.
     let run_out = run("ulimit -f 600;", "").ends(2);
