@@ -107,6 +107,7 @@ mod modes;
 mod motion;
 mod newton;
 pub mod numbers;
+mod refusal;
 pub mod relax;
 mod rod;
 mod rotation;

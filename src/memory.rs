@@ -69,7 +69,7 @@ fn group_limit(root: &Path, groups: &str) -> Option<u64> {
 
 /// A request that would take more memory than it may: what it is, and what to request in its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}, or raise the limit on memory")]
+#[error("{0}")]
 pub struct TooMuch(String);
 
 /// Refuses what takes this product of numbers, in bytes, if that is more than is [`allowed`].

@@ -42,6 +42,7 @@ mod stencil;
 pub use crate::bvp::Correction;
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
+pub use crate::refusal::RefusedOption;
 pub use crate::shape::{NodeState, RodShape};
 pub use crate::words::UnknownWord as UnknownMethod;
 pub(crate) use equilibrium::serialize_index;

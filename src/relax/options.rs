@@ -5,6 +5,7 @@ use std::fmt;
 use crate::bvp;
 use crate::limit::Limit;
 use crate::memory::TooMuch;
+use crate::refusal::RefusedOption;
 use crate::relax::method::Method;
 use crate::relax::path::Route;
 use glam::DVec3;
@@ -93,6 +94,10 @@ pub const SMALLEST_TOLERANCE: f64 = 1e-12;
 /// Largest meaningful tolerance.
 pub const LARGEST_TOLERANCE: f64 = 0.1;
 
+/// What a tolerance must be.
+const TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the largest rod length; double \
+     precision does not carry more)";
+
 /// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
 pub const MAX_NODES: usize = 4_000_000;
 
@@ -103,35 +108,19 @@ pub const MOST_MODES: usize = 100;
 pub const MAX_INTERVALS: usize = 4096;
 
 /// Checks that a tolerance is in range.
-pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
+pub fn check_tolerance(tolerance: f64) -> Result<(), RefusedOption> {
     match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         true => Ok(()),
-        false => Err(RelaxError::Tolerance { found: tolerance }),
+        false => Err(RefusedOption::new("tolerance", tolerance, TOLERANCES)),
     }
 }
 
 /// A request that cannot be met.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RelaxError {
-    /// The tolerance is out of range.
-    #[error(
-        "tolerance = {found}: allowed are {SMALLEST_TOLERANCE:e} to {LARGEST_TOLERANCE} \
-         (relative to the largest rod length; double precision does not carry more)"
-    )]
-    Tolerance {
-        /// The requested tolerance.
-        found: f64,
-    },
-    /// Too few segments for the panels of the profiles.
-    #[error(
-        "segments = {found}: at least {least} are needed, one for every piece between the knots of the profiles"
-    )]
-    TooFewSegments {
-        /// Requested number of segments.
-        found: usize,
-        /// Least number that can be used.
-        least: usize,
-    },
+    /// An option has a value that it cannot have.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
     /// Too many nodes.
     #[error(
         "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (7 to 24 GB); use fewer rods or segments"
@@ -145,42 +134,6 @@ pub enum RelaxError {
         nodes: usize,
     },
     /// Too much memory.
-    #[error(transparent)]
+    #[error("{0}")]
     Memory(#[from] TooMuch),
-    /// The explicit method has no stable time step for rigid rods.
-    #[error(
-        "method = explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
-    )]
-    Rigid,
-    /// The explicit method integrates a motion, which a dead moment may drive forever.
-    #[error(
-        "method = explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
-    )]
-    Follows,
-    /// Shooting from arcs has no continuation to a held tip.
-    #[error(
-        "method = {found}: a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest"
-    )]
-    HeldTip {
-        /// The requested method.
-        found: &'static str,
-    },
-    /// Too many modes.
-    #[error("modes = {found}: allowed are 0 to {MOST_MODES}")]
-    Modes {
-        /// Requested number of modes.
-        found: usize,
-    },
-    /// Shooting has no grids on which eigenvalues are computed.
-    #[error("modes = {found}: modes are those of a relaxed leaf: use the method semi-implicit")]
-    ModesByShooting {
-        /// Requested number of modes.
-        found: usize,
-    },
-    /// The number of intervals is out of range.
-    #[error("intervals = {found}: allowed are 1 to {MAX_INTERVALS}")]
-    Intervals {
-        /// Requested number of intervals.
-        found: usize,
-    },
 }

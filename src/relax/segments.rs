@@ -2,6 +2,7 @@
 
 use crate::leaf::Leaf;
 use crate::memory;
+use crate::refusal::RefusedOption;
 use crate::relax::method::Method;
 use crate::relax::methods::moment;
 use crate::relax::options::{MAX_NODES, RelaxError};
@@ -54,7 +55,10 @@ pub fn check_segments(
     let (rods, segments, least) = (leaf.rods(), found, panels);
     let nodes = rods.saturating_mul(segments);
     if found < least {
-        return Err(RelaxError::TooFewSegments { found, least });
+        let why = format!(
+            "at least {least} are needed, one for every piece between the knots of the profiles"
+        );
+        return Err(RefusedOption::new("segments", found, why).into());
     }
     if nodes > MAX_NODES {
         return Err(RelaxError::TooManyNodes {

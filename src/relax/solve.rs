@@ -4,6 +4,7 @@ use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Stop;
+use crate::refusal::RefusedOption;
 use crate::relax::decision::{Decision, Verdict, decide};
 use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::level::Level;
@@ -77,12 +78,13 @@ fn relax_once(
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     if options.modes > MOST_MODES {
-        let found = options.modes;
-        return Err(RelaxError::Modes { found });
+        let allowed = format!("allowed are 0 to {MOST_MODES}");
+        return Err(RefusedOption::new("modes", options.modes, allowed).into());
     }
     if options.mode_shapes && options.method.is_shooting() {
-        let found = options.modes;
-        return Err(RelaxError::ModesByShooting { found });
+        // Shooting has no grids on which eigenvalues are computed.
+        let why = "modes are those of a relaxed leaf: use the method semi-implicit";
+        return Err(RefusedOption::new("modes", options.modes, why).into());
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
@@ -96,8 +98,9 @@ fn relax_once(
     shooting::check_intervals(scenario.rods.len(), intervals)?;
     if !matches!(options.method, Method::ShootingFromRest { .. }) {
         if scenario.held_tip.is_some() {
-            let found = options.method.word();
-            return Err(RelaxError::HeldTip { found });
+            // Shooting from arcs has no continuation to a held tip.
+            let why = "a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest";
+            return Err(RefusedOption::new("method", options.method.word(), why).into());
         }
         let arcs = Start::Arcs;
         let mut found = shooting::shoot(scenario, options, intervals, tolerance, arcs, progress);

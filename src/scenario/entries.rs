@@ -109,7 +109,7 @@ impl Entries {
                 problem,
             };
             let Some((path, text)) = given.split_once('=') else {
-                let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
+                let problem = "must be KEY=VALUE, as in load.gravity=[0,0,-0.5]";
                 return Err(refuse(problem.into()));
             };
             let part = Part::parse(path).map_err(refuse)?;

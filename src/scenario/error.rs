@@ -56,7 +56,7 @@ impl fmt::Display for Place {
                 f.write_str(file)?;
                 line.map_or(Ok(()), |line| write!(f, ":{line}"))
             }
-            Place::Set { given } => write!(f, "--set {given}"),
+            Place::Set { given } => write!(f, "set {given}"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Requests that cannot be simulated.
 
+use crate::refusal::RefusedOption;
 use crate::relax;
 
 /// Longest expected duration of a simulation that is accepted, in seconds.
@@ -36,25 +37,10 @@ pub enum Refused {
         /// Whether a rod is rigid, which the explicit method cannot move.
         rigid: bool,
     },
-    /// The time step is not positive.
-    #[error("step = {found}: must be greater than 0")]
-    NotPositive {
-        /// The requested step.
-        found: f64,
-    },
-    /// The time step is too long for the explicit method.
-    #[error(
-        "step = {found}: the explicit method is stable up to {stable:.3e}, because of {limit}: \
-         use a shorter step, or the semi-implicit method, or leave the step out"
-    )]
-    Unstable {
-        /// The requested step.
-        found: f64,
-        /// The longest stable one.
-        stable: f64,
-        /// What limits it.
-        limit: &'static str,
-    },
+    /// An option has a value that it cannot have, such as a time step that is too long for the
+    /// explicit method.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
     /// The time step is too short for the duration.
     #[error(
         "the time step of {step:.3e} makes {steps:.1e} steps, which take some {} days, and at most {} are allowed: \
@@ -75,7 +61,7 @@ pub enum Refused {
         /// Whether the step was given.
         given: bool,
     },
-    /// The grid or the tolerance is invalid.
+    /// The grid is invalid.
     #[error(transparent)]
     Request(#[from] relax::RelaxError),
     /// The leaf should start at rest, and its relaxation fails.

@@ -35,11 +35,12 @@ pub use error::{MOST_SECONDS, Refused};
 pub use record::{Frame, Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
 
+use crate::refusal::RefusedOption;
 use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
-use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE};
+use crate::relax;
 use crate::scenario::{Scenario, slips};
 use crate::words;
 
@@ -97,13 +98,12 @@ impl Simulation {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)
         {
-            return Err(Refused::NotPositive { found });
+            let step = RefusedOption::new("step", found, "must be greater than 0");
+            return Err(step.into());
         }
         let leaf = Leaf::new(scenario);
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
-            return Err(RelaxError::Tolerance { found: tolerance }.into());
-        }
+        relax::check_tolerance(tolerance)?;
         let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
@@ -346,11 +346,14 @@ fn explicit(
     let bound = explicit.stable_step();
     let stable = bound.step * physics.time;
     match step {
-        Some(found) if found > stable => Err(Refused::Unstable {
-            found,
-            stable,
-            limit: bound.limit,
-        }),
+        Some(found) if found > stable => {
+            let why = format!(
+                "the explicit method is stable up to {stable:.3e}, because of {}: use a shorter \
+                 step, or the semi-implicit method, or leave the step out",
+                bound.limit
+            );
+            Err(RefusedOption::new("step", found, why).into())
+        }
         _ => Ok((
             explicit,
             StableStep {

@@ -344,7 +344,7 @@ pub enum VaryError {
     #[error("{0}")]
     Knob(String),
     /// The scenario with these values is invalid.
-    #[error(transparent)]
+    #[error("{0}")]
     Scenario(#[from] ScenarioError),
 }
 

@@ -16,6 +16,7 @@ use std::env;
 use std::error::Error;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
+use std::iter::successors;
 use std::process::{self, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -24,9 +25,9 @@ use clap::{Parser, Subcommand};
 
 use crate::files::{self, Checkpointer};
 use crate::report::{FileError, Refused, json, numbers::brief};
-use leafdyn::relax::RelaxError;
-use leafdyn::scenario::printable;
-use leafdyn::study::{ChartError, MapRefused, TraceError};
+use leafdyn::memory::TooMuch;
+use leafdyn::relax::RefusedOption;
+use leafdyn::scenario::{Place, ScenarioError, printable};
 
 /// What verbs are made of.
 mod kit {
@@ -79,42 +80,35 @@ impl Cli {
     }
 }
 
-/// Whether a refusal is one of the library about an option: others may begin with any words, such
-/// as the name of a file.
-fn is_about_an_option(refusal: &Refusal) -> bool {
-    let of_trace = refusal.downcast_ref::<TraceError>();
-    let of_chart = refusal.downcast_ref::<ChartError>();
-    refusal.is::<RelaxError>()
-        || refusal.is::<leafdyn::simulate::Refused>()
-        || refusal.is::<MapRefused>()
-        || matches!(of_trace, Some(TraceError::Relax(_) | TraceError::Option(_)))
-        || matches!(
-            of_chart,
-            Some(ChartError::Relax(_) | ChartError::Seconds(_))
-        )
+/// The first error of this kind among the causes of a refusal, itself included.
+fn cause<E: Error + 'static>(refusal: &Refusal) -> Option<&E> {
+    let first: &(dyn Error + 'static) = &**refusal;
+    let mut causes = successors(Some(first), |&error| error.source());
+    causes.find_map(|error| error.downcast_ref())
 }
 
-/// Rewrites a message of the library about an option as the user types it:
-/// `segments = 2: ...` becomes `--segments 2: ...`.
+/// A refusal with what it is about as the user types it: options, overrides, and the limit on
+/// memory.
 fn name_options(refusal: Refusal) -> Refusal {
-    const OPTIONS: [&str; 7] = [
-        "cell-seconds",
-        "intervals",
-        "method",
-        "modes",
-        "seconds",
-        "segments",
-        "step",
-    ];
-    let text = refusal.to_string();
-    if let Some(text) = text.strip_suffix("raise the limit on memory") {
-        return format!("{text}raise the limit with --memory").into();
+    if let Some(RefusedOption {
+        option,
+        value,
+        reason,
+    }) = cause(&refusal)
+    {
+        return format!("--{} {value}: {reason}", option.replace('_', "-")).into();
     }
-    match text.split_once(' ') {
-        Some((option, rest)) if OPTIONS.contains(&option) && is_about_an_option(&refusal) => {
-            format!("--{option} {}", rest.trim_start_matches("= ")).into()
-        }
-        _ => refusal,
+    if let Some(ScenarioError {
+        place: Place::Set { given },
+        problem,
+        ..
+    }) = cause(&refusal)
+    {
+        return printable(&format!("--set {given}: {problem}")).into();
+    }
+    match cause::<TooMuch>(&refusal) {
+        Some(too_much) => format!("{too_much}, or raise the limit with --memory").into(),
+        None => refusal,
     }
 }
 

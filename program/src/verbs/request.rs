@@ -16,13 +16,13 @@ use crate::files::{self, Kind, Selection, Written};
 use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
 use leafdyn::memory;
-use leafdyn::scenario::Entries;
+use leafdyn::scenario::{Entries, Place, ScenarioError, printable};
 use leafdyn::study::Base;
 use leafdyn::study::UnknownWord;
 
 use super::job::{Delivered, Job, attempt};
 use super::progress::{ProgressLine, fraction_of};
-use super::{Refusal, Status, name_options, note, refuse, show, show_report};
+use super::{Refusal, Status, cause, name_options, note, refuse, show, show_report};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -162,11 +162,16 @@ impl Request {
 
     /// Names the option that put a refused value into a scenario, if it was not --set.
     fn as_typed(&self, traits: VerbTraits, refusal: Refusal) -> Refusal {
-        let text = refusal.to_string();
-        let said = (text.strip_prefix("--set ")).and_then(|rest| rest.split_once(": "));
-        match (traits.puts, said) {
-            (Some(option), Some((given, why))) if !self.overrides.iter().any(|it| it == given) => {
-                format!("{option}: with {given}: {why}").into()
+        match (traits.puts, cause(&refusal)) {
+            (
+                Some(option),
+                Some(ScenarioError {
+                    place: Place::Set { given },
+                    problem,
+                    ..
+                }),
+            ) if !self.overrides.contains(given) => {
+                printable(&format!("{option}: with {given}: {problem}")).into()
             }
             _ => refusal,
         }

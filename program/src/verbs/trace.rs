@@ -173,7 +173,6 @@ fn cells(given: &str) -> Result<[usize; 2], String> {
 fn name_option(error: TraceError) -> Refusal {
     match error {
         TraceError::Vary { .. } => format!("--vary {error}").into(),
-        TraceError::Option { .. } => format!("--{error}").into(),
         error => error.into(),
     }
 }

@@ -15,6 +15,7 @@ use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Snapshot, Stopped};
 use crate::newton::{Stop, Work};
+use crate::refusal::RefusedOption;
 use crate::relax::methods::Relaxation;
 use crate::relax::options::RelaxError;
 use crate::relax::saddle;
@@ -58,17 +59,25 @@ const LONGEST_REMAINING: f64 = 1e-6;
 /// Limit on nodes times steps: some ten seconds.
 const BUDGET: usize = 600_000_000;
 
-/// Refuses leaves that the explicit method cannot treat.
+const RIGID: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
+     give a number, or use semi-implicit";
+
+const FOLLOWS: &str = "under load.tip_moment, which has no potential, motion need not come to \
+     rest; use semi-implicit, or shooting";
+
+/// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
+/// which may drive a motion forever.
 pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
+    let refuse = |why| Err(RefusedOption::new("method", "explicit", why).into());
     let rigid = |rod: &Rod| {
         let stiffest = (rod.force_stiffness.iter()).fold(0.0_f64, |m, h| m.max(h.max_abs()));
         stiffest.is_infinite()
     };
     if leaf.scenario().rods.iter().any(rigid) {
-        return Err(RelaxError::Rigid);
+        return refuse(RIGID);
     }
     if leaf.loads.tip_moment != DVec3::ZERO {
-        return Err(RelaxError::Follows);
+        return refuse(FOLLOWS);
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Work;
+use crate::refusal::RefusedOption;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
@@ -67,7 +68,8 @@ fn curve(rod: &RodShape) -> Vec<DVec3> {
 /// of `rods`; without a number the check is for one interval, the fewest that will be chosen.
 pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), RelaxError> {
     if let Some(found) = intervals.filter(|found| !(1..=MAX_INTERVALS).contains(found)) {
-        return Err(RelaxError::Intervals { found });
+        let allowed = format!("allowed are 1 to {MAX_INTERVALS}");
+        return Err(RefusedOption::new("intervals", found, allowed).into());
     }
     let intervals = intervals.unwrap_or(1);
     Ok(memory::shooting(rods, intervals)?)

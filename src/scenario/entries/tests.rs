@@ -58,7 +58,7 @@ fn parts_and_scales_are_whole_values() {
 #[test]
 fn slips_are_explained() {
     let table = r#"
-        stiffness.torsion[3]=1 => --set stiffness.torsion[3]=1: stiffness.torsion[3]: there are 3 entries
+        stiffness.torsion[3]=1 => set stiffness.torsion[3]=1: stiffness.torsion[3]: there are 3 entries
         stiffness.bending_2[0]=1 => is no list in the scenario
         stiffness.torsion.value[0]=1 => has no value there
         load.gravity[3]=1 => x, y, z have the indices 0, 1, 2
@@ -74,7 +74,7 @@ fn slips_are_explained() {
         scale:stiffness.torsion=inf => the factor must be a finite number
         scale:dynamics.density=2 => is not in the scenario: write it first
         scale:stiffness.torsion=-1 => stiffness.torsion = -1.0: must be greater than 0
-        stiffness.torsion[1]=-1 => --set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0
+        stiffness.torsion[1]=-1 => set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0
         stiffness.bending2[1]=1 => unknown key stiffness.bending2 (did you mean stiffness.bending_2?)
         scale:torsion=1 => did you mean stiffness.torsion?
         stiffness.gold=1 => unknown key stiffness.gold: [stiffness] has torsion, bending_2

@@ -11,6 +11,7 @@ pub use run::boundary;
 
 use super::trace::{TraceError, TraceRequest};
 use super::vary::Vary;
+use crate::refusal::RefusedOption;
 
 /// Largest number of curves of a boundary.
 pub const MOST_CURVES: usize = 24;
@@ -47,10 +48,10 @@ impl BoundaryRequest {
             return Err(TraceError::Vary(why));
         }
         let possible = |cells: &usize| (1..=map::MOST_CELLS).contains(cells);
-        if self.map.is_some_and(|map| !map.iter().all(possible)) {
+        if let Some([columns, rows]) = self.map.filter(|map| !map.iter().all(possible)) {
             let most = map::MOST_CELLS;
-            let why = format!("map: give from 1 to {most} cells along each number, as 16x16");
-            return Err(TraceError::Option(why));
+            let why = format!("give from 1 to {most} cells along each number, as 16x16");
+            return Err(RefusedOption::new("map", format!("{columns}x{rows}"), why).into());
         }
         Ok(())
     }

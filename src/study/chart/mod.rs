@@ -11,6 +11,7 @@ mod run;
 mod scaling;
 mod timing;
 
+use crate::refusal::RefusedOption;
 use run::Runs;
 use thiserror::Error;
 
@@ -56,8 +57,8 @@ pub enum ChartError {
     #[error(transparent)]
     Relax(#[from] RelaxError),
     /// The time requested is out of range.
-    #[error("seconds {0}: must be greater than 0 and at most {MOST_SECONDS}")]
-    Seconds(f64),
+    #[error("{0}")]
+    Seconds(#[from] RefusedOption),
     /// The single thread for all runs cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] rayon::ThreadPoolBuildError),
@@ -107,7 +108,8 @@ fn on_one_thread<R: Send>(
     work: impl FnOnce() -> Result<R, RelaxError> + Send,
 ) -> Result<R, ChartError> {
     if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
-        return Err(ChartError::Seconds(seconds));
+        let allowed = format!("must be greater than 0 and at most {MOST_SECONDS}");
+        return Err(RefusedOption::new("seconds", seconds, allowed).into());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(work)?)

@@ -106,7 +106,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let clock = Instant::now();
     let base = &request.base;
     if let Some(tolerance) = request.tolerance {
-        check_tolerance(tolerance)?;
+        check_tolerance(tolerance).map_err(RelaxError::from)?;
     }
     let coordinates = coordinates(request)?;
     let options = Options {

@@ -1,5 +1,6 @@
 //! Requests for maps, and their validation.
 
+use crate::refusal::RefusedOption;
 use std::time::Duration;
 
 use serde::{Serialize, Serializer};
@@ -8,7 +9,7 @@ use super::cell::{Cell, one_line};
 use super::motion;
 use super::row::{MapMethod, MapRow};
 use crate::limit::Limit;
-use crate::memory;
+use crate::memory::{self, TooMuch};
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
@@ -37,8 +38,17 @@ pub struct MapRequest {
 
 /// Why a map cannot be made, as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct MapRefused(String);
+pub enum MapRefused {
+    /// An option has a value that it cannot have.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
+    /// Its rows would take too much memory.
+    #[error("{0}")]
+    Memory(#[from] TooMuch),
+    /// The axes or the methods do not make a map, or one that is too large.
+    #[error("{0}")]
+    Map(String),
+}
 
 impl MapRequest {
     /// Validates the request. Default `methods`: all, explicit motion only if
@@ -50,7 +60,7 @@ impl MapRequest {
         tolerance: Option<f64>,
         cell_seconds: f64,
     ) -> Result<Self, MapRefused> {
-        let refuse = |why: String| Err(MapRefused(why));
+        let refuse = |why: String| Err(MapRefused::Map(why));
         if !(1..=2).contains(&axes.len()) {
             return refuse(format!("{} axes: a map has one or two axes", axes.len()));
         }
@@ -67,10 +77,10 @@ impl MapRequest {
         }
         if !(cell_seconds > 0.0 && cell_seconds <= 1e6) {
             let allowed = "must be greater than 0 and at most 1e6";
-            return refuse(format!("cell-seconds {cell_seconds}: {allowed}"));
+            return Err(RefusedOption::new("cell_seconds", cell_seconds, allowed).into());
         }
         if let Some(tolerance) = tolerance {
-            check_tolerance(tolerance).map_err(|why| MapRefused(why.to_string()))?;
+            check_tolerance(tolerance)?;
         }
         let steps = base.knobs().step.is_some() || axes.iter().any(|a| a.keys.sets(Knob::Step));
         let methods = match methods {
@@ -90,7 +100,7 @@ impl MapRequest {
         if methods.is_empty() {
             return refuse("no methods: name one at least".into());
         }
-        memory::map(found, methods.len()).map_err(|why| MapRefused(why.to_string()))?;
+        memory::map(found, methods.len())?;
         let request = MapRequest {
             base,
             axes,
@@ -108,7 +118,7 @@ impl MapRequest {
         let first = self.base.at(&self.values(0));
         let last = self.base.at(&self.values(self.cells() - 1));
         match (first, last) {
-            (Err(VaryError::Key(why)), Err(VaryError::Key(_))) => Err(MapRefused(why)),
+            (Err(VaryError::Key(why)), Err(VaryError::Key(_))) => Err(MapRefused::Map(why)),
             _ => Ok(()),
         }
     }

@@ -10,6 +10,7 @@ pub use run::trace;
 pub(super) use run::traced;
 
 use super::vary::{Base, Vary};
+use crate::refusal::RefusedOption;
 use crate::relax::RelaxError;
 use crate::scenario::Key;
 use crate::study::{Target, VaryError};
@@ -49,7 +50,7 @@ pub enum TraceError {
     Vary(String),
     /// An option has a value it cannot have.
     #[error("{0}")]
-    Option(String),
+    Option(#[from] RefusedOption),
     /// The scenario at the start of the range is invalid.
     #[error(transparent)]
     Scenario(#[from] VaryError),
@@ -89,8 +90,7 @@ impl TraceRequest {
             return Err(refuse(NO_MOMENT));
         }
         if self.most_points < 2 {
-            let why = format!("points {}: must be 2 or more", self.most_points);
-            return Err(TraceError::Option(why));
+            return Err(RefusedOption::new("points", self.most_points, "must be 2 or more").into());
         }
         Ok(())
     }
