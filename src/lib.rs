@@ -23,7 +23,7 @@
 //! | state a leaf | [`Scenario::read`](scenario::Scenario::read), [`from_toml`](scenario::Scenario::from_toml) |
 //! | bring it to rest | [`Scenario::relax`](scenario::Scenario::relax), [`relaxation`](scenario::Scenario::relaxation) |
 //! | have it confirmed by an independent method | [`study::check()`] |
-//! | find its other equilibria | [`study::all()`] |
+//! | find its other equilibria | [`study::equilibria()`] |
 //! | follow one as a number varies, through folds | [`study::trace()`] |
 //! | see it move | [`simulate::Simulation`] |
 //! | see where methods fail, or how fast they are | [`study::map()`], [`study::chart()`] |

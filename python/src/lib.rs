@@ -39,7 +39,7 @@ mod _leafdyn {
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]
-    use super::verbs::{all_shapes, boundary, chart, check, map, program, trace};
+    use super::verbs::{boundary, chart, check, equilibria, map, program, trace};
 
     #[expect(non_upper_case_globals, reason = "it is the name that Python knows")]
     #[pymodule_export]

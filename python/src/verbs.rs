@@ -56,20 +56,20 @@ pub fn check<'py>(
     Ok((Files::of(check, input), leaf, solution))
 }
 
-/// All equilibria: their files, and each leaf with the number of starts that ended there and
+/// Equilibria equilibria: their files, and each leaf with the number of starts that ended there and
 /// whether the plain one is among them.
-type All = (Files, Vec<(Leaf, usize, bool)>);
+type Equilibria = (Files, Vec<(Leaf, usize, bool)>);
 
 /// Looks for all equilibria of a leaf.
 #[pyfunction]
-pub fn all_shapes(
+pub fn equilibria(
     py: Python,
     scenario: &Scenario,
     tolerance: Option<f64>,
     full_model: bool,
     stations: Option<usize>,
     progress: Option<&Bound<PyAny>>,
-) -> PyResult<All> {
+) -> PyResult<Equilibria> {
     check_stations(stations)?;
     let scenario = scenario.checked.clone();
     let input = scenario.clone();
@@ -83,7 +83,7 @@ pub fn all_shapes(
                 format!("{starts} starts, {found} equilibria")
             });
         };
-        study::all(&scenario, how, tolerance, &monitor.limit(), &mut report)
+        study::equilibria(&scenario, how, tolerance, &monitor.limit(), &mut report)
     })?;
     let mut all = found.map_err(value_error)?;
     for one in &mut all.found {

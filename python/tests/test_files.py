@@ -155,7 +155,7 @@ def test_a_motion_by_both_roads(tmp_path: Path) -> None:
     assert {path.suffix for path in motion.save(tmp_path / "c", write="csv")} == {".csv"}
 
 
-def test_a_check_a_trace_and_all_shapes_by_both_roads(tmp_path: Path) -> None:
+def test_a_check_a_trace_and_equilibria_by_both_roads(tmp_path: Path) -> None:
     file = tmp_path / "fan.toml"
     file.write_text(leafdyn.Scenario(fan(3)).text)
 
@@ -181,7 +181,7 @@ def test_a_check_a_trace_and_all_shapes_by_both_roads(tmp_path: Path) -> None:
     assert len(branch.curves) == len(branch.values) == len(branch.tips)
     assert branch.curves[0].shape[0] == 3
     assert trace.columns["value"][0] == -1.0
-    shapes = leafdyn.all_shapes(file, tolerance=1e-4)
+    shapes = leafdyn.equilibria(file, tolerance=1e-4)
     alike(shapes.to_dict(), told("relax", "--all", "--tolerance", "1e-4"))
     assert shapes.starts.sum() + shapes.failed == shapes.to_dict()["starts"]
 

@@ -32,7 +32,7 @@ LONG: dict[str, Callable[[], Any]] = {
     "modes": lambda: leafdyn.modes(fan(1500), 20, tolerance=1e-8),
     "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
     "check": lambda: leafdyn.check(fan(120), tolerance=1e-10),
-    "all_shapes": lambda: leafdyn.all_shapes(FIG10, tolerance=1e-7),
+    "equilibria": lambda: leafdyn.equilibria(FIG10, tolerance=1e-7),
     "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 41}, tolerance=1e-9),
     "boundary": lambda: leafdyn.trace(
         FIG10, ["load.gravity[2]=-0.01..-3", "stiffness.bending_3=0.5..2"], set={"leaf.rods": 41}, tolerance=1e-9
@@ -141,7 +141,7 @@ WITH_PROGRESS: dict[str, Callable[[Any], Any]] = {
     "modes": lambda heard: leafdyn.modes(fan(3), progress=heard),
     "sensitivities": lambda heard: leafdyn.sensitivities(fan(3), "stiffness.axial", progress=heard),
     "check": lambda heard: leafdyn.check(fan(3), progress=heard),
-    "all_shapes": lambda heard: leafdyn.all_shapes(fan(2), tolerance=1e-3, progress=heard),
+    "equilibria": lambda heard: leafdyn.equilibria(fan(2), tolerance=1e-3, progress=heard),
     "trace": lambda heard: leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3", progress=heard),
     "boundary": lambda heard: leafdyn.trace(
         column(), ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.9..1.1:2"], progress=heard

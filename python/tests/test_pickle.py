@@ -61,7 +61,7 @@ def test_arrays_are_read_only() -> None:
 
 def test_every_other_result(tmp_path: Path) -> None:
     check = leafdyn.check(fan(2))
-    shapes = leafdyn.all_shapes(fan(2), tolerance=1e-4)
+    shapes = leafdyn.equilibria(fan(2), tolerance=1e-4)
     trace = leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3")
     motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
     found = leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"])

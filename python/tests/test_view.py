@@ -55,7 +55,7 @@ def test_in_a_notebook_it_is_inline(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_result_in_space_has_one(tmp_path: Path) -> None:
-    shapes = leafdyn.all_shapes(fan(2), tolerance=1e-3)
+    shapes = leafdyn.equilibria(fan(2), tolerance=1e-3)
     trace = leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3")
     motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
     for result in (shapes, trace, motion, shapes[0]):

@@ -1,9 +1,9 @@
 //! Studies built on the solvers.
 
-mod all;
 mod boundary;
 mod chart;
 mod check;
+mod equilibria;
 mod fit;
 mod judge;
 mod map;
@@ -15,7 +15,6 @@ mod vary;
 pub use crate::branch::{Doubt, End as BranchEnd, Kind as CriticalKind, Stuck};
 pub use crate::bvp::{Neutral, Solution as ShootingSolution};
 pub use crate::words::UnknownWord;
-pub use all::{All, Found, IN_VAIN, all};
 pub use boundary::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
     boundary,
@@ -25,6 +24,7 @@ pub use chart::{
     Scaling, ScalingRow, Setting, Spread, Turn, chart, scaling,
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
+pub use equilibria::{Equilibria, Found, IN_VAIN, equilibria};
 pub use fit::{
     Data, DataFile, Experiment, Fit, FitAlternative, FitCandidate, FitError, FitLeaf, FitOutcome,
     FitParameter, FitRequest, FitResidual, FitStep, FitWork, Free, Measured, MeasuredQuantity,

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::motion::Physics;
 use leafdyn::relax::SemiImplicit;
-use leafdyn::study::{CheckOptions, Verdict, all, check, relax_with_sensitivities, trace};
+use leafdyn::study::{CheckOptions, Verdict, check, equilibria, relax_with_sensitivities, trace};
 use leafdyn_testing::branch::{changes_at, request};
 use leafdyn_testing::motion::{discrete, state_of};
 use leafdyn_testing::random::Draw;
@@ -125,7 +125,7 @@ fn a_circle_is_one_family() {
         (clamped(0.9, 6.0), 1),
     ] {
         let scenario = rod(&format!("{RIGID}; {entries}"));
-        let all = all(&scenario, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap();
+        let all = equilibria(&scenario, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap();
         assert_eq!(all.found.len(), count, "{entries}");
     }
 }

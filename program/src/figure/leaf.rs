@@ -6,7 +6,7 @@ use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, stable_or_index, verdict};
 use leafdyn::relax::{Equilibrium, Sensitivity};
 use leafdyn::scenario::Scenario;
-use leafdyn::study::All;
+use leafdyn::study::Equilibria;
 
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
@@ -40,7 +40,7 @@ fn notes(equilibrium: &Equilibrium, veins: &Veins, setting: &Setting) -> Vec<Str
 /// Most equilibria drawn.
 const MOST_EQUILIBRIA: usize = 24;
 
-pub fn draw_all(all: &All, scenario: &Scenario) -> Drawing {
+pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let shown = &all.found[..all.found.len().min(MOST_EQUILIBRIA)];
     let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));

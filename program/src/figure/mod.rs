@@ -40,7 +40,7 @@ pub use energy::draw as energy;
 pub use film::write as film;
 pub use filmstrip::draw as filmstrip;
 pub use fit::draw as fit;
-pub use leaf::{draw as leaf, draw_all as all, draw_sensitivity as sensitivity};
+pub use leaf::{draw as leaf, draw_equilibria as equilibria, draw_sensitivity as sensitivity};
 pub use map::draw as map;
 pub use modes::draw as modes;
 pub use trace::draw as trace;

@@ -28,7 +28,7 @@ pub use crate::report::{Document, FileError};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Radii;
 use leafdyn::simulate::Record;
-use leafdyn::study::{All, Boundary, Chart, Check, Fit, Map, Scaling, Trace};
+use leafdyn::study::{Boundary, Chart, Check, Equilibria, Fit, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
@@ -83,10 +83,10 @@ impl Written for Map {
     ];
 }
 
-impl Written for All {
+impl Written for Equilibria {
     const JSON: Option<&'static str> = Some("equilibria.json");
     const FORMATS: &'static [Format<Self>] = &[
-        Format::Figure(["equilibria.svg", "equilibria.png"], figure::all),
+        Format::Figure(["equilibria.svg", "equilibria.png"], figure::equilibria),
         Format::Space("equilibria.html", page::write),
     ];
 }

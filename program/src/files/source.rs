@@ -10,12 +10,12 @@ use super::Written;
 use crate::report::FileError;
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
-use leafdyn::study::{All, Boundary, Chart, Check, Fit, Map, Trace};
+use leafdyn::study::{Boundary, Chart, Check, Equilibria, Fit, Map, Trace};
 
 /// The JSON files of all verbs.
 const FILES: [Option<&str>; 9] = [
     Equilibrium::JSON,
-    All::JSON,
+    Equilibria::JSON,
     Check::JSON,
     Record::JSON,
     Trace::JSON,

@@ -14,7 +14,7 @@ use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Units;
 use leafdyn::simulate::{Moment, Record};
 use leafdyn::study::{
-    All, Boundary, BoundaryPoint, PointKind, Trace, TraceBranch, TracePoint, TraceShow,
+    Boundary, BoundaryPoint, Equilibria, PointKind, Trace, TraceBranch, TracePoint, TraceShow,
 };
 
 /// Most segments of a vein that are drawn of each of many leaves, and of those of a motion.
@@ -61,10 +61,10 @@ fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -
     }
 }
 
-impl Viewed for All {
-    const STILL: Figure<Self> = figure::all;
+impl Viewed for Equilibria {
+    const STILL: Figure<Self> = figure::equilibria;
 
-    /// All equilibria side by side.
+    /// Equilibria equilibria side by side.
     fn fill(&self, view: &mut View, _: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();

@@ -262,12 +262,12 @@ mod tests {
         for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        let text = chart.report(Vec::new());
+        let text = chart.report(Vec::new(), false);
         assert!(text.contains("that is NOT CONFIRMED"), "{text}");
         let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
         assert!(text.contains(failed), "{text}");
         chart.reference = None;
-        let text = chart.report(Vec::new());
+        let text = chart.report(Vec::new(), false);
         let unknown = "  errors   not known: no equilibrium was found";
         assert!(text.contains(unknown), "{text}");
     }

@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn another_equilibrium_is_called_unstable() {
-        let report = sample::check(1, 8, 0.1).report(Vec::new());
+        let report = sample::check(1, 8, 0.1).report(Vec::new(), false);
         for part in [
             "fan: 1 vein, relaxed and by shooting\n",
             "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad, the same index\n",

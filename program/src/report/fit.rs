@@ -43,10 +43,14 @@ impl Reported for Fit {
             format!("{}: {text}", candidate.experiment)
         });
         lines.extend(labelled("measure", candidates));
-        let (evaluations, time) = (self.work.evaluations, seconds(self.wall_seconds));
-        let work = format!("all leaves brought to rest {evaluations} times in {time}");
-        lines.push(("work", work));
         lines
+    }
+
+    fn work(&self) -> Option<String> {
+        let (evaluations, time) = (self.work.evaluations, seconds(self.wall_seconds));
+        Some(format!(
+            "all leaves brought to rest {evaluations} times in {time}"
+        ))
     }
 
     fn remarks(&self) -> Lines {

@@ -40,6 +40,11 @@ pub trait Reported {
 
     fn lines(&self) -> Lines;
 
+    /// What it took, for those who ask.
+    fn work(&self) -> Option<String> {
+        None
+    }
+
     /// What follows the list of the files that were written.
     fn remarks(&self) -> Lines {
         Lines::new()
@@ -47,12 +52,18 @@ pub trait Reported {
 
     /// All lines but that list.
     fn summary(&self) -> Lines {
-        [self.lines(), self.remarks()].concat()
+        [self.lines(), labelled("work", self.work()), self.remarks()].concat()
     }
 
-    /// The text for the console.
-    fn report(&self, files: Vec<String>) -> String {
-        let parts = [self.lines(), labelled("written", files), self.remarks()];
+    /// The text for the console; the work only if it is `verbose`.
+    fn report(&self, files: Vec<String>, verbose: bool) -> String {
+        let work = labelled("work", self.work().filter(|_| verbose));
+        let parts = [
+            self.lines(),
+            work,
+            labelled("written", files),
+            self.remarks(),
+        ];
         let lines = parts.iter().flatten();
         let lines = lines.map(|(name, line)| format!("  {name:<9}{line}\n"));
         self.heading() + "\n" + &lines.collect::<String>()

@@ -9,7 +9,7 @@ use leafdyn::relax::{
     Barrier, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Outcome, Path, Push,
     Reaction, Sensitivity,
 };
-use leafdyn::study::{All, Found};
+use leafdyn::study::{Equilibria, Found};
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
@@ -54,8 +54,11 @@ impl Reported for Equilibrium {
         if !self.accuracy.segments.is_empty() {
             lines.push(("model", self.model.description.clone()));
         }
-        lines.push(("work", work(self)));
         lines
+    }
+
+    fn work(&self) -> Option<String> {
+        Some(work(self))
     }
 
     fn remarks(&self) -> Lines {
@@ -379,7 +382,7 @@ fn word(direction: Direction) -> &'static str {
     }
 }
 
-impl Reported for All {
+impl Reported for Equilibria {
     fn heading(&self) -> String {
         let leaf = self.found.first();
         let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
@@ -400,12 +403,15 @@ impl Reported for All {
             0 => String::new(),
             failed => format!(", {failed} of them without coming to rest"),
         };
-        let (starts, time) = (self.starts, seconds(self.wall_seconds));
-        let work = format!(
-            "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
-        );
-        lines.push(("work", work));
+        let starts = self.starts;
+        let count =
+            format!("{stable} stable and {others} other equilibria from {starts} starts{failed}");
+        lines.push(("starts", count));
         lines
+    }
+
+    fn work(&self) -> Option<String> {
+        Some(format!("{} in all", seconds(self.wall_seconds)))
     }
 
     fn remarks(&self) -> Lines {

@@ -121,7 +121,7 @@ mod tests {
         record.moments[last].energy = zero;
         record.moments[last].energy.elastic = 4.076036413;
         record.moments[last].energy.kinetic = 8.4e-30;
-        let report = record.report(Vec::new());
+        let report = record.report(Vec::new(), false);
         for part in [
             "  energy   kinetic 0, elastic 4.076, ",
             "  balance  4.07 at the start, 4.08 at the end: changed by 0.0071554\n",
@@ -129,7 +129,7 @@ mod tests {
             assert!(report.contains(part), "{part} in {report}");
         }
         record.moments[last].energy.elastic = 4.068881005 * (1.0 + 4e-16);
-        let report = record.report(Vec::new());
+        let report = record.report(Vec::new(), false);
         assert!(report.contains(": changed by 0\n"), "{report}");
     }
 
@@ -144,7 +144,7 @@ mod tests {
             percent: 70.0,
         });
         record.duration = 40.0;
-        let report = record.report(Vec::new());
+        let report = record.report(Vec::new(), false);
         for part in [
             "swing: 1 vein, method explicit\n",
             "  moved    diverged: only to t = 10 in ",

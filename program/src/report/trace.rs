@@ -41,10 +41,12 @@ impl Reported for Trace {
             let error = format!("{what} within {worst}, followed on {segments} segments a vein");
             ("error", error)
         }));
-        let (count, time) = (self.factorizations, seconds(self.wall_seconds));
-        let work = format!("{count} factorisations to follow, {time} in all");
-        lines.push(("work", work));
         lines
+    }
+
+    fn work(&self) -> Option<String> {
+        let (count, time) = (self.factorizations, seconds(self.wall_seconds));
+        Some(format!("{count} factorisations to follow, {time} in all"))
     }
 
     fn remarks(&self) -> Lines {
@@ -204,8 +206,11 @@ impl Reported for Boundary {
         let worst = points.map(|point| point.error).reduce(f64::max);
         lines.extend(worst.map(|worst| ("error", format!("tips within {}", bound(worst)))));
         lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
-        lines.push(("work", format!("{} in all", seconds(self.wall_seconds))));
         lines
+    }
+
+    fn work(&self) -> Option<String> {
+        Some(format!("{} in all", seconds(self.wall_seconds)))
     }
 
     fn remarks(&self) -> Lines {

@@ -18,6 +18,8 @@ use super::{Refusal, Status, note};
 pub struct Job {
     /// Whether its result is printed as JSON.
     pub(super) json: bool,
+    /// Whether the report says what it took.
+    pub(super) verbose: bool,
     /// Whether it is the only one of its request.
     pub(super) single: bool,
     pub scenario: Scenario,
@@ -122,7 +124,7 @@ impl Job {
         }
         let report = match self.json {
             true => String::new(),
-            false => report.report(files),
+            false => report.report(files, self.verbose),
         };
         Ok(Delivered {
             status: Status::of(success),

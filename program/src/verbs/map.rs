@@ -35,16 +35,12 @@ pub struct Map {
     cell_seconds: f64,
 
     /// Solve every K-th cell from the I-th on, into map-I-of-K.csv: for jobs that share a map
-    #[arg(long, value_name = "I/K", conflicts_with = "draw")]
+    #[arg(long, value_name = "I/K")]
     shard: Option<Shard>,
 
     /// What the figure shows: outcomes, or waves: how many the margins of stable answers make
     #[arg(long, value_name = "WHAT", default_value_t)]
     show: MapShow,
-
-    /// Solve nothing: take the rows of these files, and draw
-    #[arg(long, value_name = "FILE.csv", num_args = 1.., value_hint = ValueHint::FilePath)]
-    draw: Vec<PathBuf>,
 }
 
 /// One of several parts of a map.
@@ -106,14 +102,11 @@ impl Map {
         if keeps_rows {
             files::claim(folder, &job.document(&known))?;
         }
-        let computed = match self.draw.is_empty() {
-            true => self.solve(job, keeps_rows, &request, &known.rows)?,
-            false => Vec::new(),
-        };
+        let computed = self.solve(job, keeps_rows, &request, &known.rows)?;
         let counts = [known.rows.len(), computed.len()];
         let mut map = Cells::new(request, [known.rows, computed].concat());
         map.show = self.show;
-        if self.shard.is_none() && self.draw.is_empty() {
+        if self.shard.is_none() {
             let line = Mutex::new(job.progress());
             map.find_jumps(&|done, pairs| {
                 if let Ok(mut line) = line.lock() {
@@ -153,7 +146,6 @@ impl Map {
             files.extend(shards(folder));
         }
         files.retain(|file| file.exists());
-        files.extend(self.draw.iter().cloned());
         let mut rows = Vec::new();
         for file in files {
             rows.extend(report::read_rows(&file, request)?);

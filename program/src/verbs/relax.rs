@@ -3,7 +3,7 @@
 use super::kit::*;
 use crate::report::numbers::brief;
 use leafdyn::relax::{self, Equilibrium, Method, Options, Outcome, Route, Settings};
-use leafdyn::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
+use leafdyn::study::{self, Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;
@@ -87,7 +87,7 @@ impl Relax {
             puts: None,
         };
         match self.all {
-            true => self.request.each::<All>(traits, |job| self.all(job)),
+            true => self.request.each::<Equilibria>(traits, |job| self.all(job)),
             false => (self.request).each::<Equilibrium>(traits, |job| self.one(job)),
         }
     }
@@ -169,7 +169,7 @@ impl Relax {
         };
         let mut line = job.progress();
         let (mut known, mut last_new) = (0, 0);
-        let mut all = study::all(
+        let mut all = study::equilibria(
             &job.scenario,
             how,
             self.request.tolerance,

@@ -58,6 +58,10 @@ pub struct Request {
     /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
     json: bool,
+
+    /// Say what it took: steps, factorisations, time
+    #[arg(long, short)]
+    verbose: bool,
 }
 
 /// Most stations that can be requested.
@@ -319,6 +323,7 @@ impl Request {
         }
         Ok(Job {
             json: self.json,
+            verbose: self.verbose,
             single: self.single(),
             scenario,
             base,

@@ -7,7 +7,7 @@ const OPTIONS: &str = "
     check => --tolerance --set --out --json --intervals --keep-unstable
     simulate => --tolerance --set --out --json --method explicit semi-implicit --segments --step --resume
     chart => --seconds --methods --peers --rods --tolerance --set --out --json shooting-from-rest
-    map => --vary --methods --cell-seconds --shard --draw --show --tolerance --set --out --json
+    map => --vary --methods --cell-seconds --shard --show --tolerance --set --out --json
     trace => --vary --switch --keep-unstable --segments --points --tolerance --set --out --json
 ";
 

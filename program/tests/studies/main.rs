@@ -1,9 +1,9 @@
 //! The verbs that compare, follow and vary.
 
-mod all_shapes;
 mod boundary_map;
 mod chart_cli;
 mod check_cli;
+mod equilibria;
 mod map_cli;
 mod map_outcomes;
 mod margin;

@@ -131,35 +131,10 @@ fn shards_joined_equal_the_whole() {
     // No shard draws.
     let parts = ["map-1-of-3.csv", "map-2-of-3.csv", "map-3-of-3.csv"];
     shared.holds("out", &format!("{} map.json", parts.join(" ")));
-    // Joined, they have the rows of the whole.
-    let joined = parts.map(|part| shared.read(&format!("out/{part}")));
-    shared.write("joined.csv", joined.concat());
-    let mut rows = timeless(&shared, "joined.csv");
-    rows.sort();
-    rows.dedup();
-    let mut sorted = whole.clone();
-    sorted.sort();
-    assert_eq!(rows, sorted);
-
-    // What is drawn may be a part.
-    let draw = small("--out part --draw out/map-1-of-3.csv");
-    shared.run(draw).ends(0).says(&["4 of 12"]);
-    contains(&shared.picture("part/map"), &["4 of 12 cells"]);
-
-    // A plain run in their folder takes them up and draws,
+    // A plain run in their folder takes them up and draws.
     contains(&run(&shared, "", "2"), &["36 were there, 0 computed"]);
     assert_eq!(timeless(&shared, "out/map.csv"), whole);
     shared.picture("out/map");
-
-    // and so does one elsewhere that is given the joined file, or all.
-    let all = parts.map(|part| format!("out/{part}")).join(" ");
-    for files in ["out/../joined.csv", &all] {
-        let draw = small(&format!("--out drawn --draw {files}"));
-        shared.run(draw).ends(0);
-        assert_eq!(timeless(&shared, "drawn/map.csv"), whole);
-        shared.holds("drawn", FILES);
-        fs::remove_dir_all(shared.path("drawn")).unwrap();
-    }
 }
 
 #[test]
@@ -184,8 +159,9 @@ fn maps_are_not_mixed() {
     contains(&refused.err, &["name another folder with --out DIR"]);
     assert_eq!(place.read("out/map.csv"), before);
     place.holds("out", "map.csv map.png map.svg");
-    place.write("other.csv", "a,b\n1,2\n");
-    let message = "other.csv:1: is no row of this map";
-    place.refuses(small("--draw other.csv"), message);
-    place.refuses(small("--draw absent.csv"), "absent.csv");
+    let place = Workplace::new();
+    run(&place, "", "2");
+    place.write("out/map-1-of-2.csv", "a,b\n1,2\n");
+    let message = "map-1-of-2.csv:1: is no row of this map";
+    place.refuses(small("--out out"), message);
 }

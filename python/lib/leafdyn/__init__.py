@@ -20,9 +20,12 @@ from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
 from ._sensitivity import Sensitivity
-from ._study import Boundary, Branch, Chart, Check, Curve, Map, Shapes, Trace
-from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
+from ._study import Boundary, Branch, Chart, Check, Curve, Equilibria, Map, Trace
+from ._verbs import chart, check, equilibria, frames, map, simulate, trace
 from ._view import Page
+
+# The name under which scripts may know it.
+all_shapes = equilibria
 
 __all__ = [
     "Boundary",
@@ -31,6 +34,7 @@ __all__ = [
     "Chart",
     "Check",
     "Curve",
+    "Equilibria",
     "Equilibrium",
     "Fit",
     "Frame",
@@ -43,14 +47,13 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "Sensitivity",
-    "Shapes",
     "Source",
     "Table",
     "Trace",
     "__version__",
-    "all_shapes",
     "chart",
     "check",
+    "equilibria",
     "fit",
     "frames",
     "map",

@@ -15,7 +15,7 @@ __all__ = [
     "Motion",
     "Scenario",
     "__version__",
-    "all_shapes",
+    "equilibria",
     "boundary",
     "chart",
     "check",
@@ -129,7 +129,7 @@ def relax_many(scenarios: Sequence[Scenario], asked: Mapping[str, Any], progress
 def check(
     scenario: Scenario, tolerance: float | None, keep_unstable: bool, intervals: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, Leaf, tuple[_Array, _Array] | None]: ...
-def all_shapes(
+def equilibria(
     scenario: Scenario, tolerance: float | None, full_model: bool, stations: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, list[tuple[Leaf, int, bool]]]: ...
 def trace(

@@ -52,7 +52,7 @@ class Check(Result):
         return f"<Check {self.leaf.name}: {self.verdict}{apart}>"
 
 
-class Shapes(Viewed, Sequence[Equilibrium]):
+class Equilibria(Viewed, Sequence[Equilibrium]):
     """The equilibria of a leaf that were found, lowest energy first: a sequence of `Equilibrium`."""
 
     starts: NDArray[np.int64]
@@ -86,7 +86,7 @@ class Shapes(Viewed, Sequence[Equilibrium]):
 
     def __repr__(self) -> str:
         stable = sum(leaf.stable is True for leaf in self)
-        return f"<Shapes: {len(self)} equilibria, {stable} stable>"
+        return f"<Equilibria: {len(self)} equilibria, {stable} stable>"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
 from ._relax import warn
 from ._scenario import Scenario, Source, checked
-from ._study import Boundary, Chart, Check, Map, Shapes, Trace
+from ._study import Boundary, Chart, Check, Map, Equilibria, Trace
 
 
 def check(
@@ -63,7 +63,7 @@ def check(
     return found
 
 
-def all_shapes(
+def equilibria(
     scenario: Source,
     *,
     set: Mapping[str, Any] | None = None,
@@ -71,14 +71,14 @@ def all_shapes(
     full_model: bool = False,
     stations: SupportsIndex | None = None,
     progress: Progress = None,
-) -> Shapes:
+) -> Equilibria:
     """Look for all equilibria of a leaf, from many starts. Which there are no number of starts can prove.
 
     Parameters are those of `relax`.
 
     Returns
     -------
-    Shapes
+    Equilibria
         A sequence of `Equilibrium`, lowest energy first, and how many starts ended in each.
 
     Raises
@@ -91,7 +91,7 @@ def all_shapes(
     Examples
     --------
     >>> import leafdyn
-    >>> shapes = leafdyn.all_shapes("scenarios/paper/fig04.toml", set={"leaf.rods": 3}, tolerance=1e-4)
+    >>> shapes = leafdyn.equilibria("scenarios/paper/fig04.toml", set={"leaf.rods": 3}, tolerance=1e-4)
     >>> len(shapes), shapes[0].stable
     (1, True)
     """
@@ -100,9 +100,9 @@ def all_shapes(
     switches(full_model=full_model)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
-        files, found = _leafdyn.all_shapes(leaf._core, tolerance, full_model, stations, heard)
+        files, found = _leafdyn.equilibria(leaf._core, tolerance, full_model, stations, heard)
     leaves = [Equilibrium(core) for core, _, _ in found]
-    return Shapes(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
+    return Equilibria(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
 
 
 @overload

@@ -1,17 +1,17 @@
-//! All shapes of a leaf: what many starts find, and that each is an equilibrium.
+//! Equilibria shapes of a leaf: what many starts find, and that each is an equilibrium.
 
 use leafdyn::relax::SemiImplicit;
-use leafdyn::study::{All, all};
+use leafdyn::study::{Equilibria, equilibria};
 use leafdyn_testing::workplace::{Json, Workplace, timeless};
 use leafdyn_testing::*;
 
-fn search(entries: &str) -> All {
+fn search(entries: &str) -> Equilibria {
     let fig10 = scenario("paper/fig10", &format!("leaf.rods=5; {entries}"));
     let (how, limit) = (SemiImplicit::default(), Limit::default());
-    all(&fig10, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap()
+    equilibria(&fig10, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap()
 }
 
-fn stable(all: &All) -> Vec<&Equilibrium> {
+fn stable(all: &Equilibria) -> Vec<&Equilibrium> {
     let found = all.found.iter().map(|one| &one.equilibrium);
     found.filter(|leaf| leaf.stable() == Some(true)).collect()
 }
@@ -66,7 +66,7 @@ fn tips_of_unequal_rods_stay_joined() {
         );
         let (how, limit) = (SemiImplicit::default(), Limit::default());
         let leaf = parse(&leaf);
-        let all = all(&leaf, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap();
+        let all = equilibria(&leaf, how, Some(1e-5), &limit, &mut |_, _| {}).unwrap();
         for one in &all.found {
             let rods = &one.equilibrium.shape.rods;
             let tip = |j: usize| tip_node(rods, j).position;

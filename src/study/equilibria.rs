@@ -1,4 +1,4 @@
-//! All shapes of a leaf, as far as many starts find them.
+//! Equilibria shapes of a leaf, as far as many starts find them.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ const SAME_ENERGY: f64 = 1e-6;
 /// The equilibria of a leaf that many starts have found. As JSON it is
 /// `equilibria.json`.
 #[derive(Clone, Debug, Serialize)]
-pub struct All {
+pub struct Equilibria {
     /// Name of the scenario.
     pub scenario: String,
     /// Number of starts.
@@ -92,15 +92,15 @@ impl Serialize for Found {
 /// and to the equilibrium, stable or not, that Newton's method finds. No number of
 /// starts can prove that there are no other equilibria. If `limit` is reached, the result is
 /// what has been found until then.
-pub fn all(
+pub fn equilibria(
     scenario: &Scenario,
     how: SemiImplicit,
     tolerance: Option<f64>,
     limit: &Limit,
     progress: &mut dyn FnMut(usize, usize),
-) -> Result<All, RelaxError> {
+) -> Result<Equilibria, RelaxError> {
     let clock = std::time::Instant::now();
-    let mut all = All {
+    let mut all = Equilibria {
         scenario: scenario.name.clone(),
         found: Vec::new(),
         starts: 0,
@@ -157,7 +157,7 @@ pub fn all(
     Ok(all)
 }
 
-impl All {
+impl Equilibria {
     fn take(&mut self, equilibrium: Equilibrium, plain: bool) {
         self.starts += 1;
         if !equilibrium.outcome.is_success() {
@@ -179,7 +179,7 @@ impl All {
     }
 }
 
-impl All {
+impl Equilibria {
     /// The stable equilibrium with less energy than that of the unperturbed start, if any.
     fn lower(&self) -> Option<String> {
         let plain = self.found.iter().position(|found| found.plain)?;
