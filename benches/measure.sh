@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_INSTALL_ROOT="$PWD/target/docs"
-cargo install --path .
+cargo install --path program
 export PATH="$CARGO_INSTALL_ROOT/bin:$PATH"
 python -m venv target/peers
 source target/peers/bin/activate

@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 
 # The program goes into target/, not among the user's own.
 export CARGO_INSTALL_ROOT="$top/target/docs"
-cargo install --path .
+cargo install --path program
 export PATH="$CARGO_INSTALL_ROOT/bin:$PATH"
 
 # A map that is there already would be continued, not drawn anew.

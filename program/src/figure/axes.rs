@@ -1,7 +1,14 @@
 //! Two axes around a panel: grid, frame, ticks and names, with curves and markers
 //! inside. Every panel of numbers is drawn with them.
 
-use super::kit::*;
+use crate::figure::axis::{Axis, Direction, Tick};
+use crate::figure::drawing::{
+    Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle,
+};
+use crate::figure::font::Font;
+use crate::figure::markers::Marker;
+use crate::figure::page::{Cell, TEXT_SIZE, TICK_SIZE, title};
+use glam::DVec2;
 
 const TICK: f64 = 4.0;
 const DIVISION: f64 = 2.0;

@@ -2,7 +2,9 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use super::kit::*;
+use crate::figure::font::Font;
+use crate::figure::page::TICK_SIZE;
+use crate::figure::round::{multiples, round_step};
 use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 
 /// Padding at both ends: as a fraction of a linear extent, and in decades.

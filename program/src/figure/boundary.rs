@@ -4,11 +4,23 @@
 use std::collections::BTreeSet;
 
 use super::boundary_sides::write_indices;
-use super::kit::*;
 use super::map::{DARKEST_INDEX, fill_index, name};
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
+use crate::figure::labels::Labels;
+use crate::figure::markers::Marker;
+use crate::figure::page::{
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title,
+};
+use crate::figure::round::round_step;
+use crate::figure::setting::Setting;
+use crate::figure::small::SmallPanels;
+use crate::figure::veins::{Veins, longest, tips};
 use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
 use crate::report::sides;
 use crate::report::words::stable_or_index;
+use glam::DVec3;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::CriticalKind as Kind;
 use leafdyn::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};

@@ -1,7 +1,11 @@
 //! Labels with the index on both sides of the curves of a boundary.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::drawing::{Drawing, NOTE};
+use crate::figure::labels::{Labels, clearest, label_size};
+use crate::figure::page::Cell;
 use crate::report::is_special;
+use glam::DVec2;
 use leafdyn::study::{Boundary, BoundaryCurve};
 
 /// Spacing of the places that are tried along a curve, and their largest number.

@@ -2,7 +2,10 @@
 //! veins, for every method of relaxation.
 
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
-use super::kit::*;
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{BLUE, Color, Drawing, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
+use crate::figure::markers::Marker;
+use crate::figure::page::{HEADER, LEFT, new_page};
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use leafdyn::relax::Method;

@@ -1,6 +1,14 @@
 //! The panel of a chart: one line per series, with failures in lanes above.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{
+    Anchor, Color, Drawing, INK, NOTE, SHADOW, Stroke, circle, rectangle,
+};
+use crate::figure::font::Font;
+use crate::figure::markers::Marker;
+use crate::figure::page::{Cell, Key, PANEL_AXIS, TICK_SIZE};
+use glam::DVec2;
 
 const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.

@@ -1,10 +1,21 @@
 //! The figure of a check: the relaxed leaf as lines, the boundary-value
 //! solution as dots, and their differences along the veins.
 
-use super::kit::*;
 use super::panels::Panels;
+use crate::figure::axes::{Axes, Curve};
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
+use crate::figure::font::Font;
+use crate::figure::markers::{Marker, dot};
+use crate::figure::page::{
+    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH,
+    header, title,
+};
+use crate::figure::setting::Setting;
+use crate::figure::veins::Veins;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{equilibrium_of_index, headline, verdict};
+use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, Quantity, Verdict};
 

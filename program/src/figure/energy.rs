@@ -1,6 +1,10 @@
 //! The energies of a moving leaf and the position of its tip over time.
 
-use super::kit::*;
+use crate::figure::axes::{Axes, Curve};
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
+use crate::figure::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page};
+use crate::figure::setting::with_unit;
 use crate::report::numbers::short;
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::simulate::Energy;

@@ -6,9 +6,15 @@ use std::io::{self, Write};
 use rayon::prelude::*;
 use tiny_skia::Pixmap;
 
-use super::kit::*;
 use super::png::paint;
+use crate::figure::drawing::{Anchor, Color, DOT, Drawing, INK, NOTE, WHITE, vein_color};
+use crate::figure::page::{Cell, TEXT_SIZE};
+use crate::figure::setting::Setting;
+use crate::figure::small::THINNER;
+use crate::figure::space::{Margins, OBLIQUE, Scene, common_box};
+use crate::figure::veins::Veins;
 use crate::report::numbers::short;
+use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Record, Still};
 

@@ -1,8 +1,14 @@
 //! A moving leaf at several instants.
 
 use super::energy::notes;
-use super::kit::*;
+use crate::figure::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
+use crate::figure::page::{HEADER, KeyRows, NOTE_BASE, letters, new_page};
+use crate::figure::setting::Setting;
+use crate::figure::small::{SIDE, SmallPanels, THINNER};
+use crate::figure::space::OBLIQUE;
+use crate::figure::veins::{Veins, is_drawable};
 use crate::report::numbers::short;
+use glam::DVec3;
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::Record;
 

@@ -1,8 +1,16 @@
 //! A fit: results of experiments with the model and its confidence band, measured points
 //! over the veins, and the residuals of all data.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
+use crate::figure::markers::Marker;
+use crate::figure::page::{
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page,
+};
+use crate::figure::setting::with_unit;
 use crate::report::numbers::{brief, counted};
+use glam::{DVec2, DVec3};
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::{Fit, FitLeaf, FitResidual};
 

@@ -1,6 +1,10 @@
 //! Labels where they cover neither curves nor each other.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::drawing::{Anchor, Color, Drawing, INK};
+use crate::figure::font::Font;
+use crate::figure::page::{Cell, TICK_SIZE};
+use glam::DVec2;
 
 /// Spacing in pixels of the points on curves that labels keep clear of.
 const SPACING: f64 = 4.0;

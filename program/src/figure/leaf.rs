@@ -1,9 +1,18 @@
 //! A leaf at rest, all equilibria of a leaf, and how far its tip moves when a number changes.
 
-use super::kit::*;
 use super::panels::Panels;
+use crate::figure::axes::Axes;
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{Anchor, BLUE, Drawing, INK, rectangle};
+use crate::figure::page::{
+    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page,
+};
+use crate::figure::setting::Setting;
+use crate::figure::small::{SIDE, SmallPanels};
+use crate::figure::veins::Veins;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, stable_or_index, verdict};
+use glam::DVec2;
 use leafdyn::relax::{Equilibrium, Sensitivity};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::Equilibria;

@@ -1,7 +1,12 @@
 //! Markers of points in a panel, of the clamp and the tips of a leaf, of points of a second
 //! solution, and of the direction of gravity.
 
-use super::kit::*;
+use crate::figure::drawing::{
+    Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, rectangle,
+};
+use crate::figure::page::{Cell, TICK_SIZE};
+use crate::figure::veins::Veins;
+use glam::{DVec2, DVec3};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {

@@ -49,13 +49,6 @@ pub use drawing::Drawing;
 
 use leafdyn::scenario::Scenario;
 
-/// What pictures are made of.
-mod kit {
-    pub use super::{axes::*, axis::*, drawing::*, font::*, labels::*, markers::*};
-    pub use super::{page::*, round::*, setting::*, small::*, space::*, veins::*};
-    pub use glam::{DVec2, DVec3};
-}
-
 /// Draws a result of a scenario.
 pub type Figure<R> = fn(&R, &Scenario) -> Drawing;
 

@@ -1,8 +1,14 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
-use super::kit::*;
+use crate::figure::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
+use crate::figure::page::{HEADER, new_page};
+use crate::figure::setting::Setting;
+use crate::figure::small::{SIDE, SmallPanels, THINNER};
+use crate::figure::space::{FRONT, OBLIQUE, View};
+use crate::figure::veins::{Veins, tips};
 use crate::report::numbers::short;
 use crate::report::words::verdict;
+use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Scenario;
 

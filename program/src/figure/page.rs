@@ -1,6 +1,12 @@
 //! Page layout: sizes, cells and titles of panels, the header, and keys.
 
-use super::kit::*;
+use crate::figure::drawing::{
+    Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color,
+};
+use crate::figure::font::Font;
+use crate::figure::markers::{Marker, clamp_marker, tip_marker};
+use crate::figure::veins::Veins;
+use glam::DVec2;
 
 pub const WIDTH: f64 = 900.0;
 pub const LEFT: f64 = 64.0;

@@ -4,7 +4,15 @@
 //! the side view below the top view with the same xi axis, the front view to the
 //! right of the side view with the same zeta axis.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{Drawing, Stroke};
+use crate::figure::markers::leaf_markers;
+use crate::figure::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
+use crate::figure::setting::Setting;
+use crate::figure::space::{Camera, Margins, OBLIQUE, Scene, surrounding_box};
+use crate::figure::veins::{Vein, Veins};
+use glam::{DVec2, DVec3};
 
 const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.

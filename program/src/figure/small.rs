@@ -1,7 +1,13 @@
 //! Several leaves in small panels, seen by one camera, to one scale.
 
-use super::kit::*;
+use crate::figure::drawing::{Color, Drawing, NOTE};
+use crate::figure::page::{Cell, PANEL_TITLE, WIDTH, title_in};
+use crate::figure::round::round_step;
+use crate::figure::setting::Setting;
+use crate::figure::space::{Camera, Margins, OBLIQUE, Scene, View, common_box};
+use crate::figure::veins::Veins;
 use crate::report::numbers::short;
+use glam::{DVec2, DVec3};
 
 const COLUMNS: usize = 4;
 /// Margin to the left and right of the panels.

@@ -1,7 +1,16 @@
 //! The panel in space: a parallel projection of the leaf in a box, with its shadow
 //! on the floor.
 
-use super::kit::*;
+use crate::figure::drawing::{
+    Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
+};
+use crate::figure::font::Font;
+use crate::figure::markers::{draw_gravity, leaf_markers};
+use crate::figure::page::{Cell, TEXT_SIZE, TICK_SIZE};
+use crate::figure::round::{multiples, round_step};
+use crate::figure::setting::Setting;
+use crate::figure::veins::{Piece, Vein, Veins};
+use glam::{DVec2, DVec3};
 
 /// Directions from which the box is seen: azimuth from the xi axis and elevation above the
 /// floor, in degrees. From above one of its edges, and along the xi axis from a little above.

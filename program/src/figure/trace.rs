@@ -1,10 +1,19 @@
 //! Branches of equilibria: a coordinate of the tip against the number that
 //! varies, and the leaf at some of the points.
 
-use super::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
+use crate::figure::labels::Labels;
+use crate::figure::markers::Marker;
+use crate::figure::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page};
+use crate::figure::setting::{Setting, with_unit};
+use crate::figure::small::SmallPanels;
+use crate::figure::veins::{Veins, longest};
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};
+use glam::DVec3;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 

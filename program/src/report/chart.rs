@@ -6,7 +6,10 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::kit::*;
+use crate::report::Reported;
+use crate::report::numbers::{power_of_ten, seconds, veins_of};
+use crate::report::table::{Lines, labelled, text_cell};
+use crate::report::words::contender;
 use leafdyn::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
 /// Names of the columns that both files have.

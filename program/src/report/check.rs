@@ -2,8 +2,13 @@
 
 use glam::DVec3;
 
-use super::kit::*;
 use super::relax::found;
+use crate::report::Reported;
+use crate::report::numbers::{
+    as_accurate, bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, veins,
+};
+use crate::report::table::{Lines, labelled};
+use crate::report::words::{equilibrium_of_index, headline, shooting};
 use leafdyn::study::ShootingSolution as Solution;
 use leafdyn::study::{Check, Place, Quantity, Verdict};
 

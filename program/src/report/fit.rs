@@ -3,7 +3,9 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::kit::*;
+use crate::report::Reported;
+use crate::report::numbers::{brief, counted, rounded_to, seconds};
+use crate::report::table::{Lines, labelled, text_cell};
 use leafdyn::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
 
 /// Most candidates that are listed.

@@ -9,7 +9,10 @@ use std::path::Path;
 use csv::StringRecord;
 
 use super::FileError;
-use super::kit::*;
+use crate::report::Reported;
+use crate::report::numbers::{brief, seconds};
+use crate::report::table::{Lines, append_csv, labelled, text_cell, text_of_cell};
+use crate::report::words::map_shows;
 use leafdyn::study::{Map, MapOutcome, MapRequest, MapRow};
 
 /// The columns after those of the varied keys.

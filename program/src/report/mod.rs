@@ -20,7 +20,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use kit::*;
+use crate::report::table::{Lines, labelled};
 use leafdyn::scenario::{Scenario, printable};
 
 pub use centerlines::{centerlines, modes_table, sensitivity_table};
@@ -28,11 +28,6 @@ pub use chart::{chart_table, scaling_table};
 pub use fit::{fitted, table as fit_table};
 pub use map::{MapWork, lines, map_table, read_rows, table};
 pub use trace::{boundary_table, error_location, is_special, sides, slope_unit, trace_table};
-
-/// What reports are made of.
-mod kit {
-    pub use super::{Reported, numbers::*, table::*, words::*};
-}
 
 /// A result with a report: labelled lines under a heading.
 pub trait Reported {

@@ -3,7 +3,13 @@
 
 use glam::DVec3;
 
-use super::kit::*;
+use crate::report::Reported;
+use crate::report::numbers::{
+    ROUNDING, as_accurate, bound, brief, counted, decimals, decimals_within, eigenvalues, grids,
+    known, point, power_of_ten, rounded_to, seconds, veins,
+};
+use crate::report::table::{Lines, labelled};
+use crate::report::words::{shooting, stable_or_index, verdict};
 use leafdyn::largest::largest;
 use leafdyn::relax::{
     Barrier, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Outcome, Path, Push,

@@ -1,6 +1,8 @@
 //! The text report of a simulation.
 
-use super::kit::*;
+use crate::report::Reported;
+use crate::report::numbers::{brief, known, point, power_of_ten, rounded_to, seconds, veins_of};
+use crate::report::table::{Lines, labelled};
 use leafdyn::largest::{larger, largest};
 use leafdyn::simulate::{Reason, Record};
 

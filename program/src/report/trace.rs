@@ -4,8 +4,14 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::kit::*;
 use super::numbers;
+use crate::report::Reported;
+use crate::report::numbers::{
+    ROUNDING, bound, brief, decimals_within, known, power_of_ten, rounded_to, seconds, short,
+    veins_of,
+};
+use crate::report::table::{Lines, csv_without_header, header, labelled};
+use crate::report::words::{branch_end, stable_or_index};
 use leafdyn::scenario::Units;
 use leafdyn::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,

@@ -2,9 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::fraction_of;
+use super::request::{Request, VerbTraits, words};
+use super::{Refusal, Status};
 use crate::files;
 use crate::report::words::contender;
+use clap::{Args, ValueHint};
 use leafdyn::relax;
 use leafdyn::study::{self, Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
 

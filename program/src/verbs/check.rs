@@ -1,6 +1,9 @@
 //! `leafdyn check`: compares the shapes found by two independent methods.
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::request::{Request, VerbTraits};
+use super::{Refusal, Status};
+use clap::Args;
 use leafdyn::study::{self, Check as Checked, CheckOptions, Verdict};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.

@@ -2,7 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::fraction_of;
+use super::request::{Request, VerbTraits};
+use super::{Refusal, Status};
+use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::text;
 use leafdyn::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};

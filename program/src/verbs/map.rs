@@ -6,9 +6,13 @@ use std::str::FromStr;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::fraction_of;
+use super::request::{Request, VerbTraits};
+use super::{Refusal, Status};
 use crate::files::{self, Journal, Kind};
 use crate::report::{self, FileError};
+use clap::Args;
 use leafdyn::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };

@@ -29,15 +29,6 @@ use leafdyn::memory::TooMuch;
 use leafdyn::relax::RefusedOption;
 use leafdyn::scenario::{Place, ScenarioError, printable};
 
-/// What verbs are made of.
-mod kit {
-    pub(super) use super::job::{Delivered, Job};
-    pub(super) use super::progress::{ProgressLine, duration, fraction_between, fraction_of};
-    pub(super) use super::request::{Request, VerbTraits, words};
-    pub(super) use super::{Refusal, Status};
-    pub(super) use clap::{Args, ValueHint};
-}
-
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
 #[command(name = "leafdyn", version, about, arg_required_else_help = true)]

@@ -1,7 +1,11 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::{ProgressLine, fraction_of};
+use super::request::{Request, VerbTraits, words};
+use super::{Refusal, Status};
 use crate::report::numbers::brief;
+use clap::Args;
 use leafdyn::relax::{self, Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study::{self, Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
 

@@ -2,11 +2,15 @@
 
 use std::time::Instant;
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::{ProgressLine, duration, fraction_between};
+use super::request::{Request, VerbTraits, words};
+use super::{Refusal, Status};
 use super::{checkpoint_on_interrupt, note, show_checkpoint};
 use crate::files::Recording;
 use crate::report::FileError;
 use crate::report::numbers::brief;
+use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Scheme, Simulation, Stopped};
 

@@ -1,7 +1,11 @@
 //! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
-use super::kit::*;
+use super::job::{Delivered, Job};
+use super::progress::fraction_between;
+use super::request::{Request, VerbTraits};
+use super::{Refusal, Status};
 use crate::report::numbers::brief;
+use clap::Args;
 use leafdyn::study::{
     self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest,
     TraceShow, Vary,

@@ -1,6 +1,12 @@
 //! One panel of a map: its cells in the colours of their outcomes.
 
-use crate::figure::kit::*;
+use crate::figure::axes::Axes;
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{
+    Anchor, Color, Drawing, FRAME, INK, Stroke, WHITE, circle, rectangle, vein_color,
+};
+use crate::figure::page::Cell;
+use glam::DVec2;
 use leafdyn::study::{Confidence, Knob, MapOutcome, MapRequest, MapRow, MapShow, Vary};
 
 /// Smaller cells have no gaps between them and no marks.
