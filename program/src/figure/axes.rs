@@ -6,8 +6,8 @@ use crate::figure::drawing::{
     Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle,
 };
 use crate::figure::font::Font;
+use crate::figure::layout::{Cell, TEXT_SIZE, TICK_SIZE, title};
 use crate::figure::markers::Marker;
-use crate::figure::page::{Cell, TEXT_SIZE, TICK_SIZE, title};
 use glam::DVec2;
 
 const TICK: f64 = 4.0;

@@ -3,7 +3,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::figure::font::Font;
-use crate::figure::page::TICK_SIZE;
+use crate::figure::layout::TICK_SIZE;
 use crate::figure::round::{multiples, round_step};
 use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 

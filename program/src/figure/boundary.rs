@@ -9,10 +9,9 @@ use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
 use crate::figure::labels::Labels;
+use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, title};
 use crate::figure::markers::Marker;
-use crate::figure::page::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title,
-};
+use crate::figure::page::{Key, new_page};
 use crate::figure::round::round_step;
 use crate::figure::setting::Setting;
 use crate::figure::small::SmallPanels;

@@ -3,7 +3,7 @@
 use crate::figure::axes::Axes;
 use crate::figure::drawing::{Drawing, NOTE};
 use crate::figure::labels::{Labels, clearest, label_size};
-use crate::figure::page::Cell;
+use crate::figure::layout::Cell;
 use crate::report::is_special;
 use glam::DVec2;
 use leafdyn::study::{Boundary, BoundaryCurve};

@@ -4,8 +4,9 @@
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
 use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{BLUE, Color, Drawing, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
+use crate::figure::layout::{HEADER, LEFT};
 use crate::figure::markers::Marker;
-use crate::figure::page::{HEADER, LEFT, new_page};
+use crate::figure::page::new_page;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use leafdyn::relax::Method;

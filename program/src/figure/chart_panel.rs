@@ -6,8 +6,9 @@ use crate::figure::drawing::{
     Anchor, Color, Drawing, INK, NOTE, SHADOW, Stroke, circle, rectangle,
 };
 use crate::figure::font::Font;
+use crate::figure::layout::{Cell, PANEL_AXIS, TICK_SIZE};
 use crate::figure::markers::Marker;
-use crate::figure::page::{Cell, Key, PANEL_AXIS, TICK_SIZE};
+use crate::figure::page::Key;
 use glam::DVec2;
 
 const FRAME_HEIGHT: f64 = 430.0;

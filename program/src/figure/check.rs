@@ -6,11 +6,11 @@ use crate::figure::axes::{Axes, Curve};
 use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
 use crate::figure::font::Font;
-use crate::figure::markers::{Marker, dot};
-use crate::figure::page::{
-    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH,
-    header, title,
+use crate::figure::layout::{
+    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH, title,
 };
+use crate::figure::markers::{Marker, dot};
+use crate::figure::page::{Key, KeyRows, NOTE_BASE, header};
 use crate::figure::setting::Setting;
 use crate::figure::veins::Veins;
 use crate::report::numbers::power_of_ten;

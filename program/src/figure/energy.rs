@@ -3,7 +3,8 @@
 use crate::figure::axes::{Axes, Curve};
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
-use crate::figure::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page};
+use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE};
+use crate::figure::page::{Key, new_page};
 use crate::figure::setting::with_unit;
 use crate::report::numbers::short;
 use leafdyn::scenario::{Scenario, Units};

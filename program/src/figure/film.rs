@@ -8,7 +8,7 @@ use tiny_skia::Pixmap;
 
 use super::png::paint;
 use crate::figure::drawing::{Anchor, Color, DOT, Drawing, INK, NOTE, WHITE, vein_color};
-use crate::figure::page::{Cell, TEXT_SIZE};
+use crate::figure::layout::{Cell, TEXT_SIZE};
 use crate::figure::setting::Setting;
 use crate::figure::small::THINNER;
 use crate::figure::space::{Margins, OBLIQUE, Scene, common_box};

@@ -2,7 +2,8 @@
 
 use super::energy::notes;
 use crate::figure::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
-use crate::figure::page::{HEADER, KeyRows, NOTE_BASE, letters, new_page};
+use crate::figure::layout::{HEADER, letters};
+use crate::figure::page::{KeyRows, NOTE_BASE, new_page};
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels, THINNER};
 use crate::figure::space::OBLIQUE;

@@ -4,10 +4,9 @@
 use crate::figure::axes::Axes;
 use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
+use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters};
 use crate::figure::markers::Marker;
-use crate::figure::page::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page,
-};
+use crate::figure::page::{Key, new_page};
 use crate::figure::setting::with_unit;
 use crate::report::numbers::{brief, counted};
 use glam::{DVec2, DVec3};

@@ -3,7 +3,7 @@
 use crate::figure::axes::Axes;
 use crate::figure::drawing::{Anchor, Color, Drawing, INK};
 use crate::figure::font::Font;
-use crate::figure::page::{Cell, TICK_SIZE};
+use crate::figure::layout::{Cell, TICK_SIZE};
 use glam::DVec2;
 
 /// Spacing in pixels of the points on curves that labels keep clear of.

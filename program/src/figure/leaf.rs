@@ -4,9 +4,8 @@ use super::panels::Panels;
 use crate::figure::axes::Axes;
 use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{Anchor, BLUE, Drawing, INK, rectangle};
-use crate::figure::page::{
-    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page,
-};
+use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
+use crate::figure::page::new_page;
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels};
 use crate::figure::veins::Veins;

@@ -4,7 +4,7 @@
 use crate::figure::drawing::{
     Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, rectangle,
 };
-use crate::figure::page::{Cell, TICK_SIZE};
+use crate::figure::layout::{Cell, TICK_SIZE};
 use crate::figure::veins::Veins;
 use glam::{DVec2, DVec3};
 

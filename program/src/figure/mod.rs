@@ -18,6 +18,7 @@ mod filmstrip;
 mod fit;
 mod font;
 mod labels;
+mod layout;
 mod leaf;
 mod map;
 mod markers;

@@ -1,7 +1,8 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
 use crate::figure::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
-use crate::figure::page::{HEADER, new_page};
+use crate::figure::layout::HEADER;
+use crate::figure::page::new_page;
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels, THINNER};
 use crate::figure::space::{FRONT, OBLIQUE, View};

@@ -7,8 +7,8 @@
 use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{Drawing, Stroke};
+use crate::figure::layout::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
 use crate::figure::markers::leaf_markers;
-use crate::figure::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
 use crate::figure::setting::Setting;
 use crate::figure::space::{Camera, Margins, OBLIQUE, Scene, surrounding_box};
 use crate::figure::veins::{Vein, Veins};

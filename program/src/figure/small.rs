@@ -1,7 +1,7 @@
 //! Several leaves in small panels, seen by one camera, to one scale.
 
 use crate::figure::drawing::{Color, Drawing, NOTE};
-use crate::figure::page::{Cell, PANEL_TITLE, WIDTH, title_in};
+use crate::figure::layout::{Cell, PANEL_TITLE, WIDTH, title_in};
 use crate::figure::round::round_step;
 use crate::figure::setting::Setting;
 use crate::figure::space::{Camera, Margins, OBLIQUE, Scene, View, common_box};

@@ -5,8 +5,8 @@ use crate::figure::drawing::{
     Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
 };
 use crate::figure::font::Font;
+use crate::figure::layout::{Cell, TEXT_SIZE, TICK_SIZE};
 use crate::figure::markers::{draw_gravity, leaf_markers};
-use crate::figure::page::{Cell, TEXT_SIZE, TICK_SIZE};
 use crate::figure::round::{multiples, round_step};
 use crate::figure::setting::Setting;
 use crate::figure::veins::{Piece, Vein, Veins};

@@ -8,11 +8,11 @@ use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke};
 use crate::figure::font::Font;
-use crate::figure::markers::Marker;
-use crate::figure::page::{
-    Cell, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE,
-    WIDTH, header,
+use crate::figure::layout::{
+    Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, WIDTH,
 };
+use crate::figure::markers::Marker;
+use crate::figure::page::{Key, KeyRows, NOTE_BASE, header};
 use crate::figure::setting::with_unit;
 use crate::report::words::map_shows;
 use glam::DVec2;

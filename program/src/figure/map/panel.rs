@@ -5,7 +5,7 @@ use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{
     Anchor, Color, Drawing, FRAME, INK, Stroke, WHITE, circle, rectangle, vein_color,
 };
-use crate::figure::page::Cell;
+use crate::figure::layout::Cell;
 use glam::DVec2;
 use leafdyn::study::{Confidence, Knob, MapOutcome, MapRequest, MapRow, MapShow, Vary};
 
