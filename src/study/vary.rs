@@ -332,7 +332,7 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
 }
 
 /// Why numbers cannot vary as requested.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VaryError {
     /// A syntax error.
     #[error("{0}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log")]
@@ -340,6 +340,9 @@ pub enum VaryError {
     /// A key that cannot vary.
     #[error("{0}")]
     Key(String),
+    /// An entry that the scenario does not have at any value.
+    #[error("{0}")]
+    Missing(#[source] ScenarioError),
     /// An inadmissible value for the setting of a method.
     #[error("{0}")]
     Knob(String),
@@ -349,6 +352,11 @@ pub enum VaryError {
 }
 
 impl VaryError {
+    /// Whether another value may be admissible.
+    pub(crate) fn depends_on_value(&self) -> bool {
+        !matches!(self, VaryError::Key(_) | VaryError::Missing(_))
+    }
+
     fn knob(knob: Knob, found: impl fmt::Debug, needed: &str) -> VaryError {
         VaryError::Knob(format!("{} = {found:?}: must be {needed}", knob.path()))
     }

@@ -174,7 +174,8 @@ pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
 /// The content of a result's file of this name, if it has such a file.
 ///
 /// ```
-/// # use leafdyn::{files::{self, Document}, scenario::Scenario};
+/// # use leafdyn::scenario::Scenario;
+/// use leafdyn_program::files::{self, Document};
 /// let scenario = Scenario::read("../scenarios/paper/fig04.toml")?;
 /// let leaf = scenario.relax()?;
 /// let document = Document::new(&leaf, &scenario, None);

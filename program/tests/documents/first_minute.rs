@@ -35,7 +35,7 @@ fn the_way_of_a_newcomer_is_short_and_leads_to_a_page() {
     // With those that clone the repository and enter it.
     assert!(2 + commands.len() <= 5, "{commands:?}");
     let (install, own) = commands.split_first().unwrap();
-    assert_eq!(*install, "cargo install --path .");
+    assert_eq!(*install, "cargo install --path program");
     let place = Workplace::empty();
     for command in own {
         place.run(command.strip_prefix("leafdyn ").unwrap()).ends(0);

@@ -164,10 +164,10 @@ fn overrides() {
     assert!(dynamics("dynamics.clamped=true").clamped);
     let negative = "dynamics.duration=-3";
     let part = "dynamics.duration = -3: must be greater than 0";
-    holds(with(negative), &[&format!("--set {negative}: {part}")]);
+    holds(with(negative), &[&format!("set {negative}: {part}")]);
     let vector = "dynamics.gravity=[0,0,-1]";
     let part = "dynamics.gravity = [0,0,-1]: must be a table: a load in time is {";
-    holds(with(vector), &[&format!("--set {vector}: {part}")]);
+    holds(with(vector), &[&format!("set {vector}: {part}")]);
     let part = "unknown key dynamics.durration (did you mean dynamics.duration?)";
     holds(with("dynamics.durration=3"), &[part]);
 }

@@ -8,7 +8,7 @@ use leafdyn_testing::*;
 /// The message for VALID with an override goes on so.
 #[track_caller]
 fn overridden(given: &str, problem: &[&str]) {
-    holds(with(&[given]), &[&format!("--set {given}: {}", problem[0])]);
+    holds(with(&[given]), &[&format!("set {given}: {}", problem[0])]);
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn refused_overrides_say_that_they_are_overrides() {
         gravity=[0,0,1] => unknown key gravity (did you mean load.gravity?)
         leaf=3 => unknown key leaf
         =3 => unknown key
-        leaf.rods => must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]
+        leaf.rods => must be KEY=VALUE, as in load.gravity=[0,0,-0.5]
         load.tip_force=[0,0,1e300] => load.tip_force = [0,0,1e300]: gives |F| L^2/A
         name=a/b => name = a/b: must be usable as a folder name
     "#;

@@ -45,6 +45,9 @@ pub enum MapRefused {
     /// Its rows would take too much memory.
     #[error("{0}")]
     Memory(#[from] TooMuch),
+    /// A number cannot vary.
+    #[error("{0}")]
+    Vary(#[from] VaryError),
     /// The axes or the methods do not make a map, or one that is too large.
     #[error("{0}")]
     Map(String),
@@ -118,7 +121,9 @@ impl MapRequest {
         let first = self.base.at(&self.values(0));
         let last = self.base.at(&self.values(self.cells() - 1));
         match (first, last) {
-            (Err(VaryError::Key(why)), Err(VaryError::Key(_))) => Err(MapRefused::Map(why)),
+            (Err(why), Err(other)) if !why.depends_on_value() && !other.depends_on_value() => {
+                Err(why.into())
+            }
             _ => Ok(()),
         }
     }

@@ -128,7 +128,7 @@ impl Base {
         let entries = self.entries.replaced(&overriding(values));
         let entries = entries.map_err(|error| match adds {
             true => VaryError::Scenario(error),
-            false => VaryError::Key(error.to_string()),
+            false => VaryError::Missing(error),
         })?;
         Ok(Varied {
             scenario: entries.check()?,

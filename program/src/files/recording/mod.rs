@@ -35,7 +35,7 @@ const STILLS: usize = 8;
 /// The files of a running simulation.
 ///
 /// ```
-/// use leafdyn::files::{Document, Recording, Selection};
+/// use leafdyn_program::files::{Document, Recording, Selection};
 /// use leafdyn::scenario::Scenario;
 /// use leafdyn::simulate::{Options, Simulation};
 ///
