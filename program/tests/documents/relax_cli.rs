@@ -84,7 +84,9 @@ fn a_folder_that_is_a_file_is_refused() {
 
 /// A run by shooting into `out`: its report and `summary.json`.
 fn shoot(place: &Workplace, arguments: &str, status: i32) -> (String, Value) {
-    let run = place.run(format!("relax {arguments} --method shooting --out out --verbose"));
+    let run = place.run(format!(
+        "relax {arguments} --method shooting --out out --verbose"
+    ));
     let Run { out, err, .. } = run.ends(status);
     assert_eq!(err, "");
     place.holds("out", FILES);

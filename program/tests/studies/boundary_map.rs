@@ -134,7 +134,7 @@ fn cells_behind_a_fold_are_reached_round_its_cusp() {
 }
 
 /// Both modes of the flat undulating leaf become neutral along rows of cells, on a coarse grid
-/// elsewhere than on a fine one. (docs/tried.md has a range, 9 to 6, where a row leaves the sheet.)
+/// elsewhere than on a fine one. (docs/tried.md: over 9 to 6 a row leaves the sheet.)
 #[test]
 fn rows_that_run_along_a_curve_stay_on_its_sheet() {
     let (keys, half) = (weak_veins(), ["0.07"; 5].join(","));
