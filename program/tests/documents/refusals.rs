@@ -100,7 +100,7 @@ const REFUSED: &str = "
     chart leaf.toml --seconds 1e9 => at most 86400
     chart leaf.toml --methods newton => semi-implicit-grid
     chart leaf.toml --tolerance 1e-3 => --rods
-    chart leaf.toml --tolerance 2 --rods 2 => tolerance = 2
+    chart leaf.toml --tolerance 2 --rods 2 => --tolerance 2
     chart leaf.toml --rods 2,many => --rods
     chart leaf.toml --rods 2,0 => leaf.rods
     chart leaf.toml --set leaf.rods=0 => rods
