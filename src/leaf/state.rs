@@ -1,6 +1,6 @@
 //! Positions, rotations and segment forces of all nodes of a leaf.
 
-use crate::largest::largest;
+use crate::largest::{larger, largest};
 use crate::rotation;
 use glam::{DQuat, DVec3};
 
@@ -114,6 +114,14 @@ impl State {
         };
         let nodes = (0..self.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
         largest(nodes.map(|(j, i)| distance(j, i)))
+    }
+
+    /// The largest displacement or rotation of a node between this state and another on the same
+    /// grid.
+    pub fn distance(&self, other: &State) -> f64 {
+        let turns = self.q.iter().zip(&other.q);
+        let turns = turns.map(|(a, b)| rotation::log(*b * a.conjugate()).length());
+        turns.fold(self.shift_to(other), larger)
     }
 
     /// The largest change of a segment's force between this state and another on the

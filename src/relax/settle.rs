@@ -100,7 +100,7 @@ impl Run<'_, '_> {
             let begun = from_start.then(|| (state.clone(), self.work.steps));
             let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
             if let Some((begun, steps)) = begun {
-                let distance = path::distance(&begun, &settled.level.state);
+                let distance = begun.distance(&settled.level.state);
                 self.from_start = Some((distance, self.work.steps - steps));
             }
             self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);

@@ -17,7 +17,6 @@ mod snap;
 mod walk;
 
 pub use choice::preference;
-pub use walk::distance;
 
 use crate::words;
 use serde::Serialize;

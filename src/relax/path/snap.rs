@@ -8,7 +8,7 @@
 //! is Newton's method.
 
 use super::Happening;
-use super::walk::{Walk, distance};
+use super::walk::Walk;
 use crate::leaf::State;
 use crate::newton::{Equations, Newton, Stop, at_saddle};
 use crate::relax::saddle;
@@ -73,7 +73,7 @@ impl Walk<'_> {
         let (state, equally_open) = match (one, other) {
             (Some((e1, one)), Some((e2, other))) => {
                 let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
-                let apart = distance(&one, &other) > NEARBY;
+                let apart = one.distance(&other) > NEARBY;
                 match e1 <= e2 || same {
                     true => (one, same && apart),
                     false => (other, false),
@@ -92,7 +92,7 @@ impl Walk<'_> {
         self.carry_last(part);
         let before = self.next.clone();
         self.move_to_rest()?;
-        if distance(&before, &self.next) > NEARBY {
+        if before.distance(&self.next) > NEARBY {
             self.note(part, Happening::Snapped);
         }
         Ok(())
@@ -123,7 +123,7 @@ impl Walk<'_> {
                 largest: LARGEST_INCREMENT,
             };
             let mut moved = step.solve(leaf, &mut self.next, &mut self.system, proximal);
-            if moved.is_ok() && distance(&from, &self.next) > LARGEST_CHANGE {
+            if moved.is_ok() && from.distance(&self.next) > LARGEST_CHANGE {
                 moved = Err(Stop::Stuck);
             }
             match moved {

@@ -3,12 +3,10 @@
 
 use super::loading::Loading;
 use super::{Event, Happening, Stage};
-use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{Definite, Equations, Newton, Stop, Work};
 use crate::relax::saddle;
-use crate::rotation;
 use glam::DVec3;
 
 /// First, shortest and longest steps of lambda. Where an index changes, or where the path ends,
@@ -260,7 +258,7 @@ impl<'w> Walk<'w> {
     /// The Morse index of the next state, and its distance from the one predicted, if it is
     /// near that.
     fn check(&mut self, predicted: &State) -> Result<(usize, f64), Stop> {
-        let drift = distance(&self.next, predicted);
+        let drift = self.next.distance(predicted);
         if self.known.len() > 1 && drift > LARGEST_DRIFT {
             return Err(Stop::Stuck);
         }
@@ -280,9 +278,9 @@ impl<'w> Walk<'w> {
                 Err(Stop::StepLimit) => {}
                 end => return end,
             }
-            let moves = distance(&from, &self.next);
+            let moves = from.distance(&self.next);
             let approaches = moves <= APPROACHING * moved;
-            if !approaches || distance(&self.next, predicted) > LARGEST_DRIFT {
+            if !approaches || self.next.distance(predicted) > LARGEST_DRIFT {
                 return Err(Stop::Stuck);
             }
             moved = moves;
@@ -331,11 +329,4 @@ fn definite(solver: &mut Definite) -> Equations<'_> {
         shifted: false,
         cg_tolerance: CG_TOLERANCE,
     }
-}
-
-/// Largest displacement or rotation of a node between two states of a grid.
-pub fn distance(a: &State, b: &State) -> f64 {
-    let turns = a.q.iter().zip(&b.q);
-    let turns = turns.map(|(a, b)| rotation::log(*b * a.conjugate()).length());
-    turns.fold(a.shift_to(b), larger)
 }
