@@ -6,7 +6,6 @@ use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
 use crate::relax::options::Progress;
-use crate::relax::path;
 use crate::relax::run::{BUDGET, Run, is_large};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};

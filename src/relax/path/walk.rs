@@ -7,6 +7,7 @@ use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{Definite, Equations, Newton, Stop, Work};
 use crate::relax::saddle;
+use crate::rotation;
 use glam::DVec3;
 
 /// First, shortest and longest steps of lambda. Where an index changes, or where the path ends,
