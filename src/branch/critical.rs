@@ -4,13 +4,12 @@ use super::deflation::Sample;
 use super::equations::{Equations, Stuck};
 use super::field::{combined, dot, plus, times};
 use super::states::eigenvalue_rounding;
-use super::step::Found;
 use super::{Direction, Point};
 use crate::largest::larger;
 use crate::leaf::{Field, State};
 
 /// Additional modes in the border: others may be nearly neutral.
-const MORE: usize = 2;
+pub(super) const MORE: usize = 2;
 
 /// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 40;
@@ -36,14 +35,6 @@ const SAME: f64 = 1e-6;
 /// The search ends within this part of the step from the point that the step reached, if both
 /// are on the same branch.
 const ARRIVES: f64 = 0.05;
-
-/// Distances (parts of the range) behind the vertex of a pitchfork at which the branch that
-/// crosses there is sought.
-const BEYOND: [f64; 3] = [0.01, 0.003, 0.001];
-
-/// The crossing is that of the vertex if it is within so many steps of where a parabola through
-/// the points on either side has it.
-const NEAR: f64 = 10.0;
 
 /// Two vertices nearer to each other than this are the same.
 const REPEATED: f64 = 1e-4;
@@ -130,51 +121,18 @@ pub fn locate(
     Ok(found.into_iter().map(|(_, critical)| critical).collect())
 }
 
-/// The point at which a branch turns back because it crosses another one there, the vertex of a
-/// pitchfork: no eigenvalue changes its sign along this branch, but one does along the other, which
-/// goes on beyond the vertex. The points are on either side of the vertex, `step` apart; the
-/// tangent of the result is that of the other branch. None if that is not found.
-pub fn crossing_at_vertex(
-    equations: &mut Equations,
-    a: &Point,
-    b: &Point,
-    step: f64,
-) -> Option<Critical> {
-    let rates = [a, b].map(|point| point.tangent.params[0]);
-    let to_vertex = step * rates[0] / (rates[0] - rates[1]);
-    let fraction = a.fraction + 0.5 * rates[0] * to_vertex;
-    let vertex = equations.moved(&a.solution(), &a.tangent, to_vertex).ok()?;
-    BEYOND.into_iter().find_map(|beyond| {
-        let behind = fraction + beyond.copysign(rates[0]);
-        let mut behind = equations.correct(&vertex.state, behind, None).ok()?;
-        if rates[0] > 0.0 {
-            behind.tangent = behind.tangent.reversed();
-        }
-        let length = 2.0 * beyond / behind.tangent.params[0].abs();
-        let before = Found::by_step(equations, &behind, length).ok()?;
-        let [mut critical] = locate(equations, &behind, &before.point, length)
-            .ok()?
-            .try_into()
-            .ok()?;
-        let shift = vertex.state.shift_to(&critical.state);
-        let same = shift < NEAR * step && (critical.fraction - fraction).abs() < NEAR * step;
-        critical.indices = [a.index, b.index];
-        (same && critical.kind == Kind::Branching).then_some(critical)
-    })
-}
-
 /// Evaluates points along the tangent of one, and the eigenvalues of H there.
-struct Search<'s, 'a> {
-    equations: &'s mut Equations<'a>,
-    from: &'s Point,
-    soft: &'s [Field],
+pub(super) struct Search<'s, 'a> {
+    pub equations: &'s mut Equations<'a>,
+    pub from: &'s Point,
+    pub soft: &'s [Field],
     /// The parameter of a fold is known better than its shape.
-    exactly: bool,
+    pub exactly: bool,
 }
 
-struct Evaluated {
+pub(super) struct Evaluated {
     sample: Sample,
-    eigenvalues: Vec<f64>,
+    pub eigenvalues: Vec<f64>,
     /// Eigenvectors of H, in the order of the eigenvalues.
     vectors: Vec<Vec<f64>>,
 }
@@ -183,7 +141,7 @@ struct Evaluated {
 const FORCED: f64 = 1e-6;
 
 impl Search<'_, '_> {
-    fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
+    pub fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
         let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
         let moved = equations.moved(&self.from.solution(), tangent, distance)?;
         let border = equations.momenta(self.soft);
@@ -200,7 +158,7 @@ impl Search<'_, '_> {
     }
 
     /// The zero of one eigenvalue by the Anderson-Bjorck method.
-    fn zero(
+    pub fn zero(
         &mut self,
         which: usize,
         mut distance: [f64; 2],
@@ -278,7 +236,7 @@ impl Search<'_, '_> {
 }
 
 impl Critical {
-    /// Whether the index does not change along the branch: see [`crossing_at_vertex`].
+    /// Whether the index does not change along the branch: see [`super::vertex`].
     pub fn is_vertex(&self) -> bool {
         self.indices[0] == self.indices[1]
     }

@@ -204,13 +204,14 @@ impl Followed {
         None
     }
 
-    /// Drops vertices of pitchforks that are not verified, from the last critical points and from
-    /// what is `found` of these: without them the branch is complete.
+    /// Moves vertices of pitchforks that are not verified from the last critical points, and from
+    /// what is `found` of these, to those of which no crossing branch is known.
     fn forget_vertices(&mut self, found: &mut Vec<Result<Refined, Doubt>>) {
         let known = self.critical.len();
         for k in (0..found.len()).rev() {
             if found[k].is_err() && self.branch.critical[known + k].1.is_vertex() {
-                self.branch.critical.remove(known + k);
+                let (after, _) = self.branch.critical.remove(known + k);
+                self.branch.unmet.push(after);
                 drop(found.remove(k));
             }
         }

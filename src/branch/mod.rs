@@ -41,6 +41,7 @@ mod refined;
 mod states;
 mod step;
 mod stuck;
+mod vertex;
 mod walk;
 
 pub use begin::{begin, switch};

@@ -147,7 +147,9 @@ impl Softening {
 
     /// A critical point of a nearly rigid leaf, from softened matrices, extrapolated to zero.
     /// The softening is reduced until the rounding error, that of the stiffness over the
-    /// derivative of the eigenvalue, exceeds the error of the extrapolation.
+    /// derivative of the eigenvalue, exceeds the error of the extrapolation: at a fold also that of
+    /// its shape, but not at a branch point, which a singular matrix leaves undetermined along the
+    /// neutral mode, and where the shape is interpolated.
     fn unsoftened(
         &mut self,
         family: &Family,
@@ -158,9 +160,13 @@ impl Softening {
         loop {
             let found = extrapolated(family, equations.grid(), critical, self.0)?;
             let rounding = f64::EPSILON / self.0 / slope;
+            let error = match critical.kind {
+                Kind::Fold => larger(found.error, found.fraction_error),
+                Kind::Branching => found.fraction_error,
+            };
             let less = SOFTENINGS.into_iter().find(|less| *less < self.0);
             match less {
-                Some(less) if larger(found.error, found.fraction_error) > rounding => self.0 = less,
+                Some(less) if error > rounding => self.0 = less,
                 _ => return Ok(found),
             }
         }

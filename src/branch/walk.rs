@@ -1,11 +1,12 @@
 //! Following a branch on one grid.
 
-use super::critical::{Critical, Kind, crossing_at_vertex, locate};
+use super::critical::{Critical, Kind, locate};
 use super::equations::{Equations, Stuck};
 use super::field::{add, between, plus};
 use super::refine::on_finer;
 use super::refined::Doubt;
 use super::step::Found;
+use super::vertex::crossing_at_vertex;
 use super::{Direction, Point};
 use crate::largest::larger;
 
@@ -119,6 +120,9 @@ pub struct Branch {
     pub critical: Vec<(usize, Critical)>,
     /// Changes of the index that could not be located, by the number of the point before.
     pub missed: Vec<usize>,
+    /// Vertices of pitchforks at which no branch was found to cross, by the number of the point
+    /// before.
+    pub unmet: Vec<usize>,
     /// How it ended, once it has.
     pub end: Option<End>,
     /// The first point on the present grid, if it was found there.
@@ -149,6 +153,7 @@ impl Branch {
             points: vec![first.clone()],
             critical: Vec::new(),
             missed: Vec::new(),
+            unmet: Vec::new(),
             end: None,
             first: Some(first),
             step: FIRST * how.longest,
@@ -189,6 +194,7 @@ impl Branch {
         self.steps.truncate(to);
         self.critical.retain(|(after, _)| *after < to);
         self.missed.retain(|after| *after < to);
+        self.unmet.retain(|after| *after < to);
         self.end = None;
     }
 
@@ -201,7 +207,7 @@ impl Branch {
         self.points.remove(number);
         self.steps[number - 1] += self.steps.remove(number);
         let after = self.critical.iter_mut().map(|(after, _)| after);
-        for after in after.chain(&mut self.missed) {
+        for after in after.chain(&mut self.missed).chain(&mut self.unmet) {
             *after -= usize::from(*after >= number);
         }
     }
@@ -263,28 +269,30 @@ impl Branch {
             let found = locate(equations, now, &next.point, distance);
             // If the branch turns back and no eigenvalue changes sign, it touches another one
             // where that crosses: the vertex of a pitchfork.
-            let vertex = turned
+            let is_vertex = turned
                 && next.point.index == now.index
                 && found.as_ref().is_ok_and(|found| found.is_empty());
+            let vertex =
+                is_vertex.then(|| crossing_at_vertex(equations, now, &next.point, distance));
             let mut found = found.unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
             let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
             let explained = changes == next.point.index.abs_diff(now.index)
                 && (folds.count() % 2 == 1) == turned;
-            if !explained {
+            if let Some(Ok(vertex)) = vertex {
+                let known = self.critical.last().map(|(_, last)| last);
+                let again = known.is_some_and(|known| known.is_at(&vertex));
+                found.extend((!again).then_some(vertex));
+            } else if !explained {
                 // An unexplained change of the index: the step has led to another branch
                 // nearby.
                 if next.step > UNEXPLAINED * how.longest {
                     self.step = 0.5 * next.step;
                     return Ok(());
                 }
-                if vertex {
-                    let vertex = crossing_at_vertex(equations, now, &next.point, distance);
-                    let known = self.critical.last().map(|(_, last)| last);
-                    let again = |vertex: &Critical| known.is_some_and(|known| known.is_at(vertex));
-                    found.extend(vertex.filter(|vertex| !again(vertex)));
-                } else {
-                    self.missed.push(after);
+                match is_vertex {
+                    true => self.unmet.push(after),
+                    false => self.missed.push(after),
                 }
             }
             let all = found.into_iter();

@@ -275,8 +275,23 @@ impl Run<'_, '_> {
             from,
             points,
             end: followed.end.clone(),
-            remark: followed.end.remark(),
+            remark: self.remark(followed),
         }
+    }
+
+    /// Why a branch ended, and where it met no branch that must cross it.
+    fn remark(&self, followed: &Followed) -> Option<String> {
+        let near = |after: &usize| {
+            let near = &followed.points[*after];
+            let keys = &self.request.vary.keys;
+            let value = keys.text(self.family.value(near.fraction));
+            format!(
+                "it turns back beyond {value} where another branch must cross it, which was not found"
+            )
+        };
+        let mut remarks: Vec<String> = followed.branch.unmet.iter().map(near).collect();
+        remarks.extend(followed.end.remark());
+        (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 
     /// Waves and twist of the leaf at a point, on its finest grid.
