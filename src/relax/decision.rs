@@ -17,8 +17,8 @@ pub enum Verdict {
     AsCounted,
     /// It is this, by eigenvalues extrapolated over the grids.
     Index(usize),
-    /// An eigenvalue may have either sign.
-    Undecided,
+    /// An eigenvalue may have either sign; so many others are negative for certain.
+    Undecided(usize),
     /// The eigenvalues that decide cannot be computed.
     Unknown,
 }
@@ -188,30 +188,31 @@ fn beside_zero(run: &mut Run, may_refine: bool) -> Next {
 fn verdict(run: &Run, list: List, found: &Lowest) -> Verdict {
     // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
     // coarser ones tell.
-    if found.undecided.is_none() && found.negative <= run.index {
+    let as_counted = found.undecided.is_none() && found.negative <= run.index;
+    if as_counted && Some(found.certainly_negative) <= run.index {
         return Verdict::AsCounted;
     }
-    let index = match list.above {
-        Some(_) => found.negative,
-        None => index_by_eigenvalues(run, list, found),
+    let (certain, negative) = match list.above {
+        Some(_) => (found.certainly_negative, found.negative),
+        None => by_more_eigenvalues(run, list, found),
     };
-    index.map_or(Verdict::Undecided, Verdict::Index)
+    negative.map_or(Verdict::Undecided(certain), Verdict::Index)
 }
 
-/// The Morse index by the signs of the lowest eigenvalues, if they are certain: those of the
-/// list, or of more if all of these are negative.
-fn index_by_eigenvalues(run: &Run, list: List, found: &Lowest) -> Option<usize> {
-    let mut negative = found.negative?;
+/// How many eigenvalues are negative for certain, and how many are, if that is known: of the list,
+/// or of more if all of these are negative.
+fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<usize>) {
+    let (mut certain, mut negative) = (found.certainly_negative, found.negative);
     let mut list = List {
         decides: true,
         ..list
     };
-    while negative == list.count && list.count < MOST_MODES {
+    while negative == Some(list.count) && list.count < MOST_MODES {
         list.count = (2 * list.count).min(MOST_MODES);
-        let more = modes::lowest(run, list).and_then(|more| more.negative);
-        // There are at least so many.
-        let Some(more) = more else { break };
-        negative = more;
+        let more = modes::lowest(run, list);
+        negative = more.as_ref().and_then(|more| more.negative);
+        certain = certain.max(more.map_or(0, |more| more.certainly_negative));
     }
-    Some(negative)
+    // There may be more than can be listed.
+    (certain, negative.filter(|negative| *negative < list.count))
 }

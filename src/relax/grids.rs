@@ -153,7 +153,7 @@ impl Run<'_, '_> {
                 // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
                 _ if self.too_coarse(level.leaf.segments())
                     && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
-                Ok(_) if !moved || last => {
+                Ok(_) if !moved || fixed => {
                     self.push(level);
                     return Ok(());
                 }
@@ -171,6 +171,12 @@ impl Run<'_, '_> {
                     {
                         self.push(level);
                         self.add_coarser(&failed);
+                        return Ok(());
+                    }
+                    if last {
+                        // An equilibrium, but not one to which two grids led.
+                        self.unconfirmed = true;
+                        self.push(level);
                         return Ok(());
                     }
                     before = Some(level);

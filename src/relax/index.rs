@@ -95,7 +95,7 @@ fn index_from(
     (distance_from(run, given) <= allowed).then_some(match verdict {
         Verdict::AsCounted => run.index,
         Verdict::Index(index) => Some(index),
-        Verdict::Undecided | Verdict::Unknown => None,
+        Verdict::Undecided(_) | Verdict::Unknown => None,
     })
 }
 

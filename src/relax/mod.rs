@@ -8,6 +8,7 @@ mod defect;
 mod equilibrium;
 pub(crate) mod fall;
 mod follow;
+mod found;
 mod grids;
 mod grip;
 pub(crate) mod index;

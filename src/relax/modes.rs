@@ -41,9 +41,8 @@ const SIGN_TOLERANCE: f64 = 1e-2;
 const ACCURACY: f64 = 5e-3;
 const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
 
-/// To a tolerance of this or more the grids are so coarse that two of them do not tell how
-/// eigenvalues converge: so many are compared.
-const LOW_TOLERANCE: f64 = 1e-3;
+/// Two grids do not show how eigenvalues converge, which may be equal there by chance: so many
+/// are compared, if they have few unknowns.
 const COMPARED: usize = 3;
 
 /// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
@@ -64,6 +63,8 @@ pub struct Lowest {
     pub undecided: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
+    /// How many are negative by more than their errors, whatever is known of the others.
+    pub certainly_negative: usize,
     /// The ratio of the softest eigenvalue and that on the grid whose linear equations tell the
     /// error, at least one: beside a bifurcation their response is wrong by so much.
     pub softening: f64,
@@ -125,6 +126,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
             index: run.index.unwrap_or(0).saturating_sub(left_out),
             single: run.clearly_stable || run.segments().is_some(),
             grids: Vec::new(),
+            segments: 0,
             tolerance,
             rounding: 0.0,
         },
@@ -133,9 +135,9 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         segments: Vec::new(),
     };
     let sharp = requested && options.mode_shapes;
-    let low = run.tolerance >= LOW_TOLERANCE && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let few = 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
     let enough =
-        |series: &Series| (!sharp || series.accurate()) && (!low || series.grids.len() >= COMPARED);
+        |series: &Series| (!sharp || series.accurate()) && (!few || series.grids.len() >= COMPARED);
     let sufficient_grids = sufficient_grids(run);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
     for (k, level) in run.levels.iter().enumerate().skip(skipped) {
@@ -181,6 +183,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         modes: series.values().into_iter().map(mode).collect(),
         undecided: series.undecided(),
         negative: series.negative().map(|negative| left_out + negative),
+        certainly_negative: left_out + series.certainly_negative(),
         softening,
     })
 }
@@ -213,7 +216,7 @@ impl<'a> Nested<'a> {
         let Some(pairs) = on(&level, &near) else {
             return false;
         };
-        self.series.push(&pairs);
+        self.series.push(level.leaf.segments(), &pairs);
         self.segments.push(level.leaf.segments());
         self.series.rounding = modes::rounding(&level.leaf);
         let before = self.finest.replace(OnGrid { level, pairs });

@@ -1,5 +1,6 @@
 //! From the settled grids to the result in the units of the scenario.
 
+use crate::largest::larger;
 use crate::leaf::{Grid, RodFields};
 use crate::newton::Stop;
 use crate::relax::equilibrium::{
@@ -10,7 +11,7 @@ use crate::relax::method::Method;
 use crate::relax::nodes::with_sign_of;
 use crate::relax::path::{Event, Happening, Path, Stage};
 use crate::relax::richardson::Richardson;
-use crate::relax::run::Run;
+use crate::relax::run::{Run, energies};
 use crate::relax::shape;
 use crate::scenario::{Scenario, obstacle};
 use crate::shape::RodShape;
@@ -35,6 +36,7 @@ pub fn equilibrium(
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);
     let (grid, lines) = centerlines(run, finest);
+    let (energy, energy_error) = potential(run, columns);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = run
         .levels
@@ -48,7 +50,7 @@ pub fn equilibrium(
         remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
-        energy: Some(potential(run, columns) * scale.moment()),
+        energy: Some(energy * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: reaction(&run.levels, columns),
@@ -78,6 +80,7 @@ pub fn equilibrium(
             tolerance: run.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
+            energy_error: energy_error.map(|error| error * scale.moment()),
         },
         work: run.work,
         wall_seconds,
@@ -198,14 +201,24 @@ fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
 }
 
 /// The potential energy: integrated along the leaf, with an error of second order in the
-/// defect, or after `columns` extrapolations.
-fn potential(run: &Run, columns: usize) -> f64 {
-    if let Some(estimate) = &run.estimate {
-        return estimate.energy;
+/// defect, or after `columns` extrapolations. Also its error, if that by extrapolation is larger
+/// than that of positions, and what was integrated, if anything, is not within it.
+fn potential(run: &Run, columns: usize) -> (f64, Option<f64>) {
+    let table = energies(&run.levels);
+    let integrated = run.estimate.as_ref().map(|estimate| estimate.energy);
+    let Some(best) = table.best() else {
+        return (integrated.unwrap_or(table.column(columns)[0]), None);
+    };
+    let extrapolated = table.column(columns.min(best.columns))[0];
+    match integrated {
+        Some(energy) if (energy - extrapolated).abs() <= best.error => (energy, None),
+        _ => {
+            let apart = integrated.map_or(0.0, |energy| (energy - extrapolated).abs());
+            let error = larger(best.error, apart);
+            let expected = run.error().unwrap_or(f64::INFINITY) * extrapolated.abs();
+            (extrapolated, (error > expected).then_some(error))
+        }
     }
-    let on = |level: &Level| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
-    let energies: Richardson = run.levels.iter().map(on).collect();
-    energies.column(columns)[0]
 }
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of

@@ -97,19 +97,7 @@ impl Richardson {
         let before = &self.table[self.table.len().checked_sub(2)?];
         let last = row.len() - 1;
         let correction = |m: usize| self.correction(m);
-        let mut columns = last;
-        for m in 0..last - 1 {
-            let change = distance(&row[m], &before[m]);
-            let ratio = change / distance(&before[m], &self.table[last - 2][m]);
-            let order = self.order(m);
-            let least = LEAST_RATIO * order;
-            if change > self.noise.max(ROUNDING)
-                && (ratio > ORDER_SLACK * order || m == 0 && ratio < least)
-            {
-                columns = m;
-                break;
-            }
-        }
+        let mut columns = self.ordered();
         if columns == 0 {
             return Some(Best {
                 columns,
@@ -133,6 +121,38 @@ impl Richardson {
             columns,
             error: larger(0.0, safety * correction(last)),
         })
+    }
+
+    /// Terms of the series that may be removed, as the changes from grid to grid of all columns
+    /// before show their orders.
+    pub fn ordered(&self) -> usize {
+        let Some(last) = self.table.len().checked_sub(1) else {
+            return 0;
+        };
+        let shows_none = |m: &usize| {
+            let change = self.change(*m);
+            let before = distance(&self.table[last - 1][*m], &self.table[last - 2][*m]);
+            let (ratio, order) = (change / before, self.order(*m));
+            let least = LEAST_RATIO * order;
+            change > self.noise.max(ROUNDING)
+                && (ratio > ORDER_SLACK * order || *m == 0 && ratio < least)
+        };
+        (0..last.saturating_sub(1)).find(shows_none).unwrap_or(last)
+    }
+
+    /// The last change of a column from grid to grid.
+    fn change(&self, m: usize) -> f64 {
+        let last = self.table.len() - 1;
+        distance(&self.table[last][m], &self.table[last - 1][m])
+    }
+
+    /// The last change of the column with so many terms removed, if the best one has more; else
+    /// zero.
+    pub fn change_beyond(&self, columns: usize) -> f64 {
+        match columns < self.columns() {
+            true => self.change(columns),
+            false => 0.0,
+        }
     }
 
     /// Terms of the series that the best column has removed; none before there are two grids.

@@ -1,6 +1,7 @@
 //! A run over nested grids: its options, the grids on which the leaf has settled, and the
 //! error estimate of their extrapolation.
 
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, System, whole_fields};
 use crate::newton::{Contraction, Stop, Work};
 use crate::relax::defect::{self, Estimate, Linear};
@@ -55,6 +56,9 @@ const MANY_NODES: usize = 50_000;
 /// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
 const FIRST_VALLEY: (f64, usize) = (2.0, 8);
 
+/// Changes of the energy below this part of it, or of the leaf's bending energy, are rounding.
+const ENERGY_NOISE: f64 = 1e-11;
+
 /// Rounding error per segment.
 const ROUNDING: f64 = 4e-15;
 
@@ -82,6 +86,10 @@ pub struct Run<'a, 'o> {
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
     pub table: Richardson,
+    /// The error of its best column where the energy converges otherwise than its order indicates:
+    /// then layers are thinner than the segments, and what they change in positions, which is the
+    /// same on all grids that miss them, is not seen in these.
+    pub unresolved: f64,
     /// The error estimated from the defect of the extrapolated values, if it is known, and the
     /// linear equations for it.
     pub estimate: Option<Estimate>,
@@ -114,20 +122,10 @@ pub struct Run<'a, 'o> {
     /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
     /// led there.
     pub from_start: Option<(f64, usize)>,
+    /// Whether the leaf moved far from its start, and to no equilibrium on two grids.
+    pub unconfirmed: bool,
     /// Nodes times force evaluations of all walks.
     pub walked: usize,
-}
-
-/// What a run found on its grids: see its fields of the same names.
-pub struct Found {
-    levels: Vec<Level>,
-    estimate: Option<Estimate>,
-    index: Option<usize>,
-    clearly_stable: bool,
-    saddle: Option<Saddle>,
-    effects: [Option<f64>; 2],
-    solved: usize,
-    remaining: f64,
 }
 
 impl<'a, 'o> Run<'a, 'o> {
@@ -152,6 +150,7 @@ impl<'a, 'o> Run<'a, 'o> {
             saddle: None,
             levels: Vec::new(),
             table: Richardson::default(),
+            unresolved: 0.0,
             estimate: None,
             linear: None,
             spare_system: None,
@@ -167,6 +166,7 @@ impl<'a, 'o> Run<'a, 'o> {
             path: None,
             reached: None,
             from_start: None,
+            unconfirmed: false,
             walked: 0,
         }
     }
@@ -247,30 +247,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.remaining = 0.0;
         self.contraction = Contraction::default();
         self.pushes = 0;
-    }
-
-    /// What was found so far, taken out of the run but for its grids.
-    pub fn found(&mut self) -> Found {
-        Found {
-            levels: self.levels.clone(),
-            estimate: self.estimate.take(),
-            index: self.index,
-            clearly_stable: self.clearly_stable,
-            saddle: self.saddle,
-            effects: self.effects,
-            solved: self.solved,
-            remaining: self.remaining,
-        }
-    }
-
-    /// Returns to what was found before.
-    pub fn return_to(&mut self, before: Found) {
-        self.levels = before.levels;
-        self.tabulate();
-        self.estimate = before.estimate;
-        (self.index, self.clearly_stable) = (before.index, before.clearly_stable);
-        (self.saddle, self.effects) = (before.saddle, before.effects);
-        (self.solved, self.remaining) = (before.solved, before.remaining);
+        self.unconfirmed = false;
     }
 
     /// The run of a reduced leaf converted to one of the whole leaf.
@@ -324,7 +301,8 @@ impl<'a, 'o> Run<'a, 'o> {
     /// The error estimate as the linear equations of a grid tell it.
     fn error_of_linear(&self) -> Option<f64> {
         let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
-        let best = self.table.best().map(|best| best.error);
+        let best = self.table.best();
+        let best = best.map(|best| larger(best.error, self.unresolved));
         let most = best.map_or(f64::INFINITY, |best| LARGEST * best);
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
@@ -430,11 +408,25 @@ impl<'a, 'o> Run<'a, 'o> {
             (segments, positions(level, stride))
         };
         self.table = self.levels.iter().map(on).collect();
+        let ordered = energies(&self.levels).ordered();
+        self.unresolved = self.table.change_beyond(ordered);
         self.estimate = None;
         if self.levels.len() < 2 {
             self.linear = None;
         }
     }
+}
+
+/// The potential energies on all grids.
+pub fn energies(levels: &[Level]) -> Richardson {
+    let on = |level: &Level| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
+    let largest = (levels.iter()).map(|level| level.leaf.energy(&level.state).abs());
+    let noise = ENERGY_NOISE * largest.fold(1.0, larger);
+    levels
+        .iter()
+        .map(on)
+        .collect::<Richardson>()
+        .with_noise(noise)
 }
 
 /// Whether the equations of a leaf need much memory.

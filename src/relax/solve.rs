@@ -224,7 +224,11 @@ fn finished(
         .path
         .as_ref()
         .and_then(|path| path.doubt(run.options.route));
+    let unconfirmed = doubt.is_none() && run.unconfirmed && found.outcome.is_at_rest();
     found.doubts.extend(doubt);
+    found
+        .doubts
+        .extend(unconfirmed.then(|| UNCONFIRMED.to_owned()));
     found.decide(verdict);
     let modes = modes.or_else(|| {
         let list = List::requested(&run);
@@ -240,7 +244,13 @@ impl Equilibrium {
     fn decide(&mut self, verdict: Verdict) {
         let index = match verdict {
             Verdict::AsCounted => return,
-            Verdict::Undecided => {
+            Verdict::Undecided(certain)
+                if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
+            {
+                self.doubts.push(AT_LEAST.to_owned());
+                certain
+            }
+            Verdict::Undecided(_) => {
                 self.doubts.push(UNDECIDED.to_owned());
                 return;
             }
@@ -265,9 +275,17 @@ impl Equilibrium {
     }
 }
 
+/// Remark on a leaf that two grids never bring to the same equilibrium.
+const UNCONFIRMED: &str = "from its start the leaf moves to different equilibria on different grids: \
+     this is one in which it can rest; relax with --all looks for the others";
+
 /// Remark on a leaf with an eigenvalue that may have either sign.
 const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
      whether the leaf is stable is not certain";
+
+/// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
+const AT_LEAST: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+     the index is the number of those that are certainly negative, or larger";
 
 /// Remark on a leaf at rest on all grids that is at a saddle.
 const BESIDE_BIFURCATION: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \

@@ -318,3 +318,21 @@ fn a_leaf_falls_off_a_saddle_that_it_stands_on_exactly() {
     assert_eq!(rest.index, 0);
     assert!(rest.state.shift_to(&flat.state) > 1e-2);
 }
+
+/// A column a little beyond the loads of both of its planes, straight to the last digit: how many
+/// modes are requested does not change that both are unstable.
+#[test]
+fn the_index_does_not_depend_on_how_many_modes_are_requested() {
+    let column = rod(
+        "stiffness.torsion=1.2496011635341304; stiffness.bending_2=2.065310299737473; \
+         stiffness.bending_3=2.0655168307674465; stiffness.axial=1e5; stiffness.shear_2=inf; \
+         stiffness.shear_3=inf; load.tip_force=[-5.096954363457133, 0, 0]",
+    );
+    for modes in [0, 1, 2, 3] {
+        let leaf = relaxed(&column, &with_modes(modes, to(1e-10)));
+        let index = leaf.stability.negative_eigenvalues;
+        let straight = tip(&leaf).z.hypot(tip(&leaf).y) < 1e-6;
+        assert_eq!(index, Some(if straight { 2 } else { 0 }), "{modes} modes");
+        assert!(leaf.outcome != Outcome::Converged, "{modes} modes");
+    }
+}

@@ -119,7 +119,8 @@ pub fn as_accurate(equilibrium: &Equilibrium, value: f64, size: f64) -> String {
     match equilibrium.accuracy.error_estimate {
         Some(error) if size != 0.0 => {
             let part = (error / equilibrium.shape.longest()).max(10f64.powi(-DIGITS - 1));
-            known(value, part * size.abs())
+            let own = equilibrium.accuracy.energy_error.unwrap_or(0.0);
+            known(value, (part * size.abs()).max(own))
         }
         _ => significant(value),
     }

@@ -55,6 +55,22 @@ const PART: f64 = 0.1;
 pub struct Accuracy {
     pub tips: f64,
     pub numbers: f64,
+    /// That of the parameters for which further grids are tried.
+    pub sought: f64,
+}
+
+impl Accuracy {
+    /// Whether errors of the tips and of the parameters are small enough, on the `last` grid or on
+    /// one after which there are others; `exact`: whether the parameters are as sought.
+    fn is_reached(&self, tips: f64, numbers: [f64; 2], (exact, last): (bool, bool)) -> bool {
+        match last {
+            false => tips <= self.tips && exact,
+            true => {
+                tips <= larger(self.tips, NEUTRAL_TIPS)
+                    && (exact || larger(numbers[0], numbers[1]) <= self.numbers)
+            }
+        }
+    }
 }
 
 /// A point to be verified.
@@ -109,7 +125,7 @@ fn refine_from(
     let (mut moved, mut factorizations) = (f64::INFINITY, 0);
     let mut contraction = Contraction::default();
     let (mut levels, mut params) = (Vec::<Level>::new(), Vec::new());
-    let enough = accuracy.numbers.max(EXACT);
+    let enough = accuracy.sought.max(EXACT);
     let mut softening = None;
     for level in 0..GRIDS {
         if level > 0 {
@@ -160,10 +176,8 @@ fn refine_from(
         let exact = table.is_exact(enough);
         let last = level + 1 == if rigid { RIGID } else { GRIDS }
             || 2 * manifold.grid().segments() > FINEST;
-        let tips = if last { NEUTRAL_TIPS } else { accuracy.tips };
-        let tips = table.tips.best().is_some_and(|best| best.error <= tips);
-        let numbers = table.errors().iter().all(|error| *error <= accuracy.tips);
-        if tips && (exact || last && numbers) {
+        let tips = table.tips.best().map_or(f64::INFINITY, |best| best.error);
+        if accuracy.is_reached(tips, table.errors(), (exact, last)) {
             return Ok(Verified {
                 factorizations,
                 ..table.verified(&manifold, &near, step.special)
@@ -317,4 +331,26 @@ fn unsoftened(
         softening,
         errors: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where no finer grid is left parameters need not be as exact as sought, but as required; the
+    /// bound of the tips is theirs alone, and a last grid is not judged more strictly.
+    #[test]
+    fn each_error_is_compared_with_its_own_bound() {
+        let accuracy = Accuracy {
+            tips: 1e-2,
+            numbers: 1e-5,
+            sought: 1e-7,
+        };
+        let reached = |tips, number, last| {
+            accuracy.is_reached(tips, [0.0, number], (number <= accuracy.sought, last))
+        };
+        assert!(reached(1e-2, 1e-7, false) && reached(1e-2, 1e-5, true));
+        assert!(!reached(1e-2, 1e-6, false) && !reached(1e-2, 1e-4, true));
+        assert!(!reached(2e-2, 1e-7, false) && !reached(2e-2, 1e-7, true));
+    }
 }

@@ -142,6 +142,7 @@ pub fn shoot(
         tolerance,
         residual: None,
         error_estimate: None,
+        energy_error: None,
     };
     let (mut energy, mut index) = (None, None);
     let ((outcome, remark), work, rods) = match found {

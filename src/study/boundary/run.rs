@@ -23,8 +23,8 @@ const LONGEST: f64 = 0.1;
 /// Longest step along curves that are followed for a map.
 const OF_MAP: f64 = 0.04;
 
-/// Accuracy of parameters, as parts of their ranges, relative to that of tips; not for
-/// curves that are followed for a map only.
+/// Accuracy of parameters, as parts of their ranges, that is sought, relative to that required;
+/// not for curves that are followed for a map only.
 const EXACTER: f64 = 1e-2;
 
 /// Largest number of curves with leaves on either side.
@@ -140,7 +140,8 @@ fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
         most: request.trace.most_points,
         accuracy: Accuracy {
             tips: tolerance,
-            numbers: EXACTER * tolerance,
+            numbers: tolerance,
+            sought: EXACTER * tolerance,
         },
     }
 }
@@ -213,7 +214,7 @@ impl Run<'_, '_> {
     fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
         let accuracy = self.how.accuracy.tips;
         self.how.longest = self.how.longest.max(OF_MAP);
-        self.how.accuracy.numbers = accuracy;
+        self.how.accuracy.sought = accuracy;
         let mut cells = Cells::new(self.plane, size);
         let mut next = Some(cells.begin(first, &self.known));
         while let Some(unexplained) = next {
