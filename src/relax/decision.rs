@@ -189,20 +189,21 @@ fn verdict(run: &Run, list: List, found: &Lowest) -> Verdict {
     // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
     // coarser ones tell.
     let as_counted = found.undecided.is_none() && found.negative <= run.index;
-    if as_counted && Some(found.certainly_negative) <= run.index {
+    if as_counted && found.certainly_negative() <= run.index.unwrap_or(0) {
         return Verdict::AsCounted;
     }
     let (certain, negative) = match list.above {
-        Some(_) => (found.certainly_negative, found.negative),
+        Some(_) => (found.certainly_negative(), found.negative),
         None => by_more_eigenvalues(run, list, found),
     };
     negative.map_or(Verdict::Undecided(certain), Verdict::Index)
 }
 
 /// How many eigenvalues are negative for certain, and how many are, if that is known: of the list,
-/// or of more if all of these are negative.
+/// or of more if all of these are negative. What is certain of a list remains so in a longer one,
+/// whose errors are those of its higher eigenvalues.
 fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<usize>) {
-    let (mut certain, mut negative) = (found.certainly_negative, found.negative);
+    let (mut certain, mut negative) = (found.certainly_negative(), found.negative);
     let mut list = List {
         decides: true,
         ..list
@@ -210,8 +211,8 @@ fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<
     while negative == Some(list.count) && list.count < MOST_MODES {
         list.count = (2 * list.count).min(MOST_MODES);
         let more = modes::lowest(run, list);
-        negative = more.as_ref().and_then(|more| more.negative);
-        certain = certain.max(more.map_or(0, |more| more.certainly_negative));
+        negative = (more.as_ref()).and_then(|more| more.negative_beyond(certain));
+        certain = certain.max(more.map_or(0, |more| more.certainly_negative()));
     }
     // There may be more than can be listed.
     (certain, negative.filter(|negative| *negative < list.count))

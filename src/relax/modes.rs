@@ -63,11 +63,28 @@ pub struct Lowest {
     pub undecided: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
-    /// How many are negative by more than their errors, whatever is known of the others.
-    pub certainly_negative: usize,
+    /// So many eigenvalues are below those of the list.
+    pub left_out: usize,
+    /// Whether each of the list is negative, where that is certain.
+    pub signs: Vec<Option<bool>>,
     /// The ratio of the softest eigenvalue and that on the grid whose linear equations tell the
     /// error, at least one: beside a bifurcation their response is wrong by so much.
     pub softening: f64,
+}
+
+impl Lowest {
+    /// How many eigenvalues are negative for certain, whatever is known of the others.
+    pub fn certainly_negative(&self) -> usize {
+        let negative = self.signs.iter().filter(|sign| **sign == Some(true));
+        self.left_out + negative.count()
+    }
+
+    /// How many are negative where the first so `many` are known to be, if that is certain.
+    pub fn negative_beyond(&self, many: usize) -> Option<usize> {
+        let others = self.signs.iter().skip(many.saturating_sub(self.left_out));
+        let negative = |sum, sign: &Option<bool>| Some(sum + usize::from((*sign)?));
+        others.into_iter().try_fold(many, negative)
+    }
 }
 
 /// A list of eigenvalues.
@@ -183,7 +200,8 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         modes: series.values().into_iter().map(mode).collect(),
         undecided: series.undecided(),
         negative: series.negative().map(|negative| left_out + negative),
-        certainly_negative: left_out + series.certainly_negative(),
+        left_out,
+        signs: series.signs(),
         softening,
     })
 }

@@ -157,27 +157,20 @@ impl Series {
     /// Number of negative eigenvalues, if their signs are certain; on a single grid those of that
     /// grid.
     pub fn negative(&self) -> Option<usize> {
-        let (values, certain) = (self.values(), self.certain());
-        let all = certain.iter().all(|certain| *certain);
-        all.then(|| values.iter().filter(|it| it.value < 0.0).count())
+        let negative = |sum, sign: Option<bool>| Some(sum + usize::from(sign?));
+        self.signs().into_iter().try_fold(0, negative)
     }
 
-    /// Number of eigenvalues that are certainly negative, whatever the signs of the others.
-    pub fn certainly_negative(&self) -> usize {
-        let values = self.values().into_iter().zip(self.certain());
-        values
-            .filter(|(it, certain)| *certain && it.value < 0.0)
-            .count()
-    }
-
-    /// Whether the sign of each extrapolated value is certain; on a single grid that there.
-    fn certain(&self) -> Vec<bool> {
+    /// Whether each eigenvalue, ascending, is negative, if that is certain; on a single grid
+    /// whether it is there.
+    pub fn signs(&self) -> Vec<Option<bool>> {
         let alone = |k: usize| NOISE * self.rounding + UNFINISHED * self.tolerance * self.unit(k);
-        let certain = |(k, it): (usize, Extrapolated)| match it.error {
+        let certain = |(k, it): (usize, &Extrapolated)| match it.error {
             Some(error) => it.value.abs() > error || error == 0.0,
             None => self.single && it.value.abs() > alone(k),
         };
-        self.values().into_iter().enumerate().map(certain).collect()
+        let sign = |(k, it): (usize, Extrapolated)| certain((k, &it)).then_some(it.value < 0.0);
+        self.values().into_iter().enumerate().map(sign).collect()
     }
 
     /// The largest ratio of a positive eigenvalue on a grid and what it is at least without errors
@@ -259,7 +252,7 @@ mod tests {
     fn negative_eigenvalues_are_counted_beside_one_that_may_have_either_sign() {
         let found = series(&[&[-1.27e-3, 1e-6], &[-1.278e-3, 2e-6], &[-1.28e-3, 1e-6]]);
         assert_eq!(found.negative(), None);
-        assert_eq!(found.certainly_negative(), 1);
+        assert_eq!(found.signs(), [Some(true), None]);
         assert!(found.undecided().is_some());
     }
 
