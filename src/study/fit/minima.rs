@@ -199,6 +199,21 @@ impl<'a> Minima<'_, 'a> {
         self.evaluations.set(self.evaluations.get() + more);
     }
 
+    /// The number of evaluations at which searches from other values end: beside a minimum, they take no
+    /// more in all than the fit itself took.
+    fn most_evaluations(&self, best: &Minimum) -> usize {
+        match best.converged {
+            true => self.evaluations.get() + best.fit.work.evaluations,
+            false => usize::MAX,
+        }
+    }
+
+    /// How many evaluations are left up to that, if any.
+    fn left(&self, most: usize) -> Option<usize> {
+        let left = most.saturating_sub(self.evaluations.get());
+        (left > 0).then_some(left)
+    }
+
     fn loose(&self) -> Model<'a> {
         self.model.with_loose_tolerance(self.weighting.assumed)
     }
@@ -278,31 +293,26 @@ impl<'a> Minima<'_, 'a> {
         }
         starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
         self.count(scout.evaluations());
-        let starts = starts.into_iter().take(MOST_STARTS);
-        let minima = starts.filter_map(|start| self.descend(&start.theta, None, FEW_STEPS));
-        Others {
-            minima: minima.collect(),
-            tried,
+        let mut minima = Vec::new();
+        let most = self.most_evaluations(best);
+        for start in starts.into_iter().take(MOST_STARTS) {
+            // Values that are better already need not lead away from the minimum.
+            let beside = best.converged && !self.is_better(best, start.sum);
+            let besides = beside.then(|| best.besides(&start.theta));
+            let Some(most_steps) = self.left(most) else { break };
+            let most_steps = most_steps.min(FEW_STEPS);
+            minima.extend(self.descend(&start.theta, besides, most_steps));
         }
+        Others { minima, tried }
     }
 
-    /// Minima near values that may fit as well, with no more work than the fit itself took.
+    /// Minima near values that may fit as well.
     fn images(&self, best: &Minimum) -> Others {
         let mut others = Others::default();
-        let most = best.fit.work.evaluations;
-        let before = self.evaluations.get();
+        let most = self.most_evaluations(best);
         for (theta, what) in images(self.model, &best.theta) {
-            let spent = self.evaluations.get() - before;
-            if spent >= most {
-                break;
-            }
-            let change = theta.iter().zip(&best.theta).map(|(to, from)| to - from);
-            let besides = Besides {
-                theta: &best.theta,
-                most: best.sum + best.significant,
-                distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
-            };
-            let found = self.descend(&theta, Some(besides), most - spent);
+            let Some(most_steps) = self.left(most) else { break };
+            let found = self.descend(&theta, Some(best.besides(&theta)), most_steps);
             others.minima.extend(found);
             others.tried.push(what);
         }

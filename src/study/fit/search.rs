@@ -7,7 +7,7 @@ use super::end::BETTER;
 use super::found;
 use super::free::LONGEST_STEP;
 use super::interval;
-use super::least_squares::{End, Iteration, Weighting};
+use super::least_squares::{Besides, End, Iteration, Weighting};
 use super::model::{Model, Point};
 use super::result::{Fit, FitStep, FitWork};
 use super::starts::{misfit, sum};
@@ -50,6 +50,16 @@ impl Minimum {
         match self.converged == other.converged {
             true => self.sum < other.sum,
             false => self.converged,
+        }
+    }
+
+    /// This minimum as one besides which another is searched from these values.
+    pub fn besides(&self, theta: &[f64]) -> Besides<'_> {
+        let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
+        Besides {
+            theta: &self.theta,
+            most: self.sum + self.significant,
+            distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
         }
     }
 }
