@@ -1,7 +1,7 @@
 //! The answer of a fit does not depend on where it starts, and other sets of numbers that fit as well
 //! are named.
 
-use leafdyn::study::FitOutcome;
+use leafdyn::study::{Fit, FitOutcome};
 use leafdyn_testing::fit::{VEIN, fitted, gives_back, pulls, request};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -179,4 +179,46 @@ fn a_minimum_is_not_left_for_values_that_are_none() {
         "{:?}",
         found.remarks
     );
+    // Nor do they go on and on where nothing else fits.
+    assert!(found.work.evaluations <= 200, "{:?}", found.work);
+}
+
+/// A rod that is curved at rest and pulled straight: as its stiffness changes, its tip comes near the
+/// data more than once.
+const CURL: &str = r#"
+    name = "curl"
+    leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    stiffness = { torsion = 10.0, bending_2 = 1.0, bending_3 = 10.0, axial = inf, shear_2 = inf, shear_3 = inf }
+"#;
+
+/// A fit of the bending stiffness to tips, from initial values that are far from the data.
+fn uncurled(curvature: f64, start: f64, rows: &str) -> Fit {
+    let begin = format!("rest.bend_2={curvature}; stiffness.bending_2={start}");
+    let tips = "load.tip_force[0],load.tip_force[2],tip_x,sd_tip_x\n".to_string() + rows;
+    fitted(&request(
+        base(CURL, &begin),
+        &[&tips],
+        &["stiffness.bending_2"],
+    ))
+}
+
+/// What the initial values lead to is found even where the values of another decade are nearer to the
+/// data, but lead to a minimum that the data contradict, or make improbable; and a fit that begins with
+/// the values found stays there.
+#[test]
+fn a_decade_that_is_nearer_does_not_hide_the_minimum_beside_the_start() {
+    let contradicted = "2.525,1.858,0.91814,0.003\n3.283,2.416,0.96076,0.003\n";
+    let improbable = "2.977,-3.743,0.58581,0.003\n2.929,-3.682,0.56934,0.003\n";
+    for (curvature, start, rows, wanted) in [
+        (2.098, 3.98, contradicted, 1.17),
+        (-2.994, 0.736, improbable, 1.85),
+    ] {
+        let found = uncurled(curvature, start, rows);
+        assert_eq!(found.outcome, FitOutcome::Converged, "{:?}", found.remarks);
+        gives_back(&found, &[wanted], 1e-3);
+        let again = uncurled(curvature, found.parameters[0].value, rows);
+        assert_eq!(again.outcome, FitOutcome::Converged, "{:?}", again.remarks);
+        gives_back(&again, &[found.parameters[0].value], 1e-4);
+        assert!(again.work.evaluations <= 6, "{:?}", again.work);
+    }
 }

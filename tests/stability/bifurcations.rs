@@ -337,7 +337,10 @@ fn a_strip_out_of_its_plane_reports_the_plane_one_that_crosses_it() {
         let off = (vertex - plane).abs();
         println!("{stiffness}: {vertex} within {told:.1e}, {plane} within {known:.1e}");
         assert!(off <= told + known, "{stiffness}: {off:.1e} of {told:.1e}");
-        assert!(told <= 2e-4 * known.max(plane.abs()), "{stiffness}: {told:.1e}");
+        assert!(
+            told <= 2e-4 * known.max(plane.abs()),
+            "{stiffness}: {told:.1e}"
+        );
         // By collocation.
         let off = (vertex + 4.274_845_155_2).abs();
         assert!(stiffness != 20.0 || off <= told, "{off:.1e} of {told:.1e}");

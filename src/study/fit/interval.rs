@@ -76,8 +76,9 @@ fn parameter(
     let runaways: Vec<usize> = (0..stats.values.len())
         .filter(|&j| j != k && shape.ran_away(j))
         .collect();
-    // With those held where they are, ends are too near.
-    let few = match runaways.is_empty() {
+    let vague = (0..stats.values.len()).any(|j| j != k && shape.is_vague(j));
+    // Derivatives do not lead to values far away at which the sum is lower, and ends are too near.
+    let few = match runaways.is_empty() && !vague {
         true => few,
         false => {
             let guess = |side: Result<Reach, f64>| match side {

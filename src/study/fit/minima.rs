@@ -136,11 +136,11 @@ impl<'a> Minima<'_, 'a> {
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<Fit, FitError> {
         let mut remark = began.remark;
-        let first = self.search(&began.point, progress);
+        let first = self.search(&began.point, usize::MAX, progress);
         // What the initial values lead to is found even where other values seemed better.
         let doubtful = first.as_ref().map_or(true, |first| self.doubts(first));
         let plain = began.initial.filter(|_| doubtful);
-        let plain = plain.and_then(|initial| self.search(&initial, progress).ok());
+        let plain = plain.and_then(|initial| self.search(&initial, usize::MAX, progress).ok());
         let mut best = match (first, plain) {
             (Ok(first), Some(plain)) if !plain.is_preferred_to(&first) => first,
             (_, Some(plain)) => {
@@ -155,7 +155,7 @@ impl<'a> Minima<'_, 'a> {
         for _ in 0..MOST_SEARCHES {
             let further = best
                 .beyond_window
-                .then(|| self.again(&best.theta, progress));
+                .then(|| self.again(&best, &best.theta, progress));
             let further = further.flatten();
             match further.filter(|again| again.is_preferred_to(&best)) {
                 Some(again) => best = again,
@@ -173,7 +173,7 @@ impl<'a> Minima<'_, 'a> {
                 .iter()
                 .filter(|other| self.is_better(&best, other.sum));
             let better = better.min_by(|a, b| a.sum.total_cmp(&b.sum));
-            let Some(again) = better.and_then(|it| self.again(&it.theta, progress)) else {
+            let Some(again) = better.and_then(|it| self.again(&best, &it.theta, progress)) else {
                 break;
             };
             if !again.is_preferred_to(&best) {
@@ -218,10 +218,11 @@ impl<'a> Minima<'_, 'a> {
         self.model.with_loose_tolerance(self.weighting.assumed)
     }
 
-    /// The search from a point, with bounds around it if none are given.
+    /// The search from a point in no more than so many steps, with bounds around it if none are given.
     fn search(
         &self,
         first: &Point,
+        most_steps: usize,
         progress: &mut dyn FnMut(&FitStep),
     ) -> Result<Minimum, FitError> {
         let coordinates = self.model.coordinates.iter().zip(&first.theta);
@@ -237,16 +238,26 @@ impl<'a> Minima<'_, 'a> {
             weighting: self.weighting,
             known: self.known,
             candidates: self.candidates,
+            most_steps,
         };
         let found = search.run(first, progress)?;
         self.count(found.fit.work.evaluations);
         Ok(found)
     }
 
-    /// The search from other values.
-    fn again(&self, theta: &[f64], progress: &mut dyn FnMut(&FitStep)) -> Option<Minimum> {
+    /// The search from other values; where a minimum is known, in no more steps than that took.
+    fn again(
+        &self,
+        best: &Minimum,
+        theta: &[f64],
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Option<Minimum> {
         let point = self.loose().find(theta).ok()?;
-        self.search(&point, progress).ok()
+        let most_steps = match best.converged {
+            true => best.fit.work.evaluations,
+            false => usize::MAX,
+        };
+        self.search(&point, most_steps, progress).ok()
     }
 
     /// The search from values near those from which it ended where there is no leaf.
@@ -260,7 +271,7 @@ impl<'a> Minima<'_, 'a> {
         let mut points = starts.iter().take(MOST_STARTS);
         let found = points.find_map(|start| {
             let point = self.loose().find(&start.theta).ok()?;
-            self.search(&point, progress).ok()
+            self.search(&point, usize::MAX, progress).ok()
         });
         found.ok_or(FitError::NoEquilibrium(why))
     }
@@ -269,7 +280,7 @@ impl<'a> Minima<'_, 'a> {
     fn doubts(&self, best: &Minimum) -> bool {
         let contradicted = best.fit.outcome == FitOutcome::Contradicted;
         let coarse = !self.known && best.misfit > COARSE;
-        !best.converged || best.beyond_window || contradicted || coarse
+        !best.converged || best.beyond_window || contradicted || best.improbable || coarse
     }
 
     /// Whether a sum of squares is less than that of a minimum by more than chance.
@@ -299,7 +310,9 @@ impl<'a> Minima<'_, 'a> {
             // Values that are better already need not lead away from the minimum.
             let beside = best.converged && !self.is_better(best, start.sum);
             let besides = beside.then(|| best.besides(&start.theta));
-            let Some(most_steps) = self.left(most) else { break };
+            let Some(most_steps) = self.left(most) else {
+                break;
+            };
             let most_steps = most_steps.min(FEW_STEPS);
             minima.extend(self.descend(&start.theta, besides, most_steps));
         }
@@ -311,7 +324,9 @@ impl<'a> Minima<'_, 'a> {
         let mut others = Others::default();
         let most = self.most_evaluations(best);
         for (theta, what) in images(self.model, &best.theta) {
-            let Some(most_steps) = self.left(most) else { break };
+            let Some(most_steps) = self.left(most) else {
+                break;
+            };
             let found = self.descend(&theta, Some(best.besides(&theta)), most_steps);
             others.minima.extend(found);
             others.tried.push(what);

@@ -37,6 +37,8 @@ pub(super) struct Minimum {
     pub variance: f64,
     pub significant: f64,
     pub converged: bool,
+    /// Whether the residuals are larger than chance makes them probable.
+    pub improbable: bool,
     /// Root mean square of the residuals, relative to the size of the data.
     pub misfit: f64,
     /// Whether the sum still falls where a number without given bounds is as far from its initial
@@ -71,6 +73,8 @@ pub(super) struct Search<'m, 'a> {
     /// Whether the standard deviations of the data are known.
     pub known: bool,
     pub candidates: &'m [Experiment],
+    /// Largest number of steps to a minimum.
+    pub most_steps: usize,
 }
 
 impl<'m, 'a> Search<'m, 'a> {
@@ -93,6 +97,7 @@ impl<'m, 'a> Search<'m, 'a> {
                 progress(&FitStep { step, sum, known });
             };
             let mut search = Iteration::new(&coarse, weighting, &mut searching);
+            search.most_steps = search.most_steps.min(self.most_steps);
             let (near, searched, more) = search.run(point);
             work.evaluations += more;
             attempts += 1;
@@ -100,6 +105,7 @@ impl<'m, 'a> Search<'m, 'a> {
             let there = there.or_else(|_| model.find(&near.theta))?;
             let mut last = Iteration::new(model, weighting, &mut searching);
             last.lean = true;
+            last.most_steps = last.most_steps.min(self.most_steps);
             let (mut least, end, more) = last.run(there);
             work.evaluations += 1 + more;
             work.accurate += 1 + more;
@@ -143,6 +149,7 @@ impl<'m, 'a> Search<'m, 'a> {
                 variance: stats.spread.powi(2),
                 significant: (stats.quantile * stats.spread).powi(2),
                 converged: end == End::Converged,
+                improbable: stats.improbable(),
                 misfit: misfit(model, stats.point),
                 beyond_window: falls_beyond_window(&stats),
                 theta: stats.point.theta.clone(),
