@@ -1,6 +1,5 @@
 //! From the settled grids to the result in the units of the scenario.
 
-use crate::largest::larger;
 use crate::leaf::{Grid, RodFields};
 use crate::newton::Stop;
 use crate::relax::equilibrium::{
@@ -201,24 +200,19 @@ fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
 }
 
 /// The potential energy: integrated along the leaf, with an error of second order in the
-/// defect, or after `columns` extrapolations. Also its error, if that by extrapolation is larger
-/// than that of positions, and what was integrated, if anything, is not within it.
+/// defect, or after `columns` extrapolations, or fewer where it does not converge as these assume;
+/// its error, if that is larger than that of positions lets expect.
 fn potential(run: &Run, columns: usize) -> (f64, Option<f64>) {
-    let table = energies(&run.levels);
-    let integrated = run.estimate.as_ref().map(|estimate| estimate.energy);
-    let Some(best) = table.best() else {
-        return (integrated.unwrap_or(table.column(columns)[0]), None);
-    };
-    let extrapolated = table.column(columns.min(best.columns))[0];
-    match integrated {
-        Some(energy) if (energy - extrapolated).abs() <= best.error => (energy, None),
-        _ => {
-            let apart = integrated.map_or(0.0, |energy| (energy - extrapolated).abs());
-            let error = larger(best.error, apart);
-            let expected = run.error().unwrap_or(f64::INFINITY) * extrapolated.abs();
-            (extrapolated, (error > expected).then_some(error))
-        }
+    if let Some(estimate) = &run.estimate {
+        return (estimate.energy, None);
     }
+    let table = energies(&run.levels);
+    let Some(best) = table.best() else {
+        return (table.column(columns)[0], None);
+    };
+    let energy = table.column(columns.min(best.columns))[0];
+    let expected = run.error().unwrap_or(f64::INFINITY) * energy.abs();
+    (energy, (best.error > expected).then_some(best.error))
 }
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
