@@ -41,8 +41,11 @@ const SIGN_TOLERANCE: f64 = 1e-2;
 const ACCURACY: f64 = 5e-3;
 const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
 
-/// Two grids do not show how eigenvalues converge, which may be equal there by chance: so many
-/// are compared, if they have few unknowns.
+/// To a tolerance of this or more the grids are so coarse that two of them do not tell how
+/// eigenvalues converge, and few eigenvalues may be equal on two grids by chance: so many are
+/// compared.
+const LOW_TOLERANCE: f64 = 1e-3;
+const FEW: usize = 3;
 const COMPARED: usize = 3;
 
 /// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
@@ -143,7 +146,6 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
             index: run.index.unwrap_or(0).saturating_sub(left_out),
             single: run.clearly_stable || run.segments().is_some(),
             grids: Vec::new(),
-            segments: 0,
             tolerance,
             rounding: 0.0,
         },
@@ -152,9 +154,12 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         segments: Vec::new(),
     };
     let sharp = requested && options.mode_shapes;
-    let few = 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
-    let enough =
-        |series: &Series| (!sharp || series.accurate()) && (!few || series.grids.len() >= COMPARED);
+    let few = requested && !list.decides && count < FEW;
+    let compares =
+        (few || run.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let enough = |series: &Series| {
+        (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
+    };
     let sufficient_grids = sufficient_grids(run);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
     for (k, level) in run.levels.iter().enumerate().skip(skipped) {
@@ -234,7 +239,7 @@ impl<'a> Nested<'a> {
         let Some(pairs) = on(&level, &near) else {
             return false;
         };
-        self.series.push(level.leaf.segments(), &pairs);
+        self.series.push(&pairs);
         self.segments.push(level.leaf.segments());
         self.series.rounding = modes::rounding(&level.leaf);
         let before = self.finest.replace(OnGrid { level, pairs });

@@ -13,21 +13,16 @@ const SMALL: f64 = 1e-3;
 /// Safety factor on the errors of eigenvalues, and lower bound of the last change of an
 /// eigenvalue as a part of the change before: that of a single number may be small by chance,
 /// and is also combined with those of the other eigenvalues. From two grids the error is at
-/// least their difference, as there is no other change, and at least the usual error of a grid of
-/// n segments, of the order of 1/n^2: they may have the same value by chance.
+/// least so many of their differences, as there is no other change.
 const SAFETY: f64 = 2.0;
 const LEAST_CHANGE: f64 = 0.1;
+const OF_TWO_GRIDS: f64 = 1.0;
 
 /// An error of up to this many times that of rounding does not decrease on finer grids.
 const NOISE: f64 = 4.0;
 
-/// Largest factor on the errors beside a bifurcation.
-const LARGEST_CHANGE: f64 = 1e3;
-
-/// Error of an eigenvalue by unfinished iterations, as a part of the tolerance: relative, or to the
-/// lowest eigenvalue of a clamped rod, since a soft one changes with the shape as others do.
+/// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
 const UNFINISHED: f64 = 2e-3;
-const CLAMPED: f64 = 12.0;
 
 /// An extrapolated eigenvalue.
 pub struct Extrapolated {
@@ -45,19 +40,16 @@ pub struct Series {
     /// Whether their signs on a single grid are enough.
     pub single: bool,
     pub grids: Vec<Vec<f64>>,
-    /// Segments of the finest grid.
-    pub segments: usize,
     pub tolerance: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     pub rounding: f64,
 }
 
 impl Series {
-    /// Adds the eigenvalues on a grid of so many segments, twice as fine as the last.
-    pub fn push(&mut self, segments: usize, pairs: &[Eigenpair]) {
+    /// Adds the eigenvalues on a grid twice as fine as the last.
+    pub fn push(&mut self, pairs: &[Eigenpair]) {
         let values = pairs.iter().map(|pair| pair.eigenvalue);
         self.grids.push(values.collect());
-        self.segments = segments;
     }
 
     /// The unit of an eigenvalue's error.
@@ -80,10 +72,7 @@ impl Series {
             .collect();
         let error = |best: Best| {
             let least = match all {
-                2 => {
-                    let change = (table.column(0)[0] - self.coarser(k)).abs();
-                    larger(change, (self.segments as f64).powi(-2))
-                }
+                2 => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
                 _ => LEAST_CHANGE * table.change_before(best.columns),
             };
             best.error.max(least)
@@ -103,8 +92,7 @@ impl Series {
             .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
-        let far = self.change_of_softest(&found);
-        let bound = |error: f64| far * SAFETY * (error * largest).sqrt();
+        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * self.tolerance;
         let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
             let unit = self.unit(number);
             Extrapolated {
@@ -112,7 +100,7 @@ impl Series {
                 // Zero on all grids is that of a turn without resistance, and exact.
                 error: error.map(|error| match *value == 0.0 {
                     true => 0.0,
-                    false => bound(error) * unit + self.unfinished(number) + self.rounding,
+                    false => bound(error) * unit + self.rounding,
                 }),
                 number,
             }
@@ -122,32 +110,10 @@ impl Series {
         values
     }
 
-    /// Error of an eigenvalue by unfinished iterations.
-    fn unfinished(&self, k: usize) -> f64 {
-        UNFINISHED * self.tolerance * larger(self.unit(k), CLAMPED)
-    }
-
-    /// The largest ratio, at least one, of the softest eigenvalue on an extrapolated grid and its
-    /// extrapolated value, if that is larger than its error: beside a bifurcation the shape, and
-    /// with it every eigenvalue, follows a series in ds^2 only where this one hardly changes.
-    fn change_of_softest(&self, found: &[(f64, Option<f64>)]) -> f64 {
-        let sizes = (0..found.len()).map(|k| (k, found[k].0.abs() * self.unit(k)));
-        let Some((k, softest)) = sizes.min_by(|a, b| a.1.total_cmp(&b.1)) else {
-            return 1.0;
-        };
-        if found[k].1.is_none_or(|error| error >= found[k].0.abs()) {
-            return 1.0;
-        }
-        let grids = self.grids.iter().rev().take(GRIDS);
-        let ratio = |grid: &Vec<f64>| Some(grid.get(k)?.abs() / softest);
-        let change = |ratio: f64| larger(ratio, ratio.recip()).min(LARGEST_CHANGE);
-        grids.filter_map(ratio).map(change).fold(1.0, larger)
-    }
-
     /// Whether the relative error of all frequencies is within the tolerance.
     pub fn accurate(&self) -> bool {
         let known = |(k, it): (usize, Extrapolated)| {
-            let wanted = 2.0 * self.tolerance * self.unit(k) + self.unfinished(k);
+            let wanted = 2.0 * self.tolerance * self.unit(k);
             it.error
                 .is_some_and(|error| error <= wanted + self.rounding)
         };
@@ -236,32 +202,19 @@ fn ascending(values: &mut [Extrapolated]) {
 mod tests {
     use super::*;
 
-    fn series(grids: &[&[f64]]) -> Series {
-        Series {
-            index: 0,
-            single: false,
-            grids: grids.iter().map(|grid| grid.to_vec()).collect(),
-            segments: 8 << (grids.len() - 1),
-            tolerance: 1e-6,
-            rounding: 8e-6,
-        }
-    }
-
     /// What may have either sign does not hide what is certainly negative.
     #[test]
     fn negative_eigenvalues_are_counted_beside_one_that_may_have_either_sign() {
-        let found = series(&[&[-1.27e-3, 1e-6], &[-1.278e-3, 2e-6], &[-1.28e-3, 1e-6]]);
+        let grids = [[-1.27e-3, 1e-6], [-1.278e-3, 2e-6], [-1.28e-3, 1e-6]];
+        let found = Series {
+            index: 0,
+            single: false,
+            grids: grids.map(Vec::from).into(),
+            tolerance: 1e-6,
+            rounding: 8e-6,
+        };
         assert_eq!(found.negative(), None);
         assert_eq!(found.signs(), [Some(true), None]);
         assert!(found.undecided().is_some());
-    }
-
-    /// The eigenvalue of five free veins: two grids have it in common by chance, the next has
-    /// not.
-    #[test]
-    fn the_error_from_two_grids_is_not_their_difference_alone() {
-        let grids: [&[f64]; 2] = [&[9.202190136], &[9.202188907]];
-        let found = series(&grids).values();
-        assert!(found[0].error.unwrap() > 9.202188907 - 9.201210111);
     }
 }
