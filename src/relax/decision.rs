@@ -181,6 +181,7 @@ fn beside_zero(run: &mut Run, may_refine: bool) -> Next {
         count,
         above: Some((bounds.least, -bounds.close)),
         decides: true,
+        exact: false,
     })
 }
 
@@ -199,16 +200,18 @@ fn verdict(run: &Run, list: List, found: &Lowest) -> Verdict {
     negative.map_or(Verdict::Undecided(certain), Verdict::Index)
 }
 
-/// How many eigenvalues are negative for certain, and how many are, if that is known: of the list,
-/// or of more if all of these are negative. What is certain of a list remains so in a longer one,
-/// whose errors are those of its higher eigenvalues.
+/// How many eigenvalues are negative for certain, and how many are, if that is known: of the list
+/// or, where its signs are not certain or all of them are negative, of a longer and exact one.
 fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<usize>) {
     let (mut certain, mut negative) = (found.certainly_negative(), found.negative);
     let mut list = List {
         decides: true,
         ..list
     };
-    while negative == Some(list.count) && list.count < MOST_MODES {
+    while list.count < MOST_MODES
+        && (negative == Some(list.count) || negative.is_none() && !list.exact)
+    {
+        list.exact = true;
         list.count = (2 * list.count).min(MOST_MODES);
         let more = modes::lowest(run, list);
         negative = (more.as_ref()).and_then(|more| more.negative_beyond(certain));

@@ -99,6 +99,8 @@ pub struct List {
     pub above: Option<(usize, f64)>,
     /// Whether the stability of the leaf depends on them: then its size does not matter.
     pub decides: bool,
+    /// Whether more than their signs is needed: they are as accurate as requested ones.
+    pub exact: bool,
 }
 
 impl List {
@@ -108,13 +110,14 @@ impl List {
             count: run.options.modes,
             above: None,
             decides: false,
+            exact: run.options.modes > 0,
         }
     }
 }
 
 /// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
 /// large, or there are several equal ones that cannot be told apart.
-/// Of those that are not requested only the signs of the eigenvalues are needed.
+/// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
 pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     let List { count, above, .. } = list;
     let options = run.options;
@@ -125,7 +128,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     }
     let physics = Physics::new(run.leaf);
     let requested = count <= options.modes && above.is_none();
-    let tolerance = if requested {
+    let tolerance = if requested || list.exact {
         run.tolerance
     } else {
         SIGN_TOLERANCE

@@ -280,7 +280,7 @@ impl<'a> Minima<'_, 'a> {
     fn doubts(&self, best: &Minimum) -> bool {
         let contradicted = best.fit.outcome == FitOutcome::Contradicted;
         let coarse = !self.known && best.misfit > COARSE;
-        !best.converged || best.beyond_window || contradicted || best.improbable || coarse
+        !best.converged || best.beyond_window || contradicted || coarse
     }
 
     /// Whether a sum of squares is less than that of a minimum by more than chance.

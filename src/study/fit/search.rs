@@ -37,8 +37,6 @@ pub(super) struct Minimum {
     pub variance: f64,
     pub significant: f64,
     pub converged: bool,
-    /// Whether the residuals are larger than chance makes them probable.
-    pub improbable: bool,
     /// Root mean square of the residuals, relative to the size of the data.
     pub misfit: f64,
     /// Whether the sum still falls where a number without given bounds is as far from its initial
@@ -149,7 +147,6 @@ impl<'m, 'a> Search<'m, 'a> {
                 variance: stats.spread.powi(2),
                 significant: (stats.quantile * stats.spread).powi(2),
                 converged: end == End::Converged,
-                improbable: stats.improbable(),
                 misfit: misfit(model, stats.point),
                 beyond_window: falls_beyond_window(&stats),
                 theta: stats.point.theta.clone(),

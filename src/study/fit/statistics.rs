@@ -106,23 +106,12 @@ impl<'m, 'a> Statistics<'m, 'a> {
         along / own
     }
 
-    /// Whether the sum of squares of the residuals is larger than their standard deviations allow: at
-    /// the quantile of five deviations of a normal variable.
+    /// Whether the sum of squares of the residuals is larger than their standard deviations allow:
+    /// at the quantile of five deviations of a normal variable (Wilson and Hilferty 1931).
     pub fn suspicious(&self) -> bool {
-        self.exceeds(5.0)
-    }
-
-    /// Whether a lower minimum is likelier than this one: at three deviations.
-    pub fn improbable(&self) -> bool {
-        self.known && self.exceeds(3.0)
-    }
-
-    /// Whether the sum of squares is beyond the quantile of so many deviations of a normal variable
-    /// (Wilson and Hilferty 1931).
-    fn exceeds(&self, deviations: f64) -> bool {
         let freedom = self.freedom.max(1) as f64;
         let part = 2.0 / (9.0 * freedom);
-        let most = freedom * (1.0 - part + deviations * part.sqrt()).powi(3);
+        let most = freedom * (1.0 - part + 5.0 * part.sqrt()).powi(3);
         let explained = self.residuals.norm_squared() <= most;
         !self.weighting.robust && !explained
     }
