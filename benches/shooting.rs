@@ -2,7 +2,7 @@
 //! that grows with the number of veins: Fig. 4's leaf to 1e-10.
 //! `cargo bench --bench shooting`.
 
-use leafdyn::internals::bvp::{self, Solution, Start};
+use leafdyn::internals::shooting::{self, Solution, Start};
 use leafdyn::relax::{Equilibrium, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
@@ -21,11 +21,11 @@ fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solu
     let pool = leafdyn_testing::bench::threads(threads);
     let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
     let start = Start::Leaf { stations, rods };
-    let options = bvp::Options::new(start, stations, bvp::Precision::Error(ACCURACY));
+    let options = shooting::Options::new(start, stations, shooting::Precision::Error(ACCURACY));
     (0..2 + RODS_IN_ALL / leaf.rods.len())
         .map(|_| {
             let clock = Instant::now();
-            let solution = pool.install(|| bvp::solve(leaf, &options, &mut |_| {}));
+            let solution = pool.install(|| shooting::solve(leaf, &options, &mut |_| {}));
             let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
             (milliseconds, solution.expect("the leaf has a solution"))
         })

@@ -97,7 +97,6 @@
 #![warn(missing_docs)]
 
 mod branch;
-mod bvp;
 mod lanes;
 pub mod largest;
 mod leaf;
@@ -113,6 +112,7 @@ mod rod;
 mod rotation;
 pub mod scenario;
 pub mod shape;
+mod shooting;
 pub mod simulate;
 pub mod study;
 mod tableau;
@@ -127,8 +127,8 @@ pub mod internals {
             End, Equations, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, walk,
         };
     }
-    pub mod bvp {
-        pub use crate::bvp::{
+    pub mod shooting {
+        pub use crate::shooting::{
             Failure, Neutral, Options, Precision, Reason, Solution, Start, Work, solve,
         };
     }
@@ -155,8 +155,8 @@ pub mod internals {
         pub use crate::rotation::{exp, log, outer};
     }
     pub mod relax {
-        pub use crate::relax::fall::settle_from;
-        pub use crate::relax::index::{index_near, project};
-        pub use crate::relax::start::start;
+        pub use crate::relax::settle::settle_from::settle_from;
+        pub use crate::relax::settle::start::start;
+        pub use crate::relax::stability::index::{index_near, project};
     }
 }

@@ -24,36 +24,22 @@
 //! accuracy asked for. Otherwise the branch is continued on a finer grid
 //! from the last verified point.
 
-mod begin;
 pub mod boundary;
-mod cache;
-mod climb;
-mod correct;
-mod critical;
-mod deflation;
-mod equations;
-mod family;
-mod field;
-mod follow;
-mod refine;
-mod refine_critical;
-mod refined;
-mod states;
-mod step;
-mod stuck;
-mod vertex;
+mod events;
+mod problem;
+mod verify;
 mod walk;
 
-pub use begin::{begin, switch};
-pub use critical::{Critical, Kind};
-pub use equations::{Equations, Stuck};
-pub use family::{Family, Range, between as value_between};
-pub(crate) use field::{between, prolong as prolong_field, times};
-pub use follow::{Followed, Grids};
-pub(crate) use refine::{on_finer, refine_at};
-pub(crate) use refine_critical::NEARLY_RIGID;
-pub use refined::{Doubt, Refined};
-pub use walk::{End, Walk, walk};
+pub use crate::branch::events::critical::{Critical, Kind};
+pub use crate::branch::problem::equations::{Equations, Stuck};
+pub use crate::branch::problem::family::{Family, Range, between as value_between};
+pub(crate) use crate::branch::problem::field::{between, prolong as prolong_field, times};
+pub(crate) use crate::branch::verify::critical::NEARLY_RIGID;
+pub use crate::branch::verify::refined::{Doubt, Refined};
+pub(crate) use crate::branch::verify::regular::{on_finer, refine_at};
+pub use crate::branch::walk::begin::{begin, switch};
+pub use crate::branch::walk::follow::{Followed, Grids};
+pub use crate::branch::walk::steps::{End, Walk, walk};
 
 use crate::leaf::{Field, State};
 

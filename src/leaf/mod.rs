@@ -3,6 +3,7 @@
 
 mod assembly;
 mod chain;
+mod derivative;
 mod dimensionless;
 mod direct;
 mod discrete;
@@ -12,11 +13,11 @@ mod loads;
 mod mirror;
 #[cfg(test)]
 mod not_a_number;
-mod rate;
 mod state;
 mod system;
 mod turning;
 
+pub use crate::leaf::derivative::{Forces, LeafRate, Response, at_constant_force};
 pub use crate::scenario::Scale;
 pub use assembly::{Jump, Tangent};
 pub use dimensionless::{Leaf, Loads};
@@ -25,6 +26,5 @@ pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
 pub use mirror::{are_mirrored, half_of, is_mirrored, whole_fields, whole_of};
-pub use rate::{Forces, LeafRate, Response, at_constant_force};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, Sums, System};

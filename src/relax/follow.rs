@@ -3,13 +3,13 @@
 
 use crate::leaf::{Leaf, Response, State};
 use crate::newton::{Stop, Work};
-use crate::relax::level::{Level, positions};
-use crate::relax::options::{Options, Progress, RelaxError};
-use crate::relax::predict::weights;
-use crate::relax::richardson::Richardson;
-use crate::relax::run::Run;
+use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::request::options::{Options, Progress, RelaxError};
+use crate::relax::settle::run::Run;
 use crate::relax::solve::relax_on_grids;
-use crate::relax::stencil::Stencil;
+use crate::relax::transfer::level::{Level, positions};
+use crate::relax::transfer::predict::weights;
+use crate::relax::transfer::stencil::Stencil;
 use crate::relax::{Equilibrium, Outcome};
 use crate::scenario::Scenario;
 use glam::DVec3;

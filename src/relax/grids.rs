@@ -4,15 +4,15 @@ use crate::largest::largest;
 use crate::leaf::{Grid, RodFields, State};
 use crate::memory;
 use crate::newton::Stop;
-use crate::relax::level::{Level, positions};
-use crate::relax::nodes::finer_nodes;
-use crate::relax::options::MAX_NODES;
-use crate::relax::predict::predict;
-use crate::relax::prolong::{prolong, restrict};
-use crate::relax::richardson::distance;
-use crate::relax::run::{BUDGET, Run};
-use crate::relax::segments::{COARSEST_TURN, FINEST};
-use crate::relax::settle::{InitialGuess, Settled};
+use crate::relax::accuracy::nodal_fields::finer_nodes;
+use crate::relax::accuracy::richardson::distance;
+use crate::relax::request::options::MAX_NODES;
+use crate::relax::settle::iteration::{InitialGuess, Settled};
+use crate::relax::settle::run::{BUDGET, Run};
+use crate::relax::settle::segments::{COARSEST_TURN, FINEST};
+use crate::relax::transfer::level::{Level, positions};
+use crate::relax::transfer::predict::predict;
+use crate::relax::transfer::prolong::{prolong, restrict};
 
 /// Two grids on which the leaf moved far count as settled at the same equilibrium if no
 /// common nodes are farther apart than this, in lengths.

@@ -1,74 +1,52 @@
 //! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
-mod between;
-mod correction;
-mod decision;
-mod defect;
-mod equilibrium;
-pub(crate) mod fall;
+pub(crate) mod accuracy;
 mod follow;
-mod found;
 mod grids;
-mod grip;
-pub(crate) mod index;
-pub(crate) mod level;
-mod margin;
-mod method;
-mod methods;
-mod modes;
-mod nodes;
-mod number;
-mod options;
+mod loading;
 mod path;
-mod plausible;
-pub(crate) mod predict;
-pub(crate) mod prolong;
+mod preference;
+mod relaxation;
 mod request;
 mod result;
-pub(crate) mod richardson;
-mod run;
 mod saddle;
-mod segments;
 mod sensitivity;
-mod series;
-mod settle;
-mod shape;
+pub(crate) mod settle;
+mod shooting;
 mod solve;
-mod stability;
-pub(crate) mod start;
-mod stations;
-mod stencil;
+pub(crate) mod stability;
+pub(crate) mod transfer;
 
-pub use crate::bvp::Correction;
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
 pub use crate::refusal::RefusedOption;
-pub use crate::shape::{NodeState, RodShape};
-pub use crate::words::UnknownWord as UnknownMethod;
-pub(crate) use equilibrium::serialize_index;
-pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
-};
-pub(crate) use follow::{AtRest, Grids, Lost};
-pub(crate) use index::{index_near, project};
-pub(crate) use level::Level;
-pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
-pub use method::{Method, SemiImplicit, Settings, Unfit};
-pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
-pub(crate) use number::Number;
-pub use options::{
+pub use crate::relax::relaxation::Relaxation;
+pub use crate::relax::request::method::{Method, SemiImplicit, Settings, Unfit};
+pub use crate::relax::request::options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
+pub(crate) use crate::relax::result::equilibrium::serialize_index;
+pub use crate::relax::result::equilibrium::{
+    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
+};
+pub use crate::relax::result::margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
+pub(crate) use crate::relax::sensitivity::parameter::Number;
+pub(crate) use crate::relax::settle::segments::check_segments;
+pub(crate) use crate::relax::settle::start::start;
+pub(crate) use crate::relax::shooting::{START as SHOOTING_START, check_intervals};
+pub(crate) use crate::relax::stability::index::{index_near, project};
+pub(crate) use crate::relax::transfer::level::Level;
+pub(crate) use crate::relax::transfer::stencil::Stencil;
+pub(crate) use crate::relax::transfer::strains::rods as shape_of;
+pub use crate::shape::{NodeState, RodShape};
+pub use crate::shooting::Correction;
+pub use crate::words::UnknownWord as UnknownMethod;
+pub(crate) use follow::{AtRest, Grids, Lost};
 pub use path::{Event, Happening, Path, Route, Stage};
-pub use request::Relaxation;
 pub use saddle::Saddle;
 pub(crate) use saddle::{ANY_SIGN, NOISY, polish};
-pub(crate) use segments::check_segments;
 pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};
-pub(crate) use shape::rods as shape_of;
 pub use solve::relax;
 pub(crate) use solve::relax_on_grids;
-pub(crate) use start::start;
-pub(crate) use stencil::Stencil;

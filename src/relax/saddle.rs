@@ -3,7 +3,7 @@
 use crate::largest::larger;
 use crate::leaf::{DirectSolver, DiscreteLeaf, Solved, State, System};
 use crate::newton::{Equations, Newton, Work};
-use crate::relax::path::preference;
+use crate::relax::preference::preference;
 use glam::DVec3;
 use serde::Serialize;
 

@@ -1,25 +1,27 @@
 //! From a scenario and options to the leaf at rest.
 
-use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Stop;
 use crate::refusal::RefusedOption;
-use crate::relax::decision::{Decision, Verdict, decide};
-use crate::relax::equilibrium::{Equilibrium, Outcome};
-use crate::relax::level::Level;
-use crate::relax::method::Method;
-use crate::relax::methods::{explicit, shooting};
-use crate::relax::modes::{self, List};
-use crate::relax::options::{
+use crate::relax::path::Path;
+use crate::relax::request::method::Method;
+use crate::relax::request::options::{
     MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
 };
-use crate::relax::path::Path;
-use crate::relax::plausible;
-use crate::relax::result;
-use crate::relax::run::Run;
-use crate::relax::segments::{check_segments, least, reducible};
+use crate::relax::result::equilibrium::{Equilibrium, Outcome};
+use crate::relax::result::plausible;
+use crate::relax::result::report;
+use crate::relax::settle::methods::explicit;
+use crate::relax::settle::run::Run;
+use crate::relax::settle::segments::{check_segments, least, reducible};
+use crate::relax::shooting;
+use crate::relax::stability::decide::{Decision, Verdict, decide};
+use crate::relax::stability::eigenvalues;
+use crate::relax::stability::eigenvalues::List;
+use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
+use crate::shooting::Start;
 use std::time::Instant;
 
 /// Factor on the tolerance of a leaf that does not keep it between the stations of its
@@ -30,7 +32,7 @@ const FOR_STATIONS: f64 = 1e-2;
 ///
 /// # Errors
 /// Requests that cannot be met; everything that happens while solving is an
-/// [`Outcome`](crate::relax::Outcome) instead.
+/// [`Outcome`] instead.
 pub fn relax(
     scenario: &Scenario,
     options: &Options,
@@ -217,8 +219,8 @@ fn finished(
         true => clock.elapsed().as_secs_f64(),
         false => before,
     };
-    let (outcome, remark) = result::outcome(&run, end);
-    let mut found = result::equilibrium(&run, outcome, remark, wall);
+    let (outcome, remark) = report::outcome(&run, end);
+    let mut found = report::equilibrium(&run, outcome, remark, wall);
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
     let doubt = found
         .path
@@ -232,7 +234,7 @@ fn finished(
     found.decide(verdict);
     let modes = modes.or_else(|| {
         let list = List::requested(&run);
-        end.ok().and_then(|_| modes::lowest(&run, list))
+        end.ok().and_then(|_| eigenvalues::lowest(&run, list))
     });
     found.stability.modes = modes.map(|it| it.modes);
     (found, run.levels)

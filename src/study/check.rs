@@ -7,11 +7,12 @@ pub use shot::Shot;
 use serde::Serialize;
 
 use super::judge::{common, differences, fine_grid, index_at, timed, with_nodes_of};
-use crate::bvp::{self, Solution, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
+use crate::shooting;
+use crate::shooting::{Solution, Start};
 use crate::words;
 use shot::relaxation;
 
@@ -259,15 +260,15 @@ fn shoot(
         stations: &relaxed.shape.stations,
         rods: &relaxed.shape.rods,
     };
-    let precision = bvp::Precision::Error(relaxed.accuracy.tolerance);
+    let precision = shooting::Precision::Error(relaxed.accuracy.tolerance);
     let stations = with_nodes_of(grid.sigma(), &relaxed.shape.stations);
-    let options = bvp::Options {
+    let options = shooting::Options {
         intervals: asked.intervals,
         limit: asked.limit.clone(),
-        ..bvp::Options::new(start, &stations, precision)
+        ..shooting::Options::new(start, &stations, precision)
     };
     let (found, wall_seconds) = timed(|| {
-        bvp::solve(scenario, &options, &mut |step| {
+        shooting::solve(scenario, &options, &mut |step| {
             progress(&Progress::Shooting(*step))
         })
     });

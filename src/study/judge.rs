@@ -7,12 +7,12 @@
 
 use std::time::Instant;
 
-use crate::bvp::{Solution, Start};
 use crate::leaf::{Grid, Leaf};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
 use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape};
+use crate::shooting::{Solution, Start};
 use crate::undulation::Undulation;
 
 /// Stations closer than this are the same.

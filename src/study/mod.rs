@@ -13,7 +13,7 @@ mod trace;
 mod vary;
 
 pub use crate::branch::{Doubt, End as BranchEnd, Kind as CriticalKind, Stuck};
-pub use crate::bvp::{Neutral, Solution as ShootingSolution};
+pub use crate::shooting::{Neutral, Solution as ShootingSolution};
 pub use crate::words::UnknownWord;
 pub use boundary::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,

@@ -1,7 +1,7 @@
 //! The estimated error of a boundary-value solution bounds its true error: of
 //! positions, rotations, forces and moments, whatever accuracy is asked for.
 
-use leafdyn::internals::bvp::{Options, Precision, Reason, Solution, Start, solve};
+use leafdyn::internals::shooting::{Options, Precision, Reason, Solution, Start, solve};
 use leafdyn_testing::random::{drawn, leaves};
 use leafdyn_testing::*;
 use std::sync::Arc;

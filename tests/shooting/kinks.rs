@@ -1,7 +1,7 @@
 //! Profiles with kinks, veins of different lengths, free tips and dead moments:
 //! the boundary-value solution is that of the relaxation there too.
 
-use leafdyn::internals::bvp::Reason;
+use leafdyn::internals::shooting::Reason;
 use leafdyn_testing::*;
 
 /// Veins that taper, with a soft joint, and curl at rest from half their length on.

@@ -2,7 +2,7 @@
 //! reported, with the veins that would move and the direction, and does not
 //! keep the solution from being found.
 
-use leafdyn::internals::bvp::{Neutral, Reason, Solution};
+use leafdyn::internals::shooting::{Neutral, Reason, Solution};
 use leafdyn_testing::*;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];

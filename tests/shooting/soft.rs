@@ -2,7 +2,7 @@
 //! intervals the boundary-value problem is solved all the same; in one piece it
 //! is not, and that is said.
 
-use leafdyn::internals::bvp::{Reason, Solution};
+use leafdyn::internals::shooting::{Reason, Solution};
 use leafdyn_testing::*;
 
 /// A figure with five veins that are softer still, under other loads.

@@ -1,7 +1,7 @@
 //! How much work a boundary-value solution takes. A change for the better is
 //! welcome here; one for the worse is a slowdown.
 
-use leafdyn::internals::bvp::Work;
+use leafdyn::internals::shooting::Work;
 use leafdyn_testing::*;
 
 /// Linearisations and corrections to the last one, integration steps to a few.

@@ -2,8 +2,8 @@
 //! of the index is at a critical point that is reported, and no branch is lost.
 
 use leafdyn::internals::branch::{End, Family, Followed, Walk, begin};
-use leafdyn::internals::bvp::{self, Precision::LocalError, Start};
 use leafdyn::internals::relax::index_near;
+use leafdyn::internals::shooting::{self, Precision::LocalError, Start};
 use leafdyn_testing::random::{drawn, leaves};
 use leafdyn_testing::*;
 use rayon::prelude::*;
@@ -131,8 +131,8 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
     let scenario = family.scenario([point.fraction]).unwrap();
     let (stations, rods) = (point.grid.sigma(), &point.shapes(family).unwrap()[..]);
     let start = Start::Leaf { stations, rods };
-    let options = bvp::Options::new(start, stations, LocalError(SHARP));
-    let shot = bvp::solve(&scenario, &options, &mut |_| {}).ok()?;
+    let options = shooting::Options::new(start, stations, LocalError(SHARP));
+    let shot = shooting::solve(&scenario, &options, &mut |_| {}).ok()?;
     let length = family.scale().length;
     for (rod, tip) in shot.rods.iter().zip(&point.tips) {
         let off = rod.nodes.last()?.position / length - *tip;

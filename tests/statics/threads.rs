@@ -1,9 +1,9 @@
 //! Results do not depend on the number of threads, to the last bit: neither of
 //! relaxation, nor of shooting, nor of motion; nor on whether a motion is looked at on its way.
 
-use leafdyn::internals::bvp::{self, Start};
 use leafdyn::internals::leaf::State;
 use leafdyn::internals::motion::{Method, Steps};
+use leafdyn::internals::shooting::{self, Start};
 use leafdyn_testing::motion::{explicit, released, semi_implicit};
 use leafdyn_testing::*;
 
@@ -51,9 +51,10 @@ fn shooting_finds_equal_bits_on_one_two_and_five_threads() {
                 rods: &leaf.shape.rods,
             });
             let stations: Vec<f64> = (0..=16).map(|i| i as f64 / 16.0).collect();
-            let precision = bvp::Precision::LocalError(1e-11);
-            let options = bvp::Options::new(start, &stations, precision);
-            let shot = on_threads(threads, || bvp::solve(leaf, &options, &mut |_| {})).unwrap();
+            let precision = shooting::Precision::LocalError(1e-11);
+            let options = shooting::Options::new(start, &stations, precision);
+            let shot =
+                on_threads(threads, || shooting::solve(leaf, &options, &mut |_| {})).unwrap();
             let errors = [shot.error.position, shot.error.force, shot.defect];
             let numbers = [shot.energy, shot.growth, shot.condition];
             let numbers = errors.into_iter().chain(numbers).chain(shot.intervals);

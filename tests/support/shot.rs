@@ -1,7 +1,7 @@
 //! Leaves by shooting, alone and beside the relaxed ones.
 
 use glam::DVec3;
-use leafdyn::internals::bvp::{self, Failure, Precision::LocalError, Solution, Start};
+use leafdyn::internals::shooting::{self, Failure, Precision::LocalError, Solution, Start};
 use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::Scenario;
 
@@ -24,15 +24,15 @@ pub fn shoot_over(
 ) -> Result<Solution, Failure> {
     let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
     let start = Start::Leaf { stations, rods };
-    let mut options = bvp::Options::new(start, stations, LocalError(SHARP));
+    let mut options = shooting::Options::new(start, stations, LocalError(SHARP));
     options.intervals = intervals;
-    bvp::solve(scenario, &options, &mut |_| {})
+    shooting::solve(scenario, &options, &mut |_| {})
 }
 
 /// Solves the boundary-value problem without any start.
 pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
-    let options = bvp::Options::new(Start::Arcs, stations, LocalError(SHARP));
-    bvp::solve(scenario, &options, &mut |_| {})
+    let options = shooting::Options::new(Start::Arcs, stations, LocalError(SHARP));
+    shooting::solve(scenario, &options, &mut |_| {})
 }
 
 /// What shooting has found; the reason where it has not.

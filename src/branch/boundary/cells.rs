@@ -4,12 +4,12 @@ use glam::DVec3;
 
 use super::manifold::{Plane, Solution};
 use crate::branch::Point;
-use crate::branch::critical::Critical;
-use crate::branch::equations::Equations;
-use crate::branch::refine::{index_at, on_finer};
-use crate::branch::refine_critical::refine_critical;
-use crate::branch::refined::{Doubt, Refined};
-use crate::branch::walk::{End, Walk, walk};
+use crate::branch::events::critical::Critical;
+use crate::branch::problem::equations::Equations;
+use crate::branch::verify::critical::refine_critical;
+use crate::branch::verify::refined::{Doubt, Refined};
+use crate::branch::verify::regular::{index_at, on_finer};
+use crate::branch::walk::steps::{End, Walk, walk};
 use crate::leaf::Grid;
 use crate::scenario::Scenario;
 

@@ -7,8 +7,8 @@ use super::manifold::{Manifold, Plane};
 use super::singular_point::{Seed, SingularPoint};
 use super::table::Verified;
 use super::walk::{Walk, WalkOptions, lost};
-use crate::branch::critical::Kind;
-use crate::branch::walk::End;
+use crate::branch::events::critical::Kind;
+use crate::branch::walk::steps::End;
 use crate::leaf::Grid;
 
 /// A boundary, on both sides of its starting point.

@@ -2,10 +2,10 @@
 
 use super::manifold::{Direction, Manifold, Plane, Solution};
 use super::singular_point::SingularPoint;
-use crate::branch::equations::Stuck;
-use crate::branch::field::{every_second, prolong as prolong_field};
+use crate::branch::problem::equations::Stuck;
+use crate::branch::problem::field::{every_second, prolong as prolong_field};
 use crate::leaf::{Field, Grid, State};
-use crate::relax::prolong::{prolong, restrict};
+use crate::relax::transfer::prolong::{prolong, restrict};
 
 /// Segments of the coarsest.
 const COARSEST: usize = 8;

@@ -1,10 +1,11 @@
 //! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
 
-use crate::branch::equations::{Equations, Stuck};
-use crate::branch::family::{Family, OutOfRange};
-use crate::branch::field::{add, between, dot, plus, times};
-use crate::branch::states::{forces_on, rate};
-use crate::branch::{self, deflation};
+use crate::branch;
+use crate::branch::problem::bordered;
+use crate::branch::problem::equations::{Equations, Stuck};
+use crate::branch::problem::family::{Family, OutOfRange};
+use crate::branch::problem::field::{add, between, dot, plus, times};
+use crate::branch::problem::states::{forces_on, rate};
 use crate::leaf::Field;
 
 /// Increment along a mode of mass one over which the matrix is differenced.
@@ -15,7 +16,7 @@ pub type Plane<'a> = Family<'a, 2>;
 pub type Manifold<'a> = Equations<'a, 2>;
 pub type Solution = branch::Solution<2>;
 pub type Direction = branch::Direction<2>;
-pub type Sample = deflation::Sample<2>;
+pub type Sample = bordered::Sample<2>;
 
 impl Direction {
     /// The linear combination of two directions.

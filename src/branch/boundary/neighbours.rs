@@ -5,11 +5,11 @@ use std::ops::RangeInclusive;
 use super::grids::state_on_coarser;
 use super::manifold::{Direction, Manifold, Plane, Solution};
 use super::table::Verified;
-use crate::branch::critical::Kind;
-use crate::branch::field::every_second;
+use crate::branch::events::critical::Kind;
+use crate::branch::problem::field::every_second;
 use crate::leaf::{Grid, State};
 use crate::limit::Limit;
-use crate::relax::fall::settle_from;
+use crate::relax::settle::settle_from::settle_from;
 
 /// Distances from the boundary at which they are sought, in this order: arclengths on the
 /// solution manifold, or fractions of the ranges.

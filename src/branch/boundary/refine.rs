@@ -6,15 +6,15 @@ use super::search::Search;
 use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
 use super::table::{Parameters, Table, Verified};
-use crate::branch::critical::Kind;
-use crate::branch::equations::Stuck;
-use crate::branch::refine_critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
-use crate::branch::refined::Doubt;
+use crate::branch::events::critical::Kind;
+use crate::branch::problem::equations::Stuck;
+use crate::branch::verify::critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
+use crate::branch::verify::refined::Doubt;
 use crate::largest::larger;
 use crate::leaf::Grid;
 use crate::newton::Contraction;
-use crate::relax::level::Level;
-use crate::relax::predict::{predict, weights};
+use crate::relax::transfer::level::Level;
+use crate::relax::transfer::predict::{predict, weights};
 
 /// Least and largest number of grids of a point, that of a nearly rigid leaf, and segments of
 /// the finest grid.

@@ -1,8 +1,8 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
 use super::manifold::{Direction, Manifold, Sample, Solution};
-use crate::branch::equations::{ITERATIONS, Stuck};
-use crate::branch::field::{add, combined, dot, times};
+use crate::branch::problem::equations::{ITERATIONS, Stuck};
+use crate::branch::problem::field::{add, combined, dot, times};
 use crate::leaf::Field;
 use crate::newton::{Contraction, converged};
 

@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use super::manifold::{Direction, Manifold, Sample, Solution};
 use super::search::{self, Eigen, Found, Search};
-use crate::branch::critical::{Critical, Kind};
-use crate::branch::deflation::STIFF;
-use crate::branch::equations::Stuck;
-use crate::branch::field::{add, combined, dot, plus, times};
-use crate::branch::refined::Refined;
+use crate::branch::events::critical::{Critical, Kind};
+use crate::branch::problem::bordered::STIFF;
+use crate::branch::problem::equations::Stuck;
+use crate::branch::problem::field::{add, combined, dot, plus, times};
+use crate::branch::verify::refined::Refined;
 use crate::largest::larger;
 use crate::leaf::Field;
 

@@ -2,8 +2,8 @@
 
 use super::manifold::Manifold;
 use super::singular_point::SingularPoint;
-use crate::branch::critical::Kind;
-use crate::branch::equations::Stuck;
+use crate::branch::events::critical::Kind;
+use crate::branch::problem::equations::Stuck;
 
 /// Largest number of evaluations in the search along the boundary.
 const EVALUATIONS: usize = 25;

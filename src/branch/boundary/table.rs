@@ -5,12 +5,12 @@ use glam::DVec3;
 use super::manifold::{Direction, Manifold};
 use super::singular_point::SingularPoint;
 use super::special::Special;
-use crate::branch::critical::Kind;
-use crate::branch::equations::Stuck;
-use crate::branch::states::stiffest_condensed;
+use crate::branch::events::critical::Kind;
+use crate::branch::problem::equations::Stuck;
+use crate::branch::problem::states::stiffest_condensed;
 use crate::largest::larger;
 use crate::leaf::State;
-use crate::relax::richardson::Richardson;
+use crate::relax::accuracy::richardson::Richardson;
 
 /// Amplification of rounding errors by extrapolation to zero softening: the root of the sum of
 /// the squares of its weights.

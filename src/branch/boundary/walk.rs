@@ -8,9 +8,9 @@ use super::refine::{Accuracy, Step, refine};
 use super::singular_point::SingularPoint;
 use super::special::{at_distance, at_value, special_between};
 use super::table::Verified;
-use crate::branch::equations::Stuck;
-use crate::branch::refined::Doubt;
-use crate::branch::walk::End;
+use crate::branch::problem::equations::Stuck;
+use crate::branch::verify::refined::Doubt;
+use crate::branch::walk::steps::End;
 use crate::leaf::Grid;
 
 /// First step and shortest step, as parts of the longest.

@@ -3,6 +3,7 @@
 //! themselves.
 
 mod nearby;
+pub mod parameter;
 mod response;
 mod series;
 
@@ -12,9 +13,9 @@ use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, Leaf, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::equilibrium::{Reaction, Sensitivity};
-use crate::relax::level::Level;
-use crate::relax::number::Number;
+use crate::relax::result::equilibrium::{Reaction, Sensitivity};
+use crate::relax::sensitivity::parameter::Number;
+use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;

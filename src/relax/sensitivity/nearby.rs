@@ -3,8 +3,8 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
 use crate::modes::{self, Eigenpair};
-use crate::relax::level::Level;
 use crate::relax::sensitivity::response::moved;
+use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;

@@ -4,7 +4,7 @@ use crate::largest::largest;
 use crate::leaf::{
     DirectSolver, DiscreteLeaf, Factors, Field, Forces, LeafRate, Response, Solved, State, System,
 };
-use crate::relax::level::Level;
+use crate::relax::transfer::level::Level;
 use crate::rod::Segment;
 use crate::rotation;
 use glam::DVec3;

@@ -1,6 +1,6 @@
 //! Derivatives on successively refined grids.
 
-use crate::relax::richardson::{Best, Richardson};
+use crate::relax::accuracy::richardson::{Best, Richardson};
 use glam::DVec3;
 
 /// Safety factor on the error estimate: errors of derivatives decrease less regularly than

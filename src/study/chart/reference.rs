@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use crate::bvp::{self, Start};
 use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::{Scenario, longest};
+use crate::shooting;
+use crate::shooting::Start;
 use crate::study::judge::{Answer, union};
 
 /// Tolerances of the relaxation: first one that most leaves reach, then the
@@ -47,9 +48,9 @@ pub fn find(
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
     let stations = union(wanted.into_iter().chain(known.copied()).collect());
     let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
-    let precision = bvp::Precision::Error(SMALLEST_TOLERANCE);
-    let options = bvp::Options::new(start, &stations, precision);
-    let solved = bvp::solve(scenario, &options, &mut |_| {});
+    let precision = shooting::Precision::Error(SMALLEST_TOLERANCE);
+    let options = shooting::Options::new(start, &stations, precision);
+    let solved = shooting::solve(scenario, &options, &mut |_| {});
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
         Err(_) => None,

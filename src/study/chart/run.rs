@@ -1,9 +1,10 @@
 //! The runs of one contender with one setting on a leaf.
 
 use super::plan::{Contender, Setting};
-use crate::bvp::{self, Reason};
 use crate::relax::{Method, Options, Outcome, RelaxError, SHOOTING_START};
 use crate::scenario::{Scenario, longest};
+use crate::shooting;
+use crate::shooting::Reason;
 use crate::study::judge::{Answer, timed};
 
 /// A leaf, a contender and its setting, with the results of its runs so far.
@@ -75,11 +76,11 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
     };
     let (found, seconds) = timed(|| {
         let rest = Answer::relaxed(scenario, &options)?;
-        let precision = bvp::Precision::Error(accuracy);
-        let asked = bvp::Options::new(rest.as_start(), &rest.stations, precision);
+        let precision = shooting::Precision::Error(accuracy);
+        let asked = shooting::Options::new(rest.as_start(), &rest.stations, precision);
         let shot = rest
             .at_rest()
-            .then(|| bvp::solve(scenario, &asked, &mut |_| {}));
+            .then(|| shooting::solve(scenario, &asked, &mut |_| {}));
         Ok::<_, RelaxError>((rest, shot))
     });
     let (rest, shot) = found?;

@@ -3,9 +3,10 @@
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 
-use crate::bvp::{self, Failure, Reason, Solution};
 use crate::relax::{Equilibrium, serialize_index};
 use crate::shape::{Difference, serialize_tips};
+use crate::shooting;
+use crate::shooting::{Failure, Reason, Solution};
 
 /// The boundary-value solution with its verdict, or why there is none.
 #[derive(Clone, Debug)]
@@ -68,7 +69,7 @@ impl Serialize for Shot {
             #[serde(flatten, serialize_with = "serialize_index")]
             index: Option<usize>,
             neutral: Option<NeutralKeys<'a>>,
-            work: bvp::Work,
+            work: shooting::Work,
             wall_seconds: f64,
         }
         #[derive(Serialize)]

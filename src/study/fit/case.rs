@@ -11,7 +11,7 @@ use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::predict::weights;
+use crate::relax::transfer::predict::weights;
 use crate::relax::{AtRest, Level, Lost, Nearby, Number, unit_forces};
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.

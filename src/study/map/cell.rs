@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use crate::bvp::{self, Reason, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Method, Options, Outcome};
 use crate::scenario::{Scenario, longest};
+use crate::shooting;
+use crate::shooting::{Reason, Start};
 use crate::study::judge::{
     Answer, SAME_LEAF, SEGMENTS, fine_grid, grid_error, index_at, timed, union,
 };
@@ -156,12 +157,12 @@ impl<'a> Cell<'a> {
         let grid = fine_grid(self.scenario, segments);
         let others = motion::stations(self.scenario, self.knobs);
         let stations = union([grid.sigma(), &others].concat());
-        let options = bvp::Options {
+        let options = shooting::Options {
             intervals,
             limit: limit.clone(),
-            ..bvp::Options::new(start, &stations, bvp::Precision::Error(accuracy))
+            ..shooting::Options::new(start, &stations, shooting::Precision::Error(accuracy))
         };
-        let solved = bvp::solve(self.scenario, &options, &mut |_| {});
+        let solved = shooting::solve(self.scenario, &options, &mut |_| {});
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,

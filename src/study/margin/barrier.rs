@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::{Stable, StartPoint};
 use crate::branch::{Equations, Point, between, on_finer, prolong_field, times};
 use crate::leaf::{Field, Grid, State};
-use crate::relax::fall::settle_from;
-use crate::relax::prolong::prolong;
-use crate::relax::richardson::Richardson;
+use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::settle::settle_from::settle_from;
+use crate::relax::transfer::prolong::prolong;
 use crate::relax::{Barrier, Neighbour, Saddle};
 
 /// Number of modes along which saddles are sought, in both directions.

@@ -8,7 +8,7 @@ use crate::branch::{
     refine_at, switch, times,
 };
 use crate::numbers::power_of_ten;
-use crate::relax::fall::settle_from;
+use crate::relax::settle::settle_from::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
 

@@ -1,0 +1,228 @@
+//! Newton's method to a branch, within a plane or at a parameter, and the Morse index there.
+
+use crate::branch::problem::equations::{
+    Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized,
+};
+use crate::branch::problem::family::{OutOfRange, clamp};
+use crate::branch::problem::field::{add, at_same_nodes, between, dot, is_finite, largest, plus};
+use crate::branch::problem::states::rate;
+use crate::branch::{Direction, Point, Solution};
+use crate::largest::larger;
+use crate::leaf::{DiscreteLeaf, Field, Solved, State};
+use crate::relax::NOISY;
+use crate::relax::transfer::prolong::prolong;
+
+const CG_TOLERANCE: f64 = 1e-11;
+
+/// A step too small to change the sign of any eigenvalue, even of a nearly neutral one.
+const SAME_INDEX: f64 = 1e-9;
+
+/// Iterations go on while an increment is at most this part of the one before.
+const CONTRACTING: f64 = 0.5;
+
+/// A hyperplane in which a point is sought.
+pub(in crate::branch) struct Plane {
+    /// Its normal: the increments times the mass matrix, per unit of the leaf's mass, and the
+    /// component along the parameter.
+    pub dual: Field,
+    pub own: f64,
+    /// A state in it; if none, the initial state of the search.
+    pub through: Option<State>,
+}
+
+impl Plane {
+    /// The plane through a point normal to the branch without its parameter: a given displacement
+    /// along the branch, measured by the shifts and turns of the nodes of this grid only, lest it
+    /// depend on how states are interpolated.
+    pub fn across(equations: &Equations, point: &Point) -> Self {
+        let direction = equations.normalised(Direction {
+            increments: point.tangent.increments.clone(),
+            params: [0.0],
+        });
+        Plane {
+            dual: equations.momentum(&direction.increments),
+            own: 0.0,
+            through: Some(point.state.clone()),
+        }
+    }
+
+    /// The same on the grid with all segments halved; `leaf` is on this one.
+    pub fn refined(&self, leaf: &DiscreteLeaf) -> Self {
+        Plane {
+            dual: at_same_nodes(&self.dual),
+            own: self.own,
+            through: (self.through.as_ref()).map(|state| prolong(leaf, state)),
+        }
+    }
+
+    /// Signed distance of a state from it, without the parameter.
+    fn distance(&self, state: &State) -> f64 {
+        let through = self.through.as_ref();
+        through.map_or(0.0, |through| dot(&self.dual, &between(through, state)))
+    }
+}
+
+impl Equations<'_> {
+    /// Derivative, with respect to the parameter, of the positions of nodes held away from the
+    /// bases, which the forces do not contain; `None` if there are none.
+    fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
+        if self.leaves.at([fraction])?.leaf.held.is_none() {
+            return Ok(None);
+        }
+        let held = |step: f64| {
+            let mut held = state.clone();
+            clamp(self.leaves.at([fraction + step])?, &mut held);
+            Ok(between(state, &held))
+        };
+        rate(held).map(Some)
+    }
+
+    /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
+    /// else by a direct factorisation, which also counts the negative eigenvalues.
+    fn solve(
+        &mut self,
+        linear: &Linear,
+        rate: &Field,
+    ) -> Result<(Field, Field, Option<usize>), Stuck> {
+        let shift = linear.shift;
+        self.factorizations += 1;
+        if self.rodwise {
+            if self.system.factorize(shift) {
+                let mut solved = |rhs: &Field| {
+                    self.system.set_rhs(rhs);
+                    let found = self.system.solve(None, CG_TOLERANCE);
+                    matches!(found, Solved::Yes(_)).then(|| self.system.solution())
+                };
+                if let (Some(forces), Some(rate)) = (solved(&linear.forces), solved(rate)) {
+                    return Ok((forces, rate, None));
+                }
+            }
+            self.rodwise = false;
+            self.factorizations += 1;
+        }
+        let pattern = self.pattern(0)?;
+        let mut factor = factorized(&pattern, &self.system, shift)?;
+        let forces = factor.solve_bordered(&linear.forces, &[]).increments;
+        let rate = factor.solve_bordered(rate, &[]).increments;
+        Ok((forces, rate, Some(factor.negative())))
+    }
+
+    /// Newton corrector: back to the branch within the plane normal to `normal`
+    /// through the given state; without a normal, at the given parameter. The
+    /// tangent of the point is oriented along `normal`.
+    pub fn correct(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        normal: Option<&Direction>,
+    ) -> Result<Point, Stuck> {
+        let plane = normal.map(|t| Plane {
+            dual: self.momentum(&t.increments),
+            own: t.params[0],
+            through: None,
+        });
+        let mut point = self.correct_within(state, fraction, plane.as_ref())?;
+        if let Some(normal) = normal {
+            point.tangent = self.oriented(point.tangent, normal);
+        }
+        Ok(point)
+    }
+
+    /// As [`Equations::correct`], within any plane; the tangent points to growing
+    /// values of the parameter.
+    pub(in crate::branch) fn correct_within(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        plane: Option<&Plane>,
+    ) -> Result<Point, Stuck> {
+        let mut now = Solution {
+            state: state.clone(),
+            params: [fraction],
+        };
+        let mut previous = f64::INFINITY;
+        for iterations in 1.. {
+            let rates = self.rates(&now, false)?;
+            let linear = self.assemble(&mut now, false)?;
+            let (forces, mut rate, counted) = self.solve(&linear, &rates[0])?;
+            if let Some(held) = self.held_rate(&now.state, now.params[0])? {
+                add(&mut rate, 1.0, &held);
+            }
+            self.exclude_turn(&now, &mut rate)?;
+            let step = plane.map_or(0.0, |plane| {
+                let off = plane.distance(&now.state) + dot(&plane.dual, &forces);
+                -off / (dot(&plane.dual, &rate) + plane.own)
+            });
+            let increments = plus(&forces, step, &rate);
+            let size = larger(largest(&increments), step.abs());
+            if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            now.params[0] += step;
+            now.state = self.advanced(&now.state, now.params, &increments, 1.0)?;
+            if at_rest(size, previous) {
+                clamp(self.leaves.at(now.params)?, &mut now.state);
+                let tangent = self.normalised(Direction {
+                    increments: rate,
+                    params: [1.0],
+                });
+                // The factorised matrix is that of the previous state.
+                let index = match counted {
+                    Some(index) if size < SAME_INDEX => index,
+                    _ => self.index(&now)?,
+                };
+                return Ok(Point {
+                    state: now.state,
+                    fraction: now.params[0],
+                    tangent,
+                    index,
+                    iterations,
+                });
+            }
+            // Where the matrix is that of a softer leaf, the method converges linearly.
+            if iterations >= ITERATIONS && size > CONTRACTING * previous {
+                break;
+            }
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
+    }
+
+    /// Subtracts the turns of veins that can turn without resistance, so that a tangent does not
+    /// depend on where the turns are held.
+    fn exclude_turn(&mut self, at: &Solution, increments: &mut Field) -> Result<(), OutOfRange> {
+        for turn in self.leaves.at(at.params)?.turns(&at.state) {
+            let amount = self.product(&turn, increments) / self.product(&turn, &turn);
+            add(increments, -amount, &turn);
+        }
+        Ok(())
+    }
+
+    /// Morse index of an equilibrium, without neutral modes.
+    fn index(&mut self, solution: &Solution) -> Result<usize, Stuck> {
+        let shift = self.leaves.at(solution.params)?.neutral_shift();
+        let index = self.index_below(solution, shift)?;
+        if shift > NOISY && index != self.index_below(solution, -shift)? {
+            return Err(Stuck::Rounding);
+        }
+        Ok(index)
+    }
+
+    /// Number of eigenvalues below minus `shift`.
+    fn index_below(&mut self, solution: &Solution, shift: f64) -> Result<usize, Stuck> {
+        let leaf = self.leaves.at(solution.params)?;
+        let system = &mut self.system;
+        self.factorizations += 1;
+        system.set_coupling(leaf);
+        leaf.assemble(&solution.state, system);
+        leaf.hold_turn(&solution.state, system);
+        if system.stable_without_coupling(shift) {
+            return Ok(0);
+        }
+        leaf.assemble(&solution.state, system);
+        leaf.hold_turn(&solution.state, system);
+        self.factorizations += 1;
+        let pattern = self.pattern(0)?;
+        Ok(factorized(&pattern, &self.system, shift)?.negative())
+    }
+}

@@ -1,0 +1,127 @@
+//! The first points of branches: the equilibrium that a relaxation found, and those beside a
+//! branch point.
+
+use crate::branch::Point;
+use crate::branch::events::critical::Critical;
+use crate::branch::problem::equations::{Equations, Stuck};
+use crate::branch::problem::family::Family;
+use crate::branch::verify::regular::refine;
+use crate::branch::walk::follow::Grids;
+use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::relax::transfer::prolong::prolong;
+use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
+
+/// The finest grid on which the first point is sought.
+const FINEST: usize = 512;
+
+/// Largest distance between the tips of one grid and the extrapolated ones, relative to
+/// the length.
+const SAME_LEAF: f64 = 0.02;
+
+/// A relaxation on fewer segments counts as one on this many.
+const COARSEST: usize = 8;
+
+/// Distances from the branch point at which the other branch is sought, in this order.
+const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+
+/// The first point of a branch and its grid: the equilibrium `rest`, found with these
+/// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
+/// the first one, at least twice as fine as the stations of the relaxation, on which the index
+/// is that of `rest`.
+///
+/// # Errors
+/// The failure on the finest grid, if Newton's method converges on none.
+pub fn begin<'a>(
+    family: &'a Family<'a>,
+    rest: &Equilibrium,
+    options: &Options,
+    segments: Option<usize>,
+) -> Result<(Grids<'a>, Point), Stuck> {
+    let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
+    let least = segments.unwrap_or(2 * coarsest);
+    search(family, rest, least, segments.is_some()).or_else(|stuck| {
+        // Interpolation between the stations may be too inaccurate: relax once more, on the
+        // finest grid alone, and begin there.
+        let finest = rest.accuracy.segments.iter().max().copied();
+        let options = Options {
+            method: options.method.on_grid(finest),
+            ..options.clone()
+        };
+        let alone = relax(&family.scenario([0.0])?, &options, &mut |_| {});
+        let Ok(alone) = alone else {
+            return Err(stuck);
+        };
+        let mut tips = rest.tips.iter().zip(&alone.tips);
+        let near = SAME_LEAF * family.scale().length;
+        match tips.all(|(a, b)| a.distance(*b) < near) {
+            true => search(family, &alone, alone.shape.stations.len() - 1, true),
+            false => Err(stuck),
+        }
+    })
+}
+
+/// The first point on a grid of at least `least` segments; of any index, or on the first grid
+/// with the index of `rest`.
+fn search<'a>(
+    family: &'a Family<'a>,
+    rest: &Equilibrium,
+    least: usize,
+    any_index: bool,
+) -> Result<(Grids<'a>, Point), Stuck> {
+    let leaf = family.first();
+    let mut grid = Grid::through(&rest.shape.stations, leaf.kinks());
+    let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+    let mut state = project(leaf, &discrete, &rest.shape.rods);
+    let mut found = Err(Stuck::NotConverged);
+    loop {
+        if grid.segments() >= least {
+            let mut grids = Grids::new(family, grid.clone());
+            let point = grids.of(&state).correct(&state, 0.0, None).or_else(|_| {
+                let mut system = System::new(&discrete);
+                polish(&discrete, &mut state, &mut system, &mut Work::default());
+                grids.of(&state).correct(&state, 0.0, None)
+            });
+            match point {
+                Ok(point) => {
+                    let same = Some(point.index) == rest.stability.negative_eigenvalues;
+                    found = Ok((grids, point));
+                    if same || any_index {
+                        return found;
+                    }
+                }
+                Err(stuck) if found.is_err() => found = Err(stuck),
+                Err(_) => {}
+            }
+            if grid.segments() >= FINEST {
+                return found.and(Err(Stuck::BesideBifurcation));
+            }
+        }
+        state = prolong(&discrete, &state);
+        grid = grid.refined();
+        discrete = DiscreteLeaf::new(leaf, grid.clone());
+    }
+}
+
+/// The first points of the branches that cross at `critical` in the plane of
+/// the first of its neutral modes, one on either side: as near as possible, but so far from the
+/// branch point that finer grids have them too, with this accuracy of their tips.
+pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
+    let across = critical.across(equations);
+    let (family, grid) = (equations.leaves.family, equations.grid().clone());
+    [across.clone(), across.reversed()]
+        .iter()
+        .filter_map(|direction| {
+            let mut nearest = None;
+            for away in AWAY {
+                let Ok(point) = critical.beside(equations, direction, away) else {
+                    continue;
+                };
+                if refine(family, &grid, &point, accuracy).is_ok() {
+                    return Some(point);
+                }
+                nearest = nearest.or(Some(point));
+            }
+            nearest
+        })
+        .collect()
+}

@@ -1,0 +1,349 @@
+//! The derivative of a leaf with respect to a number of its scenario: of its forces in a given
+//! state, and of its energy. Exact except for the finite differences of scenarios that define
+//! the number's effect on the scenario itself.
+
+mod forces;
+mod held;
+
+pub use crate::leaf::derivative::forces::{Forces, Response};
+use crate::leaf::derivative::held::HeldRate;
+use crate::leaf::dimensionless::Leaf;
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::{Field, State, add};
+use crate::rod::{Blocks, Section, SectionRate, Segment};
+use crate::scenario::{Profile, Scenario};
+use glam::DVec3;
+
+/// The derivative of a leaf: weighted sums over scenarios that differ in the number, with
+/// weights that add up to zero.
+pub struct LeafRate<'s> {
+    rods: Vec<RodRate<'s>>,
+    coupling: Vec<DVec3>,
+    gravity: DVec3,
+    tip_force: DVec3,
+    tip_moment: DVec3,
+    held: Option<HeldRate>,
+}
+
+/// A remaining gap below this part of the initial one counts as zero: the segment's force is
+/// condensed out with its own stiffness.
+const CLOSED: f64 = 1e-12;
+
+/// The derivative of a rod, in the leaf's units.
+struct RodRate<'s> {
+    length: f64,
+    angle: f64,
+    couple_stiffness: [Slope<'s>; 3],
+    force_stiffness: [Slope<'s>; 3],
+    rest_curvature: [Slope<'s>; 3],
+    rest_stretch: Slope<'s>,
+}
+
+/// The derivative of a profile: a weighted sum of profiles, without terms if it is zero.
+struct Slope<'s>(Vec<(f64, &'s Profile)>);
+
+impl<'s> Slope<'s> {
+    fn of(
+        terms: &'s [(f64, Scenario)],
+        unit: f64,
+        profile: impl Fn(&'s Scenario) -> &'s Profile,
+    ) -> Self {
+        let first = profile(&terms[0].1);
+        let profiles = terms.iter().map(|(weight, s)| (weight * unit, profile(s)));
+        let mut profiles: Vec<_> = profiles.collect();
+        if profiles.iter().all(|(_, other)| *other == first) {
+            profiles.clear();
+        }
+        Slope(profiles)
+    }
+
+    fn at(&self, sigma: f64) -> f64 {
+        let terms = self.0.iter().map(|(weight, p)| weight * p.at(sigma));
+        terms.fold(0.0, |sum, term| sum + term)
+    }
+
+    fn is_none(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<'s> LeafRate<'s> {
+    /// Of a leaf, from neighbouring scenarios with their weights.
+    pub fn new(leaf: &Leaf, terms: &'s [(f64, Scenario)]) -> Self {
+        let scale = leaf.scale;
+        let sum = |value: &dyn Fn(&Scenario) -> f64| change(terms, value);
+        let vector = |value: fn(&Scenario) -> [f64; 3], unit: f64| {
+            DVec3::from_array([0, 1, 2].map(|axis| sum(&|s| value(s)[axis]))) / unit
+        };
+        let rod = |j: usize| RodRate {
+            length: sum(&|s| s.rods[j].length) / scale.length,
+            angle: sum(&|s| s.rods[j].angle),
+            couple_stiffness: [0, 1, 2].map(|k| {
+                Slope::of(terms, 1.0 / scale.stiffness, move |s| {
+                    &s.rods[j].couple_stiffness[k]
+                })
+            }),
+            force_stiffness: [0, 1, 2].map(|k| {
+                Slope::of(terms, 1.0 / scale.force(), move |s| {
+                    &s.rods[j].force_stiffness[k]
+                })
+            }),
+            rest_curvature: [0, 1, 2]
+                .map(|k| Slope::of(terms, scale.length, move |s| &s.rods[j].rest_curvature[k])),
+            rest_stretch: Slope::of(terms, 1.0, move |s| &s.rods[j].rest_stretch),
+        };
+        let rods = leaf.scenario().rods.len();
+        // Per unit of sigma, as in `Leaf::coupling`.
+        let gap = |s: &Scenario, g: usize| 0.5 * (s.rods[g].length + s.rods[g + 1].length);
+        let unit = scale.length / scale.force();
+        let coupling = |g: usize| {
+            let of = |axis: usize| sum(&|s| s.coupling[g][axis] * gap(s, g));
+            DVec3::from_array([0, 1, 2].map(of)) * unit
+        };
+        LeafRate {
+            rods: (0..rods).map(rod).collect(),
+            coupling: (0..rods - 1).map(coupling).collect(),
+            gravity: vector(|s| s.gravity, scale.force() / scale.length),
+            tip_force: vector(|s| s.tip_force, scale.force()),
+            tip_moment: vector(|s| s.tip_moment, scale.moment()),
+            held: HeldRate::new(leaf, terms),
+        }
+    }
+}
+
+impl LeafRate<'_> {
+    /// The rate of rotation of the base of rod `j`.
+    pub fn base_turn(&self, j: usize) -> f64 {
+        self.rods[j].angle
+    }
+
+    /// Whether a dead moment on the tip changes.
+    pub fn changes_moment(&self) -> bool {
+        self.rods.len() == 1 && self.tip_moment != DVec3::ZERO
+    }
+}
+
+impl RodRate<'_> {
+    /// Whether all sections of the rod are unchanged.
+    fn sections_unchanged(&self) -> bool {
+        let triples = [
+            &self.couple_stiffness,
+            &self.force_stiffness,
+            &self.rest_curvature,
+        ];
+        let mut slopes = triples.into_iter().flatten().chain([&self.rest_stretch]);
+        self.length == 0.0 && slopes.all(Slope::is_none)
+    }
+
+    /// The derivative of a section at `sigma` whose segment is the fraction `width` of the rod.
+    fn section(&self, section: &Section, sigma: f64, width: f64) -> SectionRate {
+        let at = |slopes: &[Slope; 3]| DVec3::from_array(slopes.each_ref().map(|s| s.at(sigma)));
+        let compliance = section.compliance;
+        SectionRate {
+            ds: self.length * width,
+            couple_stiffness: at(&self.couple_stiffness),
+            rest_curvature: at(&self.rest_curvature),
+            rest_strain: DVec3::X * self.rest_stretch.at(sigma),
+            compliance: -compliance * compliance * at(&self.force_stiffness),
+        }
+    }
+}
+
+impl DiscreteLeaf {
+    /// All segments in a state, rod after rod, for use by all derivatives in that state.
+    pub fn all_segments(&self, state: &State) -> Vec<Segment> {
+        let n = self.segments();
+        let each = self.each(0..n);
+        each.map(|(j, i)| self.segment(state, j, i, state.n[j * n + i]))
+            .collect()
+    }
+
+    /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
+    /// with these segments.
+    pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
+        let mut forces = Forces::none(self.rods());
+        let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
+        let of_all = of_all || rate.tip_moment != DVec3::ZERO;
+        for (j, rod) in rate.rods.iter().enumerate() {
+            if !rod.sections_unchanged() {
+                self.add_section_changes(segments, j, rod, &mut forces);
+            }
+            let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
+            if of_all || coupling || rod.length != 0.0 {
+                self.add_load_changes(state, j, rate, &mut forces);
+            }
+            if rod.angle != 0.0 {
+                self.add_base_rotation(segments, j, rod.angle, &mut forces);
+            }
+        }
+        if let Some(held) = &rate.held {
+            self.add_tip_motion(state, segments, held, &mut forces);
+        }
+        forces
+    }
+
+    fn add_section_changes(
+        &self,
+        segments: &[Segment],
+        j: usize,
+        rod: &RodRate,
+        forces: &mut Forces,
+    ) {
+        let n = self.segments();
+        forces.on_nodes(j, n);
+        forces.on_gaps(j, n);
+        for i in 0..n {
+            let section = self.section(j, i);
+            let segment = &segments[j * n + i];
+            let change = rod.section(section, self.grid.middle(i), self.grid.width(i));
+            let change = segment.rate(section, &change);
+            let [left, right] = change.gradient;
+            let nodes = &mut forces.nodes[j];
+            if i > 0 {
+                add(&mut nodes[i - 1], -left, DVec3::ZERO);
+            }
+            add(&mut nodes[i], -right, DVec3::ZERO);
+            forces.gaps[j][i] += change.gap;
+            forces.energy += change.energy;
+        }
+    }
+
+    /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
+    fn add_load_changes(&self, state: &State, j: usize, rate: &LeafRate, forces: &mut Forces) {
+        let n = self.segments();
+        let rod = &rate.rods[j];
+        let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
+        let ends_here = j == 0 || !self.leaf.joined();
+        forces.on_nodes(j, n);
+        if rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO) {
+            forces.on_nodes(j + 1, n);
+        }
+        for i in 1..=n {
+            let x = state.x[state.base(j) + i];
+            let mut force = gravity * (self.load_factor * self.grid.weight(i));
+            if i == n && ends_here {
+                force += self.load_factor * rate.tip_force;
+            }
+            forces.energy -= force.dot(x);
+            let coupled = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
+            if coupled && !(self.leaf.joined() && i == n) {
+                let stretch = state.x[state.base(j + 1) + i] - x;
+                let pull = rate.coupling[j] * self.grid.weight(i) * stretch;
+                forces.energy += 0.5 * pull.dot(stretch);
+                force += pull;
+                add(&mut forces.nodes[j + 1][i - 1], DVec3::ZERO, -pull);
+            }
+            add(&mut forces.nodes[j][i - 1], DVec3::ZERO, force);
+        }
+        if self.rods() == 1 {
+            let moment = self.load_factor * rate.tip_moment;
+            add(&mut forces.nodes[j][n - 1], moment, DVec3::ZERO);
+        }
+    }
+
+    /// Adds the effect of rotating a base about the normal of the fan.
+    fn add_base_rotation(&self, segments: &[Segment], j: usize, angle: f64, forces: &mut Forces) {
+        let n = self.segments();
+        let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
+        let segment = &segments[j * n];
+        let k = at_constant_force(segment, section);
+        add(
+            &mut forces.on_nodes(j, n)[0],
+            -(k.ab.transpose() * turn),
+            -(k.xa * turn),
+        );
+        forces.on_gaps(j, n)[0] += segment.gap_increment(section, DVec3::ZERO, turn, DVec3::ZERO);
+        forces.energy += segment.gradient(section).1.dot(turn);
+    }
+
+    /// The work of forces on a response to others: by symmetry also that of the
+    /// others on the response to these.
+    pub fn work(&self, segments: &[Segment], forces: &Forces, response: &Response) -> f64 {
+        let n = self.segments();
+        let mut work = 0.0;
+        for (forces, response) in forces.nodes.iter().zip(&response.nodes) {
+            for (force, shift) in forces.iter().zip(response) {
+                let pairs = force.iter().zip(shift);
+                work += pairs.map(|(force, shift)| force * shift).sum::<f64>();
+            }
+        }
+        for (j, gaps) in forces.gaps.iter().enumerate() {
+            for (i, gap) in gaps.iter().enumerate() {
+                work -= response.carried[j * n + i].dot(segments[j * n + i].frame * *gap);
+            }
+        }
+        work
+    }
+
+    /// Adds to forces on the nodes the contribution of changes of the gaps when the forces of
+    /// the segments are condensed out.
+    pub fn condense_gaps(&self, segments: &[Segment], gaps: &[DVec3], nodes: &mut Field) {
+        let n = self.segments();
+        for (j, i) in self.each(0..n) {
+            let gap = gaps[j * n + i];
+            if gap == DVec3::ZERO {
+                continue;
+            }
+            let segment = &segments[j * n + i];
+            let (g_x, g_a, g_b) = segment.gap_gradient(self.section(j, i), gap);
+            if i > 0 {
+                add(&mut nodes[j][i - 1], -g_a, g_x);
+            }
+            add(&mut nodes[j][i], -g_b, -g_x);
+        }
+        // Held components of a tip have no equations.
+        let [turns, shifts] = self.moves(n);
+        for node in nodes.iter_mut().filter_map(|rod| rod.last_mut()) {
+            let held = [turns, turns, turns, shifts, shifts, shifts].map(|moves| !moves);
+            for (force, held) in node.iter_mut().zip(held) {
+                if held {
+                    *force = 0.0;
+                }
+            }
+        }
+    }
+
+    /// The changes of the forces of all segments for increments of the nodes and changes of
+    /// the gaps, and the remaining gaps, which are nonzero where the condensing stiffness is
+    /// less than the segment's own.
+    pub fn carried(
+        &self,
+        segments: &[Segment],
+        increments: &Field,
+        gaps: &mut [DVec3],
+        carried: &mut [DVec3],
+    ) {
+        let n = self.segments();
+        for (j, rod) in increments.iter().enumerate() {
+            let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
+            for (i, increment) in rod.iter().enumerate() {
+                let k = j * n + i;
+                let (b, dx1) = (crate::leaf::turn(increment), crate::leaf::shift(increment));
+                let section = self.section(j, i);
+                let segment = &segments[k];
+                let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
+                carried[k] += segment.frame * (section.condensing * gap / section.ds);
+                let left = DVec3::ONE - section.compliance * section.condensing;
+                let none = left.cmplt(DVec3::splat(CLOSED));
+                gaps[k] = gap * DVec3::select(none, DVec3::ZERO, left);
+                (a, dx0) = (b, dx1);
+            }
+        }
+    }
+}
+
+/// The derivative of a number of the scenario: relative to the first, so that without changes it
+/// is exactly zero.
+fn change(terms: &[(f64, Scenario)], value: &dyn Fn(&Scenario) -> f64) -> f64 {
+    let first = value(&terms[0].1);
+    let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
+    terms.iter().map(change).sum()
+}
+
+/// Second derivatives of a segment at constant force.
+pub fn at_constant_force(segment: &Segment, section: &Section) -> Blocks {
+    segment.hessian(&Section {
+        condensing: DVec3::ZERO,
+        ..*section
+    })
+}

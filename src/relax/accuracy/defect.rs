@@ -1,0 +1,398 @@
+//! Defect correction: the error of a leaf on one grid, or extrapolated over several, estimated
+//! from its defect, and subtracted.
+//!
+//! The equilibrium equations are integrated from the nodes of the coarsest grid, where an
+//! extrapolated leaf is most accurate (of a single grid: from every second node), to the
+//! midpoints between them, by a method of order 8. The jumps of position, rotation, force and
+//! moment there are the defect; to first order the error is the response of the leaf to these
+//! jumps. The linear equations are those of a coarse grid: the relative error of the response
+//! is of second order.
+//!
+//! The response may be subtracted and the remaining error estimated again: iterated defect
+//! correction (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes
+//! from which it is integrated, to the solution of the equations themselves, in each round by
+//! the relative error of the linear equations: about a hundredth on 8 segments.
+
+use crate::largest::larger;
+use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
+use crate::newton::Work;
+use crate::relax::accuracy::jump_response::{Tangents, apply, largest_rotation_and_stress};
+use crate::relax::accuracy::nodal_fields::nodes;
+use crate::relax::transfer::level::Level;
+use crate::rotation;
+use glam::DVec3;
+
+/// The linear equations are those of the grid this many levels below the finest, but not of
+/// the coarsest.
+const COARSER: usize = 2;
+
+/// The part of the error assumed to remain after a correction before it has been measured: on
+/// a grid of n segments the first number over n^2, but no less than the second; and the largest
+/// measured part with which corrections continue.
+const CONTRACTION: (f64, f64) = (0.64, 0.01);
+const SLOWEST: f64 = 0.2;
+
+/// The part of the integration error that remains with halved steps, or less: with order 8 it
+/// is a 256th.
+const HALVED: f64 = 1.0 / 16.0;
+
+/// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
+/// of that of the positions (dimensionless): as they are in an extrapolated one.
+const TURNS: f64 = 10.0;
+const FORCES: f64 = 50.0;
+
+/// The factorised equations of one of the grids.
+pub struct Linear {
+    grid: usize,
+    pub system: System,
+}
+
+impl Linear {
+    /// The number of the grid.
+    pub fn grid(&self) -> usize {
+        self.grid
+    }
+}
+
+/// A leaf on one grid or several, with its error estimated from the equilibrium equations.
+pub struct Estimate {
+    /// The largest error of a position at the nodes from which the leaf was integrated.
+    pub at_nodes: f64,
+    /// The largest error on either side of the midpoints between them.
+    pub between: f64,
+    /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
+    pub rods: Vec<Vec<RodFields>>,
+    /// Its potential energy, dimensionless.
+    pub energy: f64,
+    /// The finest grid or, for a corrected leaf, one with as many segments as its accuracy needs.
+    pub grid: Grid,
+    /// Number of corrections.
+    pub corrections: usize,
+}
+
+impl Estimate {
+    /// The largest error of a position.
+    pub fn largest(&self) -> f64 {
+        larger(self.at_nodes, self.between)
+    }
+}
+
+/// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
+/// segments of the one before, with `columns` extrapolations. If the error is more than
+/// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
+/// `None` where the linear equations cannot be solved, or where the segments of a single level
+/// are not pairs of equal ones. The equations are factorised, if it fits in `spare`, unless
+/// `linear` has them already.
+pub fn estimate(
+    levels: &[Level],
+    columns: usize,
+    (enough, most): (f64, usize),
+    (linear, spare): (&mut Option<Linear>, &mut Option<System>),
+    work: &mut Work,
+) -> Option<Estimate> {
+    let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
+    // The linear equations need two segments between nodes.
+    let (parts, grid) = match last {
+        0 => (first.grid.coarsened()?, 0),
+        _ => (first.grid.clone(), last.saturating_sub(COARSER).max(1)),
+    };
+    if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
+        let system = factorized(&levels[grid], spare.take(), work)?;
+        *linear = Some(Linear { grid, system });
+    }
+    let (level, system) = (&levels[grid], &mut linear.as_mut()?.system);
+    let (finest, count) = (&levels[last].leaf.grid, parts.segments());
+    let (mut known, mut flow) = (nodes(levels, columns, count), Flow::new(first));
+    let mut tangents = Tangents::new(level, count);
+    let n = level.leaf.segments() as f64;
+    let assumed = (CONTRACTION.0 / (n * n)).max(CONTRACTION.1);
+    let mut uncorrected = None;
+    let mut before = 0.0;
+    let mut steps = Steps::new(finest.segments() / count / 2, last == 0);
+    for corrections in 0..=most {
+        satisfy_tip_conditions(first, &mut known);
+        let integrated = integrated((first, &parts), &mut flow, &known, steps.count);
+        let Some(response) = tangents.response(system, &integrated.jumps) else {
+            break;
+        };
+        let largest = larger(response.largest[0], response.largest[1]);
+        steps.measure(largest);
+        // With halved steps the error includes that of the longer ones: its ratio is no measure
+        // of the contraction.
+        let contraction = match corrections == 0 || steps.halved {
+            true => assumed,
+            false => largest / before,
+        };
+        if !largest.is_finite() || contraction > SLOWEST {
+            break;
+        }
+        let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
+        let out_of_reach = largest * contraction.powi(rounds_left) > enough;
+        if corrections == 0 && (largest <= enough || out_of_reach) {
+            return Some(integrated.estimate(&known, response.largest, finest));
+        }
+        if out_of_reach {
+            break;
+        }
+        let changes = tangents.changes(&response, &integrated.jumps);
+        if corrections == 0 {
+            uncorrected = Some(integrated.estimate(&known, response.largest, finest));
+        } else if largest + steps.error <= enough {
+            let [turn, stress] = largest_rotation_and_stress(&changes);
+            if larger(turn / TURNS, stress / FORCES) <= enough {
+                let errors = response.largest.map(|error| error + steps.error);
+                return Some(Estimate {
+                    corrections,
+                    ..integrated.estimate(&known, errors, finest)
+                });
+            }
+        }
+        apply(&changes, &mut known);
+        before = largest;
+        steps.choose(largest * contraction, enough);
+    }
+    uncorrected
+}
+
+/// The steps of the integration from a node to a midpoint.
+struct Steps {
+    count: usize,
+    /// Whether they are half of those of the round before.
+    halved: bool,
+    /// Bound on the error of the integration.
+    error: f64,
+    /// Whether the leaf is on a single grid.
+    alone: bool,
+}
+
+impl Steps {
+    fn new(count: usize, alone: bool) -> Self {
+        Steps {
+            count,
+            halved: false,
+            error: f64::INFINITY,
+            alone,
+        }
+    }
+
+    /// With the estimated error of a round: after a round with longer steps it includes their
+    /// error, and so bounds that of the halved steps.
+    fn measure(&mut self, largest: f64) {
+        self.error = match (self.halved, self.alone) {
+            (true, true) => HALVED * largest,
+            (true, false) => 0.0,
+            (false, true) => self.error,
+            (false, false) => f64::INFINITY,
+        };
+    }
+
+    /// Halves the steps if the next round, whose error is `expected`, may be the last; on a
+    /// single grid only if their own error is not known to be small. For small tolerances, with
+    /// several grids, the ends of more steps make better stations.
+    fn choose(&mut self, expected: f64, enough: f64) {
+        let unknown = !self.alone || self.error > 0.5 * enough;
+        self.halved = unknown && expected <= enough;
+        if self.halved {
+            self.count *= 2;
+        }
+    }
+}
+
+/// Assembled anew at rest: the equations of the last Newton step have the forces before it,
+/// which differ where rods are rigid.
+fn factorized(level: &Level, spare: Option<System>, work: &mut Work) -> Option<System> {
+    let mut system = System::reused(spare, &level.leaf);
+    work.force_evaluations += 1;
+    work.factorizations += 1;
+    level.leaf.assemble(&level.state, &mut system);
+    level.leaf.hold_turn(&level.state, &mut system);
+    let regular = match level.leaf.rods() {
+        1 => system.factorize_indefinite(),
+        _ => system.factorize(0.0),
+    };
+    regular.then_some(system)
+}
+
+/// A leaf integrated along its rods.
+struct Integrated {
+    /// After every step from the two ends of a part to its midpoint, part after part.
+    slices: Vec<[Vec<Slice>; 2]>,
+    jumps: Vec<Vec<Jump>>,
+    energy: f64,
+}
+
+/// The leaf `known` at the nodes of `parts`, integrated from there to the midpoints between
+/// them in `steps` steps, and the jumps there.
+fn integrated(
+    (leaf, parts): (&DiscreteLeaf, &Grid),
+    flow: &mut Flow,
+    known: &[Vec<RodFields>],
+    steps: usize,
+) -> Integrated {
+    let n = parts.segments();
+    let mut slices = vec![[(); 2].map(|()| vec![Slice::default(); steps]); n];
+    let mut jumps = vec![Vec::with_capacity(n); leaf.rods()];
+    let mut energy = 0.0;
+    for (i, ends) in slices.iter_mut().enumerate() {
+        let [before, behind] = &mut *ends;
+        for (k, after, sign) in [(i, before, 1.0), (i + 1, behind, -1.0)] {
+            flow.integrate(|j| known[j][k], [parts.sigma()[k], parts.middle(i)], after);
+            energy += sign * flow.energy();
+        }
+        for (j, jumps) in jumps.iter_mut().enumerate() {
+            let [a, b] = at_midpoint(ends, j);
+            let jump = jump(&a, &b);
+            // Minus the work of closing the jump: the energy error is then of second order.
+            energy -= a.n.dot(jump[0]) + a.m.dot(jump[1]);
+            jumps.push(jump);
+        }
+    }
+    for (j, known) in known.iter().enumerate() {
+        energy -= known.last().map_or(0.0, |tip| leaf.tip_force(j).dot(tip.x));
+    }
+    Integrated {
+        slices,
+        jumps,
+        energy,
+    }
+}
+
+/// Rod `j` at the midpoint of a part, integrated from either end.
+fn at_midpoint(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
+    ends.each_ref()
+        .map(|slices| slices.last().expect("a step at least").rod(j))
+}
+
+impl Integrated {
+    /// An uncorrected leaf with its largest errors at the nodes from which it was integrated and
+    /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
+    fn estimate(
+        &self,
+        known: &[Vec<RodFields>],
+        [at_nodes, between]: [f64; 2],
+        finest: &Grid,
+    ) -> Estimate {
+        let rods = self.rods(known);
+        let mut grid = finest.clone();
+        while grid.segments() + 1 < rods[0].len() {
+            grid = grid.refined();
+        }
+        Estimate {
+            at_nodes,
+            between,
+            rods,
+            energy: self.energy,
+            grid,
+            corrections: 0,
+        }
+    }
+
+    /// All rods at the ends of all steps from `known`; at midpoints the mean of the two sides.
+    fn rods(&self, known: &[Vec<RodFields>]) -> Vec<Vec<RodFields>> {
+        let rod = |(j, known): (usize, &Vec<RodFields>)| {
+            let steps = self.slices.first().map_or(0, |[before, _]| before.len());
+            let mut rod = Vec::with_capacity(2 * steps * self.slices.len() + 1);
+            for (begin, ends) in known.iter().zip(&self.slices) {
+                let [before, behind] = ends.each_ref().map(|it| &it[..steps - 1]);
+                let [a, b] = at_midpoint(ends, j);
+                rod.push(*begin);
+                rod.extend(before.iter().map(|slice| slice.rod(j)));
+                rod.push(mean(&a, &b));
+                rod.extend(behind.iter().rev().map(|slice| slice.rod(j)));
+            }
+            rod.extend(known.last());
+            rod
+        };
+        known.iter().enumerate().map(rod).collect()
+    }
+}
+
+/// Makes forces and moments at the tips satisfy the end conditions, which unfinished
+/// iterations violate slightly: the linear equations assume them. For a rod in the mirror
+/// plane the components that would move it out of the plane are set to zero.
+fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
+    for (j, rod) in known.iter_mut().enumerate() {
+        for node in rod.iter_mut().filter(|_| leaf.leaf.in_plane(j)) {
+            node.n.y = 0.0;
+            (node.m.x, node.m.z) = (0.0, 0.0);
+        }
+    }
+    let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
+    let held = leaf.leaf.held.as_ref();
+    let clamped = held.is_some_and(|held| held.clamps.is_some());
+    let share = 1.0 / tips.len() as f64;
+    let mut missing: DVec3 = (tips.iter().enumerate())
+        .map(|(j, tip)| share * (leaf.tip_force(j) - tip.n))
+        .sum();
+    if leaf.leaf.in_half() {
+        // The mirror image balances the component across the plane.
+        missing.y = 0.0;
+    }
+    for (j, tip) in tips.iter_mut().enumerate() {
+        match held {
+            Some(_) => {}
+            None if leaf.leaf.joined() => tip.n += missing,
+            None => tip.n = leaf.tip_force(j),
+        }
+        if !clamped {
+            tip.m = leaf.tip_moment();
+        }
+    }
+}
+
+fn jump(a: &RodFields, b: &RodFields) -> Jump {
+    let turn = rotation::log(a.q * b.q.conjugate());
+    [a.x - b.x, turn, a.n - b.n, a.m - b.m]
+}
+
+fn mean(a: &RodFields, b: &RodFields) -> RodFields {
+    RodFields {
+        x: 0.5 * (a.x + b.x),
+        q: a.q.lerp(b.q, 0.5),
+        n: 0.5 * (a.n + b.n),
+        m: 0.5 * (a.m + b.m),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::{Options, relax_on_grids};
+    use crate::scenario::Scenario;
+
+    const LEAF: &str = r#"
+        name = "leaf"
+        leaf = { rods = 5, length = 1.0, fan = "paper", joined = true }
+        stiffness = { torsion = 0.7, bending_2 = 1.0, bending_3 = 2.0, axial = AXIAL, shear_2 = 50.0, shear_3 = inf }
+        load = { gravity = [0.0, 0.0, -1.0] }
+    "#;
+
+    /// The linear equations are factorised once for all rounds, and each of these leaves less
+    /// than a thirtieth of the error, for rods that are rigid in stretch or not.
+    #[test]
+    fn every_round_leaves_a_small_part() {
+        for axial in ["inf", "100.0"] {
+            let leaf = Scenario::from_toml(&LEAF.replace("AXIAL", axial)).unwrap();
+            let options = Options {
+                tolerance: Some(1e-3),
+                ..Options::default()
+            };
+            let (_, levels) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let (mut linear, mut work) = (None, Work::default());
+            let mut estimated = |enough, most| {
+                let systems = (&mut linear, &mut None);
+                estimate(&levels, 1, (enough, most), systems, &mut work).unwrap()
+            };
+            let first = estimated(0.0, 0).largest();
+            // The last round only verifies.
+            for most in 2..=4_usize {
+                let enough = first * 30.0_f64.powi(1 - most as i32);
+                let estimate = estimated(enough, most);
+                let what = format!("{axial}, {most}: {} of {first}", estimate.largest());
+                assert!((1..=most).contains(&estimate.corrections), "{what}");
+                assert!(estimate.largest() <= enough, "{what}");
+            }
+            assert_eq!(work.factorizations, 1);
+        }
+    }
+}

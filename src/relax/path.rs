@@ -1,0 +1,149 @@
+//! The path on which a leaf is loaded, and which defines the equilibrium that a relaxation finds.
+//!
+//! The veins of the natural leaf are in their rest shapes, apart and unloaded. Slowly, so that the
+//! leaf is at rest all the time, first the loads are put on in proportion, the tips keeping their
+//! distances from each other, then the tips are moved
+//! together while the tissue between the veins is put on. As long as this
+//! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
+//! method. Where stability is lost the leaf moves on, down its energy (`loading::snap`).
+//!
+//! The loads come first because straight veins of unequal chords that are compressed before
+//! they are bent buckle at once, to either side; after their loads they are bent already.
+
+use crate::words;
+use serde::Serialize;
+use std::fmt;
+
+words! {
+    /// Which equilibrium a relaxation finds, where there are several.
+    #[derive(Default)]
+    pub enum Route {
+        /// That of a leaf which is loaded slowly: see [`Path`].
+        #[default]
+        Loading = "loading",
+        /// That in which a leaf comes to rest which is released under all of its loads, with
+        /// its tips together and its veins bent to circular arcs.
+        Release = "release",
+    }
+}
+
+words! {
+    /// A stage of the path.
+    pub enum Stage {
+        /// The loads are put on.
+        Loading = "loading",
+        /// The tips are moved together, and the tissue is put on.
+        Joining = "joining",
+    }
+}
+
+/// Where the stability of the path was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// The stage.
+    pub stage: Stage,
+    /// The part of it, from 0 to 1.
+    pub part: f64,
+    /// What happened.
+    #[serde(flatten)]
+    pub happening: Happening,
+}
+
+/// How the stability of a path was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Happening {
+    /// The equilibrium ended at a fold: the leaf moved to another one.
+    Snapped,
+    /// The equilibrium became unstable: the leaf turned aside.
+    Branched {
+        /// Whether to turn to the other side was as good: a mirror image.
+        equally_open: bool,
+    },
+}
+
+/// How the leaf came to its equilibrium.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Path {
+    /// Loaded slowly; stable all the way if nothing happened.
+    Loaded {
+        /// What happened.
+        events: Vec<Event>,
+        /// Whether two grids lead to the same equilibrium.
+        confirmed: bool,
+    },
+    /// Released.
+    Released,
+}
+
+impl Path {
+    /// Stable all the way.
+    pub const STABLE: Path = Path::Loaded {
+        events: Vec::new(),
+        confirmed: true,
+    };
+
+    /// What happened on it.
+    pub fn events(&self) -> &[Event] {
+        match self {
+            Path::Loaded { events, .. } => events,
+            Path::Released => &[],
+        }
+    }
+
+    /// What is not certain about it, where this route was meant.
+    pub(super) fn doubt(&self, meant: Route) -> Option<String> {
+        match self {
+            Path::Loaded {
+                confirmed: false, ..
+            } => Some(UNCONFIRMED.into()),
+            Path::Released if meant == Route::Loading => Some(INSTEAD.into()),
+            _ => None,
+        }
+    }
+
+    /// The word for it in files.
+    pub fn word(&self) -> &'static str {
+        let snapped = |event: &Event| event.happening == Happening::Snapped;
+        match self {
+            Path::Released => "released",
+            Path::Loaded { events, .. } if events.is_empty() => "stable-throughout",
+            Path::Loaded { events, .. } if events.iter().any(snapped) => "snapped",
+            Path::Loaded { .. } => "branched",
+        }
+    }
+}
+
+/// Remark on a path whose events lead elsewhere on another grid.
+const UNCONFIRMED: &str = "where the leaf lost its stability while it was loaded, it moves to different equilibria on \
+     different grids: this is one in which it can rest; relax with --all looks for the others";
+
+/// Remark on a leaf whose path could not be followed.
+const INSTEAD: &str = "slow loading could not be followed to its end: the leaf was released from arcs under all of its \
+     loads instead, and may rest elsewhere than slow loading leads";
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let percent = 100.0 * self.part;
+        let what = match self.happening {
+            Happening::Snapped => "snapped",
+            Happening::Branched { equally_open: true } => "turned to one of two equal sides",
+            Happening::Branched { .. } => "turned aside",
+        };
+        write!(f, "{what} at {percent:.0} % of {}", self.stage)
+    }
+}
+
+/// As the keys `path` and, if anything happened, `path_events`.
+impl Serialize for Path {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Keys<'a> {
+            path: &'static str,
+            #[serde(skip_serializing_if = "<[Event]>::is_empty")]
+            path_events: &'a [Event],
+        }
+        let (path, path_events) = (self.word(), self.events());
+        Keys { path, path_events }.serialize(serializer)
+    }
+}

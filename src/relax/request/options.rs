@@ -1,0 +1,139 @@
+//! Options of a relaxation, and the errors of requests that cannot be met.
+
+use std::fmt;
+
+use crate::limit::Limit;
+use crate::memory::TooMuch;
+use crate::refusal::RefusedOption;
+use crate::relax::path::Route;
+use crate::relax::request::method::Method;
+use crate::shooting;
+use glam::DVec3;
+
+/// Options of a relaxation.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+    /// Which equilibrium is meant, where there are several (semi-implicit and explicit method).
+    pub route: Route,
+    /// A force along the lab axes, of any size, that decides to which side a slowly loaded leaf
+    /// turns where both are equally open; zero: down, then to the left, then forward.
+    pub leaning: DVec3,
+    /// Replaces the scenario's tolerance.
+    pub tolerance: Option<f64>,
+    /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];
+    /// their time is not measured. 0: none. The signs of their eigenvalues are compared with
+    /// the Morse index, and finer grids decide where they differ.
+    pub modes: usize,
+    /// Whether their shapes are requested. Without them modes of large leaves are left out,
+    /// and eigenvalues are slightly less accurate.
+    pub mode_shapes: bool,
+    /// Whether the leaf is requested at the nodes of the finest grid, not only at those of the
+    /// coarsest (semi-implicit and explicit method).
+    pub every_node: bool,
+    /// The number of equal parts of a vein at whose ends the tolerance must be kept, too: where
+    /// interpolation loses more, the leaf is solved with a smaller tolerance.
+    pub stations: Option<usize>,
+    /// Time limit and cancellation: a run that is stopped ends not at rest.
+    pub limit: Limit,
+}
+
+/// Progress of a run.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress {
+    /// Of a relaxation.
+    Relaxing {
+        /// Segments per rod of the present grid.
+        grid: usize,
+        /// Step on that grid.
+        step: usize,
+        /// Size of that step: largest rotation or displacement, in radians or
+        /// lengths of the leaf. It goes to zero as the leaf comes to rest.
+        residual: f64,
+    },
+    /// Of a shooting.
+    Shooting(shooting::Correction),
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Progress::Relaxing {
+                grid,
+                step,
+                residual,
+            } => write!(
+                f,
+                "{grid} segments a vein, step {step}, residual {residual:.1e}"
+            ),
+            Progress::Shooting(now) if now.way < 1.0 => write!(
+                f,
+                "shooting, {:.0} % of the way, correction {:.1e}",
+                100.0 * now.way,
+                now.size
+            ),
+            Progress::Shooting(now) if now.linearized < 1.0 => write!(
+                f,
+                "shooting, step {}, {:.0} % of its linearisation",
+                now.iteration,
+                100.0 * now.linearized
+            ),
+            Progress::Shooting(now) => write!(
+                f,
+                "shooting, step {}, correction {:.1e}",
+                now.iteration, now.size
+            ),
+        }
+    }
+}
+
+/// Smallest tolerance that double precision can keep.
+pub const SMALLEST_TOLERANCE: f64 = 1e-12;
+
+/// Largest meaningful tolerance.
+pub const LARGEST_TOLERANCE: f64 = 0.1;
+
+/// What a tolerance must be.
+const TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the largest rod length; double \
+     precision does not carry more)";
+
+/// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
+pub const MAX_NODES: usize = 4_000_000;
+
+/// Largest number of modes.
+pub const MOST_MODES: usize = 100;
+
+/// Largest number of intervals of a shooting.
+pub const MAX_INTERVALS: usize = 4096;
+
+/// Checks that a tolerance is in range.
+pub fn check_tolerance(tolerance: f64) -> Result<(), RefusedOption> {
+    match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+        true => Ok(()),
+        false => Err(RefusedOption::new("tolerance", tolerance, TOLERANCES)),
+    }
+}
+
+/// A request that cannot be met.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RelaxError {
+    /// An option has a value that it cannot have.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
+    /// Too many nodes.
+    #[error(
+        "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (7 to 24 GB); use fewer rods or segments"
+    )]
+    TooManyNodes {
+        /// Number of rods.
+        rods: usize,
+        /// Segments per rod.
+        segments: usize,
+        /// Their product.
+        nodes: usize,
+    },
+    /// Too much memory.
+    #[error("{0}")]
+    Memory(#[from] TooMuch),
+}

@@ -1,0 +1,382 @@
+//! The result of a relaxation: the shape, its accuracy and its stability.
+
+use crate::newton::Work;
+use crate::numbers::power_of_ten;
+use crate::relax::path::Path;
+use crate::relax::request::method::Method;
+use crate::relax::result::margin::Margin;
+use crate::relax::saddle::Saddle;
+use crate::shape;
+use crate::shape::RodShape;
+use crate::undulation::Undulation;
+use crate::words;
+use glam::DVec3;
+use serde::{Serialize, Serializer};
+
+words! {
+    /// How a run ended.
+    pub enum Outcome {
+        /// At rest in a stable equilibrium, within the tolerance.
+        Converged = "converged",
+        /// As `Converged`, but a saddle was reached before: the leaf was pushed off along the
+        /// unstable mode and came to rest elsewhere.
+        ConvergedAfterSaddle = "converged-after-saddle",
+        /// At rest within the tolerance in an unstable equilibrium, as allowed by the options.
+        Saddle = "saddle",
+        /// At rest, but the finest grid allowed does not reach the tolerance.
+        ToleranceNotReached = "tolerance-not-reached",
+        /// The step limit was reached before rest.
+        NotAtRest = "not-at-rest",
+        /// The equations are singular: at a bifurcation, or where the leaf can move
+        /// without resistance.
+        Singular = "singular",
+        /// Energy grew beyond what the method allows, or a value was not finite.
+        Diverged = "diverged",
+    }
+}
+
+impl Outcome {
+    /// Whether the leaf is at rest, to the tolerance or not.
+    pub fn is_at_rest(self) -> bool {
+        self.is_success() || self == Outcome::ToleranceNotReached
+    }
+
+    /// Whether the leaf is at rest within the tolerance (exit status 0).
+    pub fn is_success(self) -> bool {
+        matches!(
+            self,
+            Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle
+        )
+    }
+}
+
+/// The model that was solved, and the effects of shear and stretch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Model {
+    /// Rods solved for; the others are their mirror images.
+    #[serde(skip)]
+    pub rods: usize,
+    /// Whether nothing acts out of the leaf's plane, which it does not leave.
+    #[serde(skip)]
+    pub planar: bool,
+    /// A description of the model, with the grids.
+    #[serde(rename = "model")]
+    pub description: String,
+    /// Largest displacement, in units of length, that would follow from
+    /// neglecting shear, to first order, on the coarsest grid.
+    pub shear_effect: Option<f64>,
+    /// The same for stretch.
+    pub stretch_effect: Option<f64>,
+}
+
+impl Model {
+    /// Of a leaf of `veins` rods, solved for `rods` of them, in a plane or not, on grids
+    /// of these `segments`; the effects are those of shear and stretch.
+    pub fn new(
+        veins: usize,
+        (rods, planar): (usize, bool),
+        segments: &[usize],
+        [shear_effect, stretch_effect]: [Option<f64>; 2],
+    ) -> Self {
+        let mirrored = rods < veins;
+        let mut phrases = vec![match mirrored {
+            true => format!("{rods} of {veins} veins, the others are their mirror images"),
+            false if veins == 1 => "1 vein".into(),
+            false => format!("all {veins} veins"),
+        }];
+        if planar {
+            phrases.push("planar".into());
+        }
+        if !segments.is_empty() {
+            let grids: Vec<String> = segments.iter().map(usize::to_string).collect();
+            phrases.push(format!("{} segments", grids.join("+")));
+        }
+        if mirrored {
+            phrases.push("stable against breaking the mirror".into());
+        }
+        if planar {
+            phrases.push("stable out of the plane".into());
+        }
+        for (effect, what) in [(shear_effect, "shear"), (stretch_effect, "stretch")] {
+            if let Some(effect) = effect {
+                phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
+            }
+        }
+        Model {
+            rods,
+            planar,
+            description: phrases.join("; "),
+            shear_effect,
+            stretch_effect,
+        }
+    }
+}
+
+/// A mode of small free vibration without damping: sin(omega t) times its shape, or exp(gamma
+/// t) where the equilibrium is unstable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// omega^2, or -gamma^2 if negative: the eigenvalue of the energy's Hessian with respect
+    /// to the masses, per time squared.
+    pub eigenvalue: f64,
+    /// Bound on its error; `None` on a single grid.
+    pub error: Option<f64>,
+    /// Displacement of the nodes of [`Shape::curves`], one list per rod. The largest is as
+    /// long as the longest rod; for a mode that rotates the rods without displacing them, the
+    /// largest rotation is 1. Empty unless shapes were requested.
+    pub displacement: Vec<Vec<DVec3>>,
+    /// Rotation vector of these nodes, along the lab axes, radians.
+    pub rotation: Vec<Vec<DVec3>>,
+}
+
+impl Mode {
+    /// Angular frequency omega, radians per time: zero if the mode is neutral, `None` if it is
+    /// unstable.
+    pub fn frequency(&self) -> Option<f64> {
+        match self.is_neutral() {
+            true => Some(0.0),
+            false => (self.eigenvalue >= 0.0).then(|| self.eigenvalue.sqrt()),
+        }
+    }
+
+    /// Rate gamma at which the leaf leaves an unstable equilibrium, per time.
+    pub fn growth(&self) -> Option<f64> {
+        let unstable = self.eigenvalue < 0.0 && !self.is_neutral();
+        unstable.then(|| (-self.eigenvalue).sqrt())
+    }
+
+    /// Whether the eigenvalue is zero within its error.
+    pub fn is_neutral(&self) -> bool {
+        (self.error).is_some_and(|error| self.eigenvalue.abs() <= error)
+    }
+}
+
+/// The accuracy of a result, and that requested.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// Segments per rod of each grid used, coarse to fine; none for shooting.
+    pub segments: Vec<usize>,
+    /// Intervals of the shooting.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<usize>,
+    /// Requested accuracy, relative to the largest rod length.
+    pub tolerance: f64,
+    /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L (A: the leaf's mean
+    /// bending stiffness, L: largest rod length). For shooting: the largest defect
+    /// ([`crate::shooting::Solution::defect`]), if it found a solution.
+    pub residual: Option<f64>,
+    /// Bound on the error of the positions, in units of length; `None` on a single grid.
+    pub error_estimate: Option<f64>,
+    /// Bound on the error of the energy, where it is larger than that of the positions, relative
+    /// to the length, lets expect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_error: Option<f64>,
+}
+
+/// Whether an equilibrium is stable, as far as that is known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Stability {
+    /// Morse index: negative eigenvalues of the energy's Hessian. `None` if
+    /// the leaf is not at rest.
+    #[serde(flatten, serialize_with = "serialize_index")]
+    pub negative_eigenvalues: Option<usize>,
+    /// Number of directions in which the leaf can move without resistance, as round veins
+    /// clamped in line can: eigenvalues that are exactly zero, at no bifurcation.
+    pub neutral_directions: usize,
+    /// The lowest modes, ascending, without omissions. `None` if they were not requested or
+    /// not found, if the leaf is not at rest, or for shooting.
+    #[serde(flatten, serialize_with = "serialize_eigenvalues")]
+    pub modes: Option<Vec<Mode>>,
+    /// Whether the shapes of the modes were requested.
+    #[serde(skip)]
+    pub mode_shapes: bool,
+    /// A saddle that was reached and left.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub saddle: Option<Saddle>,
+}
+
+/// The reaction at a held tip: what the leaf exerts on its holder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reaction {
+    /// The force.
+    #[serde(rename = "tip_reaction")]
+    pub force: DVec3,
+    /// For a clamp, the moments of the rods about the tip.
+    #[serde(
+        rename = "tip_reaction_moments",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub moments: Option<Vec<DVec3>>,
+}
+
+/// Derivatives of the results of a leaf at rest with respect to a number of its scenario, in
+/// the scenario's units.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The number.
+    pub key: String,
+    /// Its value.
+    pub value: f64,
+    /// Derivative of the joint tip alone, or one per rod.
+    #[serde(flatten, serialize_with = "shape::serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Bound on its error; `None` on a single grid.
+    pub tip_error: Option<f64>,
+    /// Derivative of the energy.
+    pub energy: f64,
+    /// Bound on its error.
+    pub energy_error: Option<f64>,
+    /// Derivative of the lowest eigenvalue (the squared frequency), if it is known.
+    pub lowest_eigenvalue: Option<f64>,
+    /// Bound on its error.
+    pub lowest_eigenvalue_error: Option<f64>,
+    /// Derivatives of the frequencies of the requested modes, in cycles per time; none for an
+    /// unstable mode, and for a nearly rigid leaf only the lowest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frequencies: Vec<Option<f64>>,
+    /// Derivative of the reaction at the tip, if it is held.
+    #[serde(flatten)]
+    pub reaction: Option<Reaction>,
+    /// Bound on the error of its force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_reaction_error: Option<f64>,
+    /// Fractions of the length that the nodes of all grids have in common.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
+    /// Derivatives of the positions there, rod after rod; none if too many numbers are
+    /// requested to solve the equations for each.
+    #[serde(skip)]
+    pub positions: Vec<Vec<DVec3>>,
+    /// Bound on their error.
+    #[serde(skip)]
+    pub positions_error: Option<f64>,
+}
+
+/// The shape of a leaf.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shape {
+    /// Fractions of the length at which `rods` are given, base to tip.
+    pub stations: Vec<f64>,
+    /// Nodes at the stations, extrapolated if several grids were used.
+    #[serde(rename = "positions", serialize_with = "shape::serialize_positions")]
+    pub rods: Vec<RodShape>,
+    /// Whether the tips share one point.
+    #[serde(skip)]
+    pub joined: bool,
+    /// Centerlines on the finest grid, one per rod, for drawing.
+    #[serde(skip)]
+    pub curves: Vec<Vec<DVec3>>,
+    /// Fractions of the length at which these are given.
+    #[serde(skip)]
+    pub curve_stations: Vec<f64>,
+}
+
+impl Shape {
+    /// Length of the longest rod.
+    pub fn longest(&self) -> f64 {
+        self.rods.iter().map(|rod| rod.length).fold(0.0, f64::max)
+    }
+}
+
+/// A leaf at rest (or in its last state), in the units of its scenario. As JSON it is
+/// `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Equilibrium {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The method.
+    pub method: Method,
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// Advice if the run did not succeed: one sentence for the user.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+    /// Implausible properties: a leaf that is stretched far, inverted, or too long for its
+    /// weight and stiffness; and an uncertain stability.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
+    /// Number of rods.
+    #[serde(rename = "rods")]
+    pub rod_count: usize,
+    /// How accurate it is.
+    #[serde(flatten)]
+    pub accuracy: Accuracy,
+    /// Total potential energy; `None` where shooting found no solution.
+    pub energy: Option<f64>,
+    /// The joint tip alone, or one tip per rod.
+    #[serde(flatten, serialize_with = "shape::serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Sum over the rods of the force each passes to its tip.
+    pub tip_force_sum: DVec3,
+    /// The reaction at the tip, if it is held.
+    #[serde(flatten)]
+    pub reaction: Option<Reaction>,
+    /// Whether it is stable.
+    #[serde(flatten)]
+    pub stability: Stability,
+    /// How the leaf came to this equilibrium: `None` for shooting, under a dead moment, and where
+    /// an unstable one was looked for.
+    #[serde(flatten)]
+    pub path: Option<Path>,
+    /// Derivatives of the results with respect to the requested numbers of the scenario.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivities: Option<Vec<Sensitivity>>,
+    /// The stability margin, if it was requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin: Option<Margin>,
+    /// Waves and twist of the veins on the finest grid.
+    pub undulation: Undulation,
+    /// The model that was solved.
+    #[serde(flatten)]
+    pub model: Model,
+    /// Work done.
+    pub work: Work,
+    /// Time of the solve alone, in seconds.
+    pub wall_seconds: f64,
+    /// The shape.
+    #[serde(flatten)]
+    pub shape: Shape,
+}
+
+impl Equilibrium {
+    /// Whether the equilibrium is stable: no negative eigenvalue.
+    pub fn stable(&self) -> Option<bool> {
+        (self.stability.negative_eigenvalues).map(|count| count == 0)
+    }
+}
+
+/// A Morse index as the keys `stable` and `negative_eigenvalues`.
+pub fn serialize_index<S: Serializer>(
+    index: &Option<usize>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys {
+        stable: Option<bool>,
+        negative_eigenvalues: Option<usize>,
+    }
+    Keys {
+        stable: index.map(|count| count == 0),
+        negative_eigenvalues: *index,
+    }
+    .serialize(serializer)
+}
+
+/// Modes as the keys `lowest_eigenvalues` and `eigenvalue_errors`; errors are given only if
+/// all are known.
+fn serialize_eigenvalues<S: Serializer>(
+    modes: &Option<Vec<Mode>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys {
+        lowest_eigenvalues: Option<Vec<f64>>,
+        eigenvalue_errors: Option<Vec<f64>>,
+    }
+    let modes = modes.as_deref();
+    Keys {
+        lowest_eigenvalues: modes.map(|modes| modes.iter().map(|mode| mode.eigenvalue).collect()),
+        eigenvalue_errors: modes.and_then(|modes| modes.iter().map(|mode| mode.error).collect()),
+    }
+    .serialize(serializer)
+}

@@ -1,0 +1,7 @@
+//! What was found, in the units of the scenario.
+
+pub mod equilibrium;
+pub mod margin;
+pub mod plausible;
+pub mod report;
+pub mod stations;

@@ -1,0 +1,356 @@
+//! From the settled grids to the result in the units of the scenario.
+
+use crate::leaf::{Grid, RodFields};
+use crate::newton::Stop;
+use crate::relax::accuracy::nodal_fields::with_sign_of;
+use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::path::{Event, Happening, Path, Stage};
+use crate::relax::request::method::Method;
+use crate::relax::result::equilibrium::{
+    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
+};
+use crate::relax::settle::run::{Run, energies};
+use crate::relax::transfer::level::{Level, flat};
+use crate::relax::transfer::strains;
+use crate::scenario::{Scenario, obstacle};
+use crate::shape::RodShape;
+use crate::undulation::{Centerline, Undulation};
+use glam::DVec3;
+
+/// Assembles the result.
+pub fn equilibrium(
+    run: &Run,
+    outcome: Outcome,
+    remark: Option<String>,
+    wall_seconds: f64,
+) -> Equilibrium {
+    let finest = run.levels.last().expect("the grid it failed on, at least");
+    let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
+    let columns = run.table.columns();
+    let error = run.error();
+    let (stations, rods, between) = fields(run, error.unwrap_or(0.0));
+    let joined = run.leaf.joined();
+    debug_assert!(!joined || finest.state.tips_meet());
+    let tips = rods.iter().take(if joined { 1 } else { rods.len() });
+    let tips = tips.filter_map(|rod| rod.nodes.last());
+    let error_estimate = error.map(|error| (error + between) * scale.length);
+    let (grid, lines) = centerlines(run, finest);
+    let (energy, energy_error) = potential(run, columns);
+    let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
+    let segments: Vec<usize> = run
+        .levels
+        .iter()
+        .map(|level| level.leaf.segments())
+        .collect();
+    Equilibrium {
+        scenario: scenario.name.clone(),
+        method: run.options.method,
+        outcome,
+        remark,
+        doubts: Vec::new(),
+        rod_count: rods.len(),
+        energy: Some(energy * scale.moment()),
+        tips: tips.map(|node| node.position).collect(),
+        tip_force_sum: rods.iter().map(tip_force).sum(),
+        reaction: reaction(&run.levels, columns),
+        stability: Stability {
+            negative_eigenvalues: run.index,
+            neutral_directions: neutral_directions(scenario, &rods),
+            modes: None,
+            mode_shapes: run.options.mode_shapes,
+            saddle: run.saddle,
+        },
+        path: path(run),
+        sensitivities: None,
+        margin: None,
+        undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
+        model: Model::new(
+            rods.len(),
+            (
+                run.solved,
+                run.planar && run.index == Some(0) && flat(finest),
+            ),
+            &segments,
+            (run.effects).map(|effect| effect.map(|effect| effect * scale.length)),
+        ),
+        accuracy: Accuracy {
+            segments,
+            intervals: None,
+            tolerance: run.tolerance,
+            residual: Some(finest.leaf.residual(&finest.state)),
+            error_estimate,
+            energy_error: energy_error.map(|error| error * scale.moment()),
+        },
+        work: run.work,
+        wall_seconds,
+        shape: Shape {
+            stations,
+            rods,
+            joined,
+            curves: (lines.iter())
+                .map(|line| line.iter().map(|(x, _)| *x).collect())
+                .collect(),
+            curve_stations: grid.sigma().to_vec(),
+        },
+    }
+}
+
+/// Directions in which a leaf of this shape can move without resistance.
+pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
+    scenario.neutral_directions(|j| rods[j].nodes.iter().map(|node| node.position))
+}
+
+/// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
+/// belongs to it.
+fn path(run: &Run) -> Option<Path> {
+    let mut path = run.path.clone()?;
+    if let Path::Loaded { events, .. } = &mut path
+        && run.saddle.is_some()
+    {
+        let joins = run.leaf.joined() && run.leaf.rods() > 1;
+        events.push(Event {
+            stage: if joins {
+                Stage::Joining
+            } else {
+                Stage::Loading
+            },
+            part: 1.0,
+            happening: Happening::Branched {
+                equally_open: false,
+            },
+        });
+    }
+    Some(path)
+}
+
+/// Segments of the coarsest grid from which on its nodes are enough stations.
+const STATIONS: usize = 8;
+
+/// Stations, the rods there in the scenario's units, and the error of the positions in addition
+/// to `error`, that at the nodes of the coarsest grid. The stations are these nodes or, if they
+/// are few, those of the next grid, and all if every node is requested: of a leaf that was
+/// integrated to the tolerance those of the integration, otherwise those of the finest grid that
+/// keeps the tolerance between the nodes of the coarsest.
+fn fields(run: &Run, error: f64) -> (Vec<f64>, Vec<RodShape>, f64) {
+    let (first, finest) = (&run.levels[0].leaf.grid, &run.levels[run.levels.len() - 1]);
+    let (every_node, few) = (run.options.every_node, first.segments() < STATIONS);
+    let (grid, rods, between) = match run.integrated() {
+        Some((estimate, integrated)) => {
+            let grid = match every_node {
+                true => estimate.grid.clone(),
+                false if few && estimate.grid != *first => first.refined(),
+                false => first.clone(),
+            };
+            let stride = estimate.grid.segments() / grid.segments();
+            let rod = |(j, rod): (usize, &Vec<RodFields>)| {
+                // Quaternions have the signs of the finest grid.
+                let mut q = finest.state.q[finest.state.base(j)];
+                let node = |node: &RodFields| {
+                    q = with_sign_of(node.q, q);
+                    RodFields {
+                        q: q.normalize(),
+                        ..*node
+                    }
+                };
+                rod.iter().step_by(stride).map(node).collect()
+            };
+            let rods = estimate.rods.iter().enumerate().map(rod).collect();
+            (grid, rods, (integrated - error).max(0.0))
+        }
+        None => {
+            let wanted = match every_node {
+                true => run.levels.len(),
+                false => run.levels.len().min(1 + usize::from(few)),
+            };
+            let (reached, rods, between) = run.finer_nodes(wanted);
+            (run.levels[reached].leaf.grid.clone(), rods, between)
+        }
+    };
+    let leaf = run.leaf;
+    let rod = |(j, rod): (usize, &Vec<RodFields>)| {
+        let nodes = rod.iter().zip(grid.sigma());
+        let nodes = nodes.map(|(fields, sigma)| strains::node_of(leaf, (j, *sigma), fields));
+        RodShape {
+            length: leaf.length(j) * leaf.scale.length,
+            nodes: nodes.collect(),
+        }
+    };
+    let rods = rods.iter().enumerate().map(rod).collect();
+    (grid.sigma().to_vec(), rods, between)
+}
+
+/// The reaction at a held tip, after `columns` extrapolations.
+fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
+    let leaf = &levels[0].leaf.leaf;
+    let held = leaf.held.as_ref()?;
+    let on = |level: &Level| {
+        let (force, moments) = level.leaf.reaction(&level.state);
+        let all = [force].into_iter().chain(moments);
+        let values = all.flat_map(|it| it.to_array()).collect();
+        (level.leaf.segments(), values)
+    };
+    let table: Richardson = levels.iter().map(on).collect();
+    let mut vectors = table.column(columns).chunks(3).map(DVec3::from_slice);
+    let force = vectors.next()? * leaf.scale.force();
+    let moments = vectors.map(|moment| moment * leaf.scale.moment()).collect();
+    Some(Reaction {
+        force,
+        moments: held.clamps.is_some().then_some(moments),
+    })
+}
+
+/// The potential energy: integrated along the leaf, with an error of second order in the
+/// defect, or after `columns` extrapolations, or fewer where it does not converge as these assume;
+/// its error, if that is larger than that of positions lets expect.
+fn potential(run: &Run, columns: usize) -> (f64, Option<f64>) {
+    if let Some(estimate) = &run.estimate {
+        return (estimate.energy, None);
+    }
+    let table = energies(&run.levels);
+    let Some(best) = table.best() else {
+        return (table.column(columns)[0], None);
+    };
+    let energy = table.column(columns.min(best.columns))[0];
+    let expected = run.error().unwrap_or(f64::INFINITY) * energy.abs();
+    (energy, (best.error > expected).then_some(best.error))
+}
+
+/// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
+/// the integration, in units of the scenario.
+fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline>) {
+    let length = run.leaf.scale.length;
+    if let Some(estimate) = run.corrected() {
+        let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
+        return (&estimate.grid, estimate.rods.iter().map(line).collect());
+    }
+    let n = finest.leaf.segments();
+    let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);
+    let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
+    let lines = bases.map(|base| (base..=base + n).map(node).collect());
+    (&finest.leaf.grid, lines.collect())
+}
+
+/// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
+/// of advice where one helps.
+pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
+    let finest = run.levels.last().map_or(0, |level| level.leaf.segments());
+    let explicit = matches!(run.options.method, Method::Explicit { .. });
+    match end {
+        Ok(true) => (
+            match (run.index, run.saddle) {
+                (Some(1..), _) => Outcome::Saddle,
+                (_, Some(_)) => Outcome::ConvergedAfterSaddle,
+                _ => Outcome::Converged,
+            },
+            run.index.is_none().then(|| match run.leaf.loads.tip_moment == DVec3::ZERO {
+                true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
+                     its stability is not known".into(),
+                false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
+            }),
+        ),
+        Ok(false) => (
+            Outcome::ToleranceNotReached,
+            Some(match run.beyond_rounding(2 * finest) {
+                true => "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one".into(),
+                false => format!(
+                    "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
+                ),
+            }),
+        ),
+        Err(Stop::Stuck) => (
+            Outcome::Diverged,
+            Some(format!(
+                "no step lowers the energy on {finest} segments{}",
+                advice(run)
+            )),
+        ),
+        Err(stop) => (
+            Outcome::NotAtRest,
+            Some(match stop {
+                Stop::StepLimit if run.out_of_time() => format!(
+                    "the time allowed was over before rest on {finest} segments: allow more"
+                ),
+                Stop::StepLimit if explicit => format!(
+                    "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
+                ),
+                Stop::Memory => format!(
+                    "the factorised matrix of the leaf on {finest} segments does not fit into the memory that is allowed: use fewer rods or segments, or raise the limit on memory"
+                ),
+                Stop::Unresolved => format!(
+                    "a vein bends by more than a right angle within one of {finest} segments{}",
+                    advice(run)
+                ),
+                Stop::StepLimit if run.keeps_unstable() => format!(
+                    "Newton's method leads to no equilibrium from this start on {finest} segments: let the leaf relax, which moves it to a stable one"
+                ),
+                _ => format!(
+                    "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
+                    advice(run)
+                ),
+            }),
+        ),
+    }
+}
+
+/// Loads that advice names, as a part of the largest.
+const COUNTS: f64 = 0.1;
+
+/// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
+/// of its loads, and the softest stiffness of the vein that bends most.
+fn advice(run: &Run) -> String {
+    if let Some(slip) = obstacle(run.leaf.scenario()) {
+        return format!(": {slip}");
+    }
+    let Some(level) = run.levels.last() else {
+        return String::new();
+    };
+    let bends = |j: usize| {
+        let base = level.state.base(j);
+        let rate = |i: usize| {
+            let ends = [level.state.q[base + i], level.state.q[base + i + 1]];
+            ends[0].angle_between(ends[1]) / level.leaf.section(j, i).ds
+        };
+        (0..level.leaf.segments()).map(rate).fold(0.0, f64::max)
+    };
+    let rods = 0..level.leaf.rods();
+    let vein = rods
+        .max_by(|&a, &b| bends(a).total_cmp(&bends(b)))
+        .unwrap_or(0);
+    let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
+    let loads = run.leaf.loads;
+    let [weight, tip, moment] =
+        [loads.gravity, loads.tip_force, loads.tip_moment].map(|load| load.length());
+    // Along the directors at the base a moment shows what it turns; forces turn by their arms.
+    let base = level.state.q[level.state.base(vein)];
+    let turned = match moment > weight.max(tip) {
+        true => (base.conjugate() * loads.tip_moment).abs() / stiffness,
+        false => stiffness.recip(),
+    };
+    let softest = ["torsion", "bending_2", "bending_3"][turned.max_position()];
+    let named = [
+        (weight * run.leaf.rods() as f64, "load.gravity"),
+        (tip, "load.tip_force"),
+        (moment, "load.tip_moment"),
+    ];
+    let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
+    let counts = |(size, _): &&(f64, _)| *size > COUNTS * largest;
+    let loads: Vec<&str> = named.iter().filter(counts).map(|(_, name)| *name).collect();
+    let load = match loads.is_empty() {
+        true => "the curvatures at rest".to_owned(),
+        false => loads.join(" or "),
+    };
+    let reached = match run.reached {
+        Some((stage, part)) if part > 0.0 => {
+            format!(" (it came to rest up to {:.2} % of {stage})", 100.0 * part)
+        }
+        _ => String::new(),
+    };
+    let otherwise = match moment > 0.0 && run.leaf.held.is_none() {
+        true => ", or try the method shooting",
+        false => "",
+    };
+    format!(
+        "{reached}: lower {load}, or raise stiffness.{softest} of vein {}{otherwise}",
+        vein + 1
+    )
+}

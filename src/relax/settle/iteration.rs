@@ -1,0 +1,264 @@
+//! The iteration to equilibrium on one grid.
+
+use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
+use crate::newton::{Definite, Newton, Stop};
+use crate::relax::request::method::{Method, SemiImplicit};
+use crate::relax::request::options::Progress;
+use crate::relax::saddle;
+use crate::relax::saddle::saddle_of;
+use crate::relax::settle::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
+use crate::relax::settle::run::{BUDGET, Run, is_large};
+use crate::relax::settle::start::{disturb, start};
+use crate::relax::transfer::level::Level;
+use glam::DVec3;
+
+/// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
+/// coarse, a looser one saves a step on the finest. On a grid that may be the only one it is
+/// estimated, and subtracted, with the error of the grid.
+const ITERATION_PART: f64 = 1e-3;
+const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+const ITERATION_PART_ALONE: f64 = 5e-2;
+
+/// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
+const FIXED_ACCURACY: f64 = 1e-12;
+
+/// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
+/// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
+const LEAST_EVALUATIONS: (usize, usize) = (600, 100);
+const COARSE: usize = 64;
+
+/// Newton iterations towards an equilibrium of any kind.
+const MAX_ITERATIONS: usize = 200;
+
+/// Saddles that are left before the run fails.
+pub const MAX_SADDLES: i32 = 10;
+
+/// Accuracy, in the energy norm, of the effects of shear and stretch: stretch dominates this
+/// norm, to which displacements contribute little.
+const EFFECT_ACCURACY: f64 = 1e-5;
+
+/// The initial guess of the iteration on a grid.
+pub enum InitialGuess {
+    /// The start of the scenario, disturbed if requested.
+    Start,
+    /// The equilibrium of the next coarser grid, prolonged.
+    Coarser(State),
+    /// The equilibrium predicted from those on several coarser grids.
+    Predicted(State),
+    /// A state displaced from a saddle along its unstable mode.
+    Pushed(State),
+}
+
+/// The end of the iteration on a grid, converged or not.
+pub struct Settled {
+    pub level: Level,
+    /// The remaining iteration error.
+    pub rest: Result<f64, Stop>,
+    /// Whether it had to move through states of non-convex energy, instead of settling in the
+    /// valley of the initial guess.
+    pub moved: bool,
+}
+
+impl Run<'_, '_> {
+    /// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
+    /// resistance leans down.
+    pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
+        let mut settled = self.settle_from(grid, guess);
+        let Level { leaf, state } = &mut settled.level;
+        leaf.lean_down(state);
+        settled
+    }
+
+    fn settle_from(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
+        let mut leaf = DiscreteLeaf::new(self.leaf, grid);
+        let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
+        let from_start = matches!(guess, InitialGuess::Start);
+        let grip = leaf.leaf.held.is_some() && from_start;
+        let cg_tolerance = match guess {
+            InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
+            InitialGuess::Coarser(_) => 1e-4,
+            // The interpolation error is dominated by stiff modes; the error to be removed is
+            // one of soft modes, a small part of the energy.
+            InitialGuess::Predicted(_) => 1e-8,
+        };
+        let mut state = match guess {
+            InitialGuess::Start => self.start(&leaf),
+            InitialGuess::Coarser(state)
+            | InitialGuess::Predicted(state)
+            | InitialGuess::Pushed(state) => state,
+        };
+        let mut moved = false;
+        if grip {
+            (state, near_rest, moved) = self.move_grips(&leaf, state);
+        }
+        let explicit = matches!(self.options.method, Method::Explicit { .. });
+        let dead_moment = leaf.tip_moment() != DVec3::ZERO;
+        if !explicit && !dead_moment && !self.keeps_unstable() {
+            let how = (near_rest, cg_tolerance);
+            self.spare_system = None;
+            let mut system = System::new(&leaf);
+            let begun = from_start.then(|| (state.clone(), self.work.steps));
+            let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
+            if let Some((begun, steps)) = begun {
+                let distance = begun.distance(&settled.level.state);
+                self.from_start = Some((distance, self.work.steps - steps));
+            }
+            self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
+            return Settled {
+                moved: moved || settled.moved,
+                ..settled
+            };
+        }
+        let accuracy = self.accuracy(&leaf);
+        let mut system = System::new(&leaf);
+        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
+        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
+        let mut relaxation = Relaxation {
+            near_rest,
+            moved,
+            ..Relaxation::new(state, accuracy, out, &self.options.limit)
+        };
+        let rest = match (explicit, dead_moment) {
+            (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
+            (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
+            // To the next equilibrium, stable or not.
+            _ => {
+                let newton = Newton {
+                    accuracy,
+                    iterations: MAX_ITERATIONS,
+                    work: relaxation.work,
+                    progress: relaxation.progress,
+                };
+                newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
+            }
+        };
+        let Relaxation { state, moved, .. } = relaxation;
+        if explicit {
+            self.remaining = self.remaining.max(rest.unwrap_or(0.0));
+        }
+        let level = Level { leaf, state };
+        Settled { level, rest, moved }
+    }
+
+    /// The start of a leaf without an initial guess.
+    pub(in crate::relax) fn start(&self, leaf: &DiscreteLeaf) -> State {
+        if let Some(whole) = self.whole {
+            let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
+            return half_of(self.leaf, &start(&whole));
+        }
+        let mut state = start(leaf);
+        if let Method::SemiImplicit(SemiImplicit {
+            disturbance: Some(number),
+            ..
+        }) = self.options.method
+        {
+            disturb(leaf, number, &mut state);
+        }
+        state
+    }
+
+    /// Iteration error allowed on a grid.
+    fn accuracy(&self, leaf: &DiscreteLeaf) -> f64 {
+        let first = (self.levels.first()).map_or(leaf.segments(), |first| first.leaf.segments());
+        match self.segments() {
+            Some(_) => FIXED_ACCURACY,
+            None if self.too_coarse(first) => match self.levels.is_empty() && self.may_be_alone() {
+                true => ITERATION_PART_ALONE * self.tolerance,
+                false => ITERATION_PART_FROM_COARSE * self.tolerance,
+            },
+            None => ITERATION_PART * self.tolerance,
+        }
+    }
+
+    /// Settles by the semi-implicit method.
+    fn settle_semi_implicit(
+        &mut self,
+        leaf: DiscreteLeaf,
+        state: State,
+        system: &mut System,
+        (near_rest, cg_tolerance): (bool, f64),
+    ) -> Settled {
+        let accuracy = self.accuracy(&leaf);
+        let convex_only =
+            self.whole.is_some() || self.stays_in_valley || self.too_coarse(leaf.segments());
+        let nodes = leaf.rods() * leaf.segments();
+        let (most, least) = LEAST_EVALUATIONS;
+        let granted = (most * COARSE / leaf.segments()).clamp(least, most);
+        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
+        let most_evaluations = self.work.force_evaluations + allowed;
+        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
+        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
+        let mut relaxation = Relaxation {
+            near_rest,
+            cg_tolerance,
+            solver: Definite {
+                contraction: self.contraction,
+                direct: None,
+            },
+            most_evaluations,
+            convex_only,
+            ..Relaxation::new(state, accuracy, out, &self.options.limit)
+        };
+        let mut rest = Err(Stop::StepLimit);
+        // After earlier pushes off saddles at rest, the softened leaf returned to one.
+        for pushes in self.pushes..self.pushes + MAX_SADDLES {
+            relaxation.pushes = pushes;
+            let before = relaxation.work.force_evaluations;
+            let settled = relaxation.settle(&leaf, system);
+            self.spent += nodes * (relaxation.work.force_evaluations - before);
+            if let Ok(remaining) = settled {
+                self.remaining = self.remaining.max(remaining);
+                if self.levels.is_empty() && relaxation.solver.direct.is_none() {
+                    self.effects = effects(&leaf, &relaxation.state, system);
+                }
+            }
+            if settled != Err(Stop::Saddle) || convex_only {
+                rest = settled;
+                break;
+            }
+            let state = &mut relaxation.state;
+            match saddle::polish(&leaf, state, system, relaxation.work) {
+                Some(0) => {
+                    rest = Ok(accuracy);
+                    break;
+                }
+                Some(index) => self.saddle = Some(saddle_of(&leaf, state, index)),
+                None => {}
+            }
+            saddle::push_off(&leaf, state, system, self.options.leaning, relaxation.work);
+            relaxation.near_rest = false;
+            relaxation.cg_tolerance = FAR_FROM_REST;
+            relaxation.solver.direct = None;
+        }
+        let Relaxation { state, moved, .. } = relaxation;
+        self.contraction = relaxation.solver.contraction;
+        let level = Level { leaf, state };
+        Settled { level, rest, moved }
+    }
+}
+
+/// Reports the steps on a grid of `grid` segments.
+fn step_reporter(
+    progress: &mut dyn FnMut(&Progress),
+    grid: usize,
+) -> impl FnMut(usize, f64) + use<'_> {
+    move |step, residual| {
+        progress(&Progress::Relaxing {
+            grid,
+            step,
+            residual,
+        });
+    }
+}
+
+/// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
+/// factorisation of the last iteration.
+fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
+        leaf.assemble_stiffening(state, dropped, system);
+        match system.solve(None, EFFECT_ACCURACY) {
+            Solved::Yes(_) => Some(system.largest().1),
+            _ => None,
+        }
+    })
+}

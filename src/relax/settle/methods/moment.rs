@@ -1,0 +1,236 @@
+//! A single rod under a dead moment at its tip.
+//!
+//! A moment fixed in space has no potential in three dimensions, so that
+//! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
+//! quasi-statically instead: all loads grow together from zero, in steps of
+//! about one radian of tip rotation, each followed by Newton's method with the
+//! exact, unsymmetric tangent.
+//!
+//! Where that would take too many steps, the other loads grow from the shape under the moment
+//! alone. The moment is the same along the whole rod, so that this shape can be computed
+//! segment by segment from the clamp.
+//!
+//! Where the path ends at a fold, the moment is applied before the other loads, or after them.
+
+use crate::largest::larger;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::newton::{Equations, Newton, Stop};
+use crate::relax::settle::methods::Relaxation;
+use crate::rod::{RESOLVED_TURN, Section};
+use crate::rotation;
+use glam::{DMat3, DQuat, DVec3};
+
+/// Rotation of the tip (radians) in one load step.
+const TURN_PER_STEP: f64 = 1.0;
+
+/// Newton iterations of a load step before it is halved.
+const MAX_ITERATIONS: usize = 15;
+
+/// Accuracy of all load steps but the last.
+const STEP_ACCURACY: f64 = 1e-3;
+
+/// Smallest load step, as a part of the load.
+const SMALLEST_STEP: f64 = 1e-6;
+
+/// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
+/// grid.
+const COARSE: f64 = 0.5 * RESOLVED_TURN;
+
+/// Rotation (radians) beyond which the moment is not applied in steps, and the largest number
+/// of steps of the other loads in that case.
+const LARGEST_BY_STEPS: f64 = 250.0;
+const MAX_STEPS: usize = 100;
+
+/// Newton iterations for the rotation of one segment, the step (radians) at which they end,
+/// and the step of their finite differences, radians.
+const SEGMENT_ITERATIONS: usize = 20;
+const SEGMENT_ACCURACY: f64 = 1e-13;
+const DIFFERENCE: f64 = 1e-7;
+
+/// Squared half rotation below which series replace quotients that tend to 0/0.
+const SMALL: f64 = 1e-5;
+
+/// The parts of the moment and of the other loads that are applied after a part of the loading.
+type Order = fn(f64) -> [f64; 2];
+
+/// Orders of loading: the path may end at a fold in one of them, and pass it in another.
+const ORDERS: [Order; 3] = [
+    |part| [part, part],
+    |part| [2.0 * part, 2.0 * part - 1.0],
+    |part| [2.0 * part - 1.0, 2.0 * part],
+];
+
+/// Loads the rod from its rest shape, or corrects a state near rest.
+pub fn settle(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+) -> Result<f64, Stop> {
+    if rod.near_rest {
+        return newton(leaf, system, rod, rod.accuracy);
+    }
+    if largest_turn(&leaf.leaf) > LARGEST_BY_STEPS {
+        shape_by_moment(leaf, &mut rod.state)?;
+        return load(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
+    }
+    let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
+    let softest = stiffness.fold(f64::INFINITY, f64::min);
+    let turn = leaf.leaf.loads.tip_moment.length() * leaf.leaf.length(0) / softest;
+    let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    let unloaded = rod.state.clone();
+    let mut end = Err(Stop::StepLimit);
+    for order in ORDERS {
+        rod.state.clone_from(&unloaded);
+        end = load(leaf, system, rod, order, (step, usize::MAX));
+        if end.is_ok() || end == Err(Stop::Unresolved) || rod.limit.reached() {
+            break;
+        }
+        // In the others the moment is applied in half of the loading.
+        step = 0.5 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    }
+    end
+}
+
+fn newton(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    accuracy: f64,
+) -> Result<f64, Stop> {
+    let newton = Newton {
+        accuracy,
+        iterations: MAX_ITERATIONS,
+        work: rod.work,
+        progress: rod.progress,
+    };
+    newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
+}
+
+/// Applies the loads in a given order and at most so many steps of the given size, which is
+/// halved where Newton's method fails. [`Stop::Unresolved`]: the grid is too coarse.
+fn load(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    order: Order,
+    (mut step, mut steps): (f64, usize),
+) -> Result<f64, Stop> {
+    let loads = leaf.loads;
+    let (mut reached, mut before) = (0.0, rod.state.clone());
+    let end = loop {
+        if steps == 0 || rod.limit.reached() {
+            break Err(Stop::StepLimit);
+        }
+        steps -= 1;
+        let part: f64 = (reached + step).min(1.0);
+        let [moment, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        leaf.loads.tip_moment = moment * loads.tip_moment;
+        leaf.loads.gravity = others * loads.gravity;
+        leaf.loads.tip_force = others * loads.tip_force;
+        let wanted = match part < 1.0 {
+            true => STEP_ACCURACY,
+            false => rod.accuracy,
+        };
+        match newton(leaf, system, rod, wanted) {
+            Ok(remaining) if part == 1.0 => break Ok(remaining),
+            Ok(_) => {
+                reached = part;
+                before.clone_from(&rod.state);
+            }
+            Err(stop) => {
+                rod.state.clone_from(&before);
+                step /= 2.0;
+                let mut coarse = || leaf.assemble(&before, system).turn > COARSE;
+                if step < SMALLEST_STEP || stop == Stop::Unresolved && coarse() {
+                    break Err(match coarse() {
+                        true => Stop::Unresolved,
+                        false => Stop::Stuck,
+                    });
+                }
+            }
+        }
+    };
+    leaf.loads = loads;
+    end
+}
+
+/// Upper bound on the rotation of the tip (radians) by the moment: as if only the softest
+/// stiffness resisted it.
+fn largest_turn(leaf: &Leaf) -> f64 {
+    let moment = leaf.loads.tip_moment.length();
+    let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
+    moment * leaf.length(0) / softest
+}
+
+/// The largest curvature (radians per length) of the rod under a large moment alone; `None` if
+/// the moment is small, or too large for a grid of `segments` segments.
+pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
+    if largest_turn(leaf) <= LARGEST_BY_STEPS {
+        return None;
+    }
+    let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
+    let mut base = leaf.leaf.base(0);
+    let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
+    for section in &leaf.sections {
+        turn = segment_turn(section, base, leaf.tip_moment(), turn)?;
+        largest = larger(largest, turn.length() / section.ds);
+        base = (base * rotation::exp(turn)).normalize();
+    }
+    Some(largest)
+}
+
+/// Sets the state to the shape under the moment alone.
+fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
+    let mut turn = DVec3::ZERO;
+    for (i, section) in leaf.sections.iter().enumerate() {
+        let base = state.q[i];
+        turn = segment_turn(section, base, leaf.tip_moment(), turn).ok_or(Stop::Unresolved)?;
+        let next = (base * rotation::exp(turn)).normalize();
+        state.q[i + 1] = next;
+        state.x[i + 1] =
+            state.x[i] + section.ds * (rotation::midpoint(base, next) * section.rest_strain);
+        state.n[i] = DVec3::ZERO;
+    }
+    Ok(())
+}
+
+/// S a, S being the derivative of the rotation vector psi half-way:
+/// s a + sigma y (y . a), with y = psi/2, s = |y|/sin |y|, sigma = (1 - s)/|y|^2.
+fn pulled_back(psi: DVec3, a: DVec3) -> DVec3 {
+    let y = 0.5 * psi;
+    let squared = y.length_squared();
+    let (s, sigma) = match squared < SMALL {
+        true => (1.0 + squared / 6.0, -1.0 / 6.0 - 7.0 / 360.0 * squared),
+        false => {
+            let s = squared.sqrt() / squared.sqrt().sin();
+            (s, (1.0 - s) / squared)
+        }
+    };
+    s * a + sigma * y.dot(a) * y
+}
+
+/// The rotation vector of a segment that carries the moment and no force, from
+/// its neighbour's: S A (psi/ds - u0) = exp(-psi/2) R^T M in the frame half-way.
+fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> Option<DVec3> {
+    let moment = base.conjugate() * moment;
+    let unbalanced = |psi: DVec3| {
+        let couple = section.couple_stiffness * (psi / section.ds - section.rest_curvature);
+        pulled_back(psi, couple) - rotation::exp(-0.5 * psi) * moment
+    };
+    let mut psi = near;
+    for _ in 0..SEGMENT_ITERATIONS {
+        let value = unbalanced(psi);
+        let column = |axis: DVec3| (unbalanced(psi + DIFFERENCE * axis) - value) / DIFFERENCE;
+        let rate = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        let step = rate.inverse() * value;
+        psi -= step;
+        if psi.is_nan() || psi.length() > RESOLVED_TURN {
+            return None;
+        }
+        if step.length() <= SEGMENT_ACCURACY {
+            return Some(psi);
+        }
+    }
+    // The remaining error is corrected by Newton's method for the whole rod.
+    Some(psi)
+}

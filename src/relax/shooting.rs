@@ -1,0 +1,245 @@
+//! Shooting: a boundary-value solution as a result of the same type as a relaxation's.
+
+use crate::leaf::{Grid, Leaf};
+use crate::memory;
+use crate::newton::Work;
+use crate::refusal::RefusedOption;
+use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError};
+use crate::relax::result::equilibrium::{
+    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
+};
+use crate::relax::result::report::neutral_directions;
+use crate::relax::result::stations::SAME;
+use crate::relax::settle::segments::coarsest;
+use crate::relax::stability::index::index_near;
+use crate::scenario::{Scenario, longest};
+use crate::shape::{RodShape, equally_spaced};
+use crate::shooting;
+use crate::shooting::{Reason, Solution, Start};
+use crate::undulation::Undulation;
+use glam::DVec3;
+use std::time::Instant;
+
+/// Smallest number of segments between stations.
+const SEGMENTS: usize = 32;
+
+/// Tolerance of the relaxation that shooting starts from: the coarsest grids are enough, as
+/// Newton's method converges from there faster than finer grids.
+pub const START: f64 = 1e-3;
+
+/// The grid whose nodes are the stations of a boundary-value solution.
+fn station_grid(scenario: &Scenario) -> Grid {
+    let leaf = Leaf::new(scenario);
+    let segments = coarsest(&leaf, SEGMENTS).max(leaf.kinks().len() + 1);
+    Grid::new(segments, leaf.kinks())
+}
+
+/// The stations `own` and those that divide a vein into `parts` equal parts: the solution is
+/// integrated to all of them, so that none is interpolated.
+fn with_requested(own: &[f64], parts: Option<usize>) -> Vec<f64> {
+    let requested = parts.map(equally_spaced).unwrap_or_default();
+    let mut all = own.to_vec();
+    let is_own = |at: &f64| {
+        let next = own.partition_point(|station| at - station >= SAME);
+        own.get(next).is_some_and(|station| station - at < SAME)
+    };
+    all.extend(requested.iter().filter(|at| !is_own(at)));
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The rods at those of their `stations` that are in `own`, too.
+fn at_own(own: &[f64], stations: &[f64], rods: &[RodShape]) -> Vec<RodShape> {
+    let at_own = |rod: &RodShape| {
+        let nodes = rod.nodes.iter().zip(stations);
+        let nodes = nodes.filter(|(_, at)| own.binary_search_by(|o| o.total_cmp(at)).is_ok());
+        RodShape {
+            length: rod.length,
+            nodes: nodes.map(|(node, _)| *node).collect(),
+        }
+    };
+    rods.iter().map(at_own).collect()
+}
+
+fn curve(rod: &RodShape) -> Vec<DVec3> {
+    rod.nodes.iter().map(|node| node.position).collect()
+}
+
+/// Refuses a number of intervals that is out of range or needs too much memory for this number
+/// of `rods`; without a number the check is for one interval, the fewest that will be chosen.
+pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), RelaxError> {
+    if let Some(found) = intervals.filter(|found| !(1..=MAX_INTERVALS).contains(found)) {
+        let allowed = format!("allowed are 1 to {MAX_INTERVALS}");
+        return Err(RefusedOption::new("intervals", found, allowed).into());
+    }
+    let intervals = intervals.unwrap_or(1);
+    Ok(memory::shooting(rods, intervals)?)
+}
+
+/// Solves the boundary-value problem starting from a relaxed leaf, `rest`; if that is not at
+/// rest it is returned.
+pub fn from_rest(
+    scenario: &Scenario,
+    options: &Options,
+    intervals: Option<usize>,
+    tolerance: f64,
+    rest: Equilibrium,
+    progress: &mut dyn FnMut(&Progress),
+) -> Equilibrium {
+    if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
+        return Equilibrium {
+            method: options.method,
+            ..rest
+        };
+    }
+    let start = Start::Leaf {
+        stations: &rest.shape.stations,
+        rods: &rest.shape.rods,
+    };
+    let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
+    found.stability.saddle = rest.stability.saddle;
+    found.work = rest.work + found.work;
+    found.wall_seconds += rest.wall_seconds;
+    found
+}
+
+/// The work of shooting in terms of a relaxation: Newton corrections count as steps,
+/// linearisations as factorisations, evaluations of all slopes as force evaluations.
+impl From<shooting::Work> for Work {
+    fn from(work: shooting::Work) -> Self {
+        Work {
+            steps: work.iterations,
+            factorizations: work.linearizations,
+            force_evaluations: work.slopes,
+            cg_iterations: 0,
+        }
+    }
+}
+
+/// Solves the boundary-value problem from a start.
+pub fn shoot(
+    scenario: &Scenario,
+    options: &Options,
+    intervals: Option<usize>,
+    tolerance: f64,
+    start: Start,
+    progress: &mut dyn FnMut(&Progress),
+) -> Equilibrium {
+    let clock = Instant::now();
+    let grid = station_grid(scenario);
+    let own = grid.sigma().to_vec();
+    let stations = with_requested(&own, options.stations);
+    let shooting_options = shooting::Options {
+        intervals,
+        limit: options.limit.clone(),
+        ..shooting::Options::new(start, &stations, shooting::Precision::Error(tolerance))
+    };
+    let found = shooting::solve(scenario, &shooting_options, &mut |step| {
+        progress(&Progress::Shooting(*step))
+    });
+    let mut accuracy = Accuracy {
+        segments: Vec::new(),
+        intervals: None,
+        tolerance,
+        residual: None,
+        error_estimate: None,
+        energy_error: None,
+    };
+    let (mut energy, mut index) = (None, None);
+    let ((outcome, remark), work, rods) = match found {
+        Ok(solution) => {
+            accuracy.intervals = Some(solution.intervals.len() - 1);
+            accuracy.residual = Some(solution.defect);
+            accuracy.error_estimate = Some(solution.error.position);
+            energy = Some(solution.energy);
+            let rods = at_own(&own, &stations, &solution.rods);
+            index = index_near(scenario, grid, &rods, solution.error.position);
+            let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
+            (outcome, solution.work, solution.rods)
+        }
+        Err(failure) => (outcome_of_failure(&failure), failure.work, failure.rods),
+    };
+    let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
+    let listed = if scenario.joined { 1 } else { tips.len() };
+    let tip_force_sum = tips.iter().map(|node| node.rotation * node.n).sum();
+    let rods_at_own = at_own(&own, &stations, &rods);
+    Equilibrium {
+        scenario: scenario.name.clone(),
+        method: options.method,
+        outcome,
+        remark,
+        doubts: Vec::new(),
+        rod_count: rods.len(),
+        energy,
+        tips: tips.iter().take(listed).map(|node| node.position).collect(),
+        tip_force_sum,
+        reaction: scenario.held_tip.as_ref().map(|held| Reaction {
+            force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
+            moments: (held.clamps.is_some())
+                .then(|| tips.iter().map(|node| -(node.rotation * node.m)).collect()),
+        }),
+        stability: Stability {
+            negative_eigenvalues: index,
+            neutral_directions: neutral_directions(scenario, &rods),
+            mode_shapes: options.mode_shapes,
+            ..Stability::default()
+        },
+        path: None,
+        sensitivities: None,
+        margin: None,
+        undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
+        accuracy,
+        model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
+        work: work.into(),
+        wall_seconds: clock.elapsed().as_secs_f64(),
+        shape: Shape {
+            stations,
+            joined: scenario.joined,
+            curves: rods_at_own.iter().map(curve).collect(),
+            curve_stations: own,
+            rods,
+        },
+    }
+}
+
+/// The outcome of a solution.
+fn outcome_of_solution(
+    scenario: &Scenario,
+    solution: &Solution,
+    index: Option<usize>,
+    tolerance: f64,
+) -> (Outcome, Option<String>) {
+    let (outcome, remark) = match index {
+        _ if solution.error.position > tolerance * longest(&scenario.rods) => (
+            Outcome::ToleranceNotReached,
+            Some(match &solution.unsharpened {
+                Some(reason) => format!("this is the best solution found; with smaller local errors {reason}"),
+                None => "double precision does not carry more through this leaf: ask for a larger tolerance".into(),
+            }),
+        ),
+        Some(1..) => (
+            Outcome::Saddle,
+            Some("shooting finds equilibria, stable or not: the method semi-implicit finds a stable one".into()),
+        ),
+        Some(0) => (Outcome::Converged, None),
+        None => (
+            Outcome::Converged,
+            Some("the number of negative eigenvalues is not known: a dead moment has no energy, the leaf is too fine to count them, or one may have either sign".into()),
+        ),
+    };
+    let neutral = solution.neutral.as_ref().map(|neutral| neutral.to_string());
+    (outcome, remark.or(neutral))
+}
+
+/// The outcome of a failure: how far the continuation came, and why it ended.
+fn outcome_of_failure(failure: &shooting::Failure) -> (Outcome, Option<String>) {
+    let way = match failure.part {
+        part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
+        _ => String::new(),
+    };
+    let outcome = match failure.reason {
+        Reason::Singular(_) => Outcome::Singular,
+        _ => Outcome::NotAtRest,
+    };
+    (outcome, Some(format!("{}{way}", failure.reason)))
+}

@@ -1,0 +1,401 @@
+//! The modes of the settled leaf, extrapolated over nested grids, in the units of the
+//! scenario.
+
+use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, System, shift, turn};
+use crate::modes;
+use crate::modes::{Eigenpair, Wanted};
+use crate::motion::Physics;
+use crate::newton::{Newton, Work};
+use crate::relax::result::equilibrium::Mode;
+use crate::relax::saddle::ANY_SIGN;
+use crate::relax::settle::run::Run;
+use crate::relax::stability::eigenvalue_bars::{Extrapolated, GRIDS, Series};
+use crate::relax::transfer::level::Level;
+use crate::relax::transfer::predict::predict;
+use crate::relax::transfer::prolong::prolong;
+use crate::relax::transfer::stencil::Stencil;
+use glam::DVec3;
+use std::borrow::Cow;
+
+/// Largest number of unknowns of the finest grid for which modes are computed without their
+/// shapes: about a second.
+const FEW_UNKNOWNS: usize = 20_000;
+
+/// Without their shapes the grids of a stable leaf with fewer unknowns than this suffice, if
+/// there are any: about as long as a relaxation.
+const QUICK_UNKNOWNS: usize = 4_000;
+
+/// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
+const MANY_MORE_UNKNOWNS: usize = 200_000;
+
+/// Largest number of grids finer than those of the relaxation.
+const MORE_GRIDS: usize = 6;
+
+/// Growth of the rounding error of an eigenvalue from grid to grid.
+const FINER_NOISE: f64 = 4.0;
+
+/// The tolerance if only the signs of the eigenvalues are needed.
+const SIGN_TOLERANCE: f64 = 1e-2;
+
+/// Accuracy of eigenvectors over the root of the tolerance (that of eigenvalues is its
+/// square), and its limits: with less of it close eigenvalues are not told apart.
+const ACCURACY: f64 = 5e-3;
+const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
+
+/// To a tolerance of this or more the grids are so coarse that two of them do not tell how
+/// eigenvalues converge, and few eigenvalues may be equal on two grids by chance: so many are
+/// compared.
+const LOW_TOLERANCE: f64 = 1e-3;
+const FEW: usize = 3;
+const COMPARED: usize = 3;
+
+/// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
+/// farther away is another equilibrium.
+const ITERATIONS: usize = 12;
+const SAME_PLACE: f64 = 0.02;
+
+/// A mode with smaller displacements than this, in lengths per radian of its rotation, is one
+/// of rotation alone.
+const NO_DISPLACEMENT: f64 = 1e-6;
+
+/// The lowest modes of a settled leaf.
+pub struct Lowest {
+    pub modes: Vec<Mode>,
+    /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
+    /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
+    /// free motion.
+    pub undecided: Option<f64>,
+    /// How many eigenvalues are negative, if all of these are larger than their errors.
+    pub negative: Option<usize>,
+    /// So many eigenvalues are below those of the list.
+    pub left_out: usize,
+    /// Whether each of the list is negative, where that is certain.
+    pub signs: Vec<Option<bool>>,
+    /// The ratio of the softest eigenvalue and that on the grid whose linear equations tell the
+    /// error, at least one: beside a bifurcation their response is wrong by so much.
+    pub softening: f64,
+}
+
+impl Lowest {
+    /// How many eigenvalues are negative for certain, whatever is known of the others.
+    pub fn certainly_negative(&self) -> usize {
+        let negative = self.signs.iter().filter(|sign| **sign == Some(true));
+        self.left_out + negative.count()
+    }
+
+    /// How many are negative where the first so `many` are known to be, if that is certain.
+    pub fn negative_beyond(&self, many: usize) -> Option<usize> {
+        let others = self.signs.iter().skip(many.saturating_sub(self.left_out));
+        let negative = |sum, sign: &Option<bool>| Some(sum + usize::from((*sign)?));
+        others.into_iter().try_fold(many, negative)
+    }
+}
+
+/// A list of eigenvalues.
+#[derive(Clone, Copy)]
+pub struct List {
+    pub count: usize,
+    /// So many lower ones are left out, and the shift by which they are found to be lower: see
+    /// [`Wanted::above`].
+    pub above: Option<(usize, f64)>,
+    /// Whether the stability of the leaf depends on them: then its size does not matter.
+    pub decides: bool,
+    /// Whether more than their signs is needed: they are as accurate as requested ones.
+    pub exact: bool,
+}
+
+impl List {
+    /// The modes that are requested.
+    pub fn requested(run: &Run) -> Self {
+        List {
+            count: run.options.modes,
+            above: None,
+            decides: false,
+            exact: run.options.modes > 0,
+        }
+    }
+}
+
+/// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
+/// large, or there are several equal ones that cannot be told apart.
+/// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
+pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
+    let List { count, above, .. } = list;
+    let options = run.options;
+    let finest = run.levels.last()?;
+    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides;
+    if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
+        return None;
+    }
+    let physics = Physics::new(run.leaf);
+    let requested = count <= options.modes && above.is_none();
+    let tolerance = if requested || list.exact {
+        run.tolerance
+    } else {
+        SIGN_TOLERANCE
+    };
+    let on = |level: &Level, near: &[Vec<Increment>]| {
+        let wanted = Wanted {
+            count,
+            above,
+            accuracy: (ACCURACY * tolerance.sqrt()).clamp(ACCURACIES.0, ACCURACIES.1),
+            near,
+            time: &options.limit,
+        };
+        modes::lowest(&level.leaf, &physics, &level.state, wanted)
+    };
+    let left_out = above.map_or(0, |(others, _)| others);
+    let mut nested = Nested {
+        series: Series {
+            index: run.index.unwrap_or(0).saturating_sub(left_out),
+            single: run.clearly_stable || run.segments().is_some(),
+            grids: Vec::new(),
+            tolerance,
+            rounding: 0.0,
+        },
+        finest: None,
+        coarser: None,
+        segments: Vec::new(),
+    };
+    let sharp = requested && options.mode_shapes;
+    let few = requested && !list.decides && count < FEW;
+    let compares =
+        (few || run.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let enough = |series: &Series| {
+        (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
+    };
+    let sufficient_grids = sufficient_grids(run);
+    let skipped = sufficient_grids.saturating_sub(GRIDS);
+    for (k, level) in run.levels.iter().enumerate().skip(skipped) {
+        let series = &nested.series;
+        let decided = !series.grids.is_empty() && series.undecided().is_none();
+        if k >= sufficient_grids && decided && enough(series) {
+            break;
+        }
+        if !nested.add(Cow::Borrowed(level), on) {
+            if k >= sufficient_grids && nested.finest.is_some() {
+                break;
+            }
+            // The series needs consecutive grids.
+            nested.clear();
+        }
+    }
+    nested.finest.as_ref()?;
+    if options.method.segments().is_none() {
+        refine(run, &mut nested, (on, enough));
+    }
+    let on = run.segments_of_estimate();
+    let softening = (nested
+        .segments
+        .iter()
+        .position(|segments| Some(*segments) == on))
+    .map_or(1.0, |grid| nested.series.softening(grid));
+    let Nested { series, finest, .. } = nested;
+    let shapes = match options.mode_shapes {
+        true => finest?.shapes(&run.levels.last()?.leaf),
+        false => Vec::new(),
+    };
+    let unit = physics.time.powi(-2);
+    let mode = |it: Extrapolated| {
+        let (displacement, rotation) = shapes.get(it.number).cloned().unwrap_or_default();
+        Mode {
+            eigenvalue: it.value * unit,
+            error: it.error.map(|error| error * unit),
+            displacement,
+            rotation,
+        }
+    };
+    Some(Lowest {
+        modes: series.values().into_iter().map(mode).collect(),
+        undecided: series.undecided(),
+        negative: series.negative().map(|negative| left_out + negative),
+        left_out,
+        signs: series.signs(),
+        softening,
+    })
+}
+
+/// Eigenvalues on nested grids, and the modes on the finest of these.
+struct Nested<'a> {
+    series: Series,
+    finest: Option<OnGrid<'a>>,
+    /// The grid before that.
+    coarser: Option<Cow<'a, Level>>,
+    /// Segments of each grid of the series.
+    segments: Vec<usize>,
+}
+
+/// The lowest modes on one grid: their number and their nodes are those of this grid alone.
+struct OnGrid<'a> {
+    level: Cow<'a, Level>,
+    pairs: Vec<Eigenpair>,
+}
+
+impl<'a> Nested<'a> {
+    /// Adds the modes on the next finer grid; false if they are not found.
+    fn add(
+        &mut self,
+        level: Cow<'a, Level>,
+        on: impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    ) -> bool {
+        let coarser = self.finest.as_ref();
+        let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
+        let Some(pairs) = on(&level, &near) else {
+            return false;
+        };
+        self.series.push(&pairs);
+        self.segments.push(level.leaf.segments());
+        self.series.rounding = modes::rounding(&level.leaf);
+        let before = self.finest.replace(OnGrid { level, pairs });
+        self.coarser = before.map(|before| before.level);
+        true
+    }
+
+    fn clear(&mut self) {
+        self.series.grids.clear();
+        self.segments.clear();
+        (self.finest, self.coarser) = (None, None);
+    }
+}
+
+/// Number of grids that suffice if they determine the signs of the eigenvalues.
+fn sufficient_grids(run: &Run) -> usize {
+    if run.options.mode_shapes || run.index != Some(0) {
+        return run.levels.len();
+    }
+    let few = |level: &&Level| unknowns(&level.leaf) < QUICK_UNKNOWNS;
+    let few = run.levels.iter().take_while(few).count();
+    few.max(2).min(run.levels.len())
+}
+
+/// Whether the cost of modes on this grid is acceptable.
+fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
+    6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
+}
+
+/// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
+/// small enough for an undecided one of this `size`.
+pub fn deciding_grid(run: &Run, size: f64) -> Option<Grid> {
+    let noise = run.levels.last()?.leaf.neutral_shift();
+    let finer = run.finer().filter(|grid| is_affordable(run.leaf, grid))?;
+    (size > FINER_NOISE * noise && !run.out_of_time()).then_some(finer)
+}
+
+/// The next grid, if it has few unknowns.
+pub fn small_grid(run: &Run) -> Option<Grid> {
+    let few = |grid: &Grid| 6 * run.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
+    run.finer().filter(|grid| few(grid) && !run.out_of_time())
+}
+
+fn unknowns(leaf: &DiscreteLeaf) -> usize {
+    6 * leaf.rods() * leaf.segments()
+}
+
+/// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, or
+/// the limits are reached.
+fn refine(
+    run: &Run,
+    nested: &mut Nested,
+    (on, enough): (
+        impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+        impl Fn(&Series) -> bool,
+    ),
+) -> Option<()> {
+    for _ in 0..MORE_GRIDS {
+        if enough(&nested.series) || run.out_of_time() {
+            break;
+        }
+        let finest = &*nested.finest.as_ref()?.level;
+        if !is_affordable(run.leaf, &finest.leaf.grid.refined()) {
+            break;
+        }
+        let next = settle(nested.coarser.as_deref(), finest, run.tolerance)?;
+        if !nested.add(Cow::Owned(next), &on) {
+            break;
+        }
+    }
+    Some(())
+}
+
+/// The same equilibrium on the grid next to the `finest`, predicted from a `coarser` one, too.
+fn settle(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> Option<Level> {
+    let mut state = prolong(&finest.leaf, &finest.state);
+    if let Some(coarser) = coarser {
+        predict(&[coarser, finest], &mut state);
+    }
+    let leaf = DiscreteLeaf::new(&finest.leaf.leaf, finest.leaf.grid.refined());
+    let mut system = System::new(&leaf);
+    let guess = state.clone();
+    let newton = Newton {
+        accuracy: 1e-3 * tolerance,
+        iterations: ITERATIONS,
+        work: &mut Work::default(),
+        progress: &mut |_, _| {},
+    };
+    (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
+    (guess.shift_to(&state) < SAME_PLACE).then_some(Level { leaf, state })
+}
+
+/// Displacements and rotations of all nodes, rod by rod.
+type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
+
+impl OnGrid<'_> {
+    /// The shapes interpolated to a finer grid.
+    fn interpolated(&self, fine: &DiscreteLeaf) -> Vec<Vec<Increment>> {
+        let coarse = &self.level.leaf;
+        let nodes = fine.grid.sigma().iter();
+        let stencils: Vec<_> = nodes.map(|&sigma| <Stencil>::at(coarse, sigma)).collect();
+        let on_grid = |pair: &Eigenpair| {
+            let rods = pair.shape.chunks(coarse.segments() + 1);
+            let node = |(rod, [stencil, _]): (&[Increment], &[Stencil; 2])| -> Increment {
+                let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
+                let mut both = [0.0; 6];
+                turn.write_to_slice(&mut both[..3]);
+                shift.write_to_slice(&mut both[3..]);
+                both
+            };
+            rods.flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
+                .collect()
+        };
+        self.pairs.iter().map(on_grid).collect()
+    }
+
+    /// Normalised shapes at the nodes of the same or a coarser grid: the largest displacement
+    /// is the longest rod's length, and the last of the largest components is positive.
+    fn shapes(&self, coarse: &DiscreteLeaf) -> Vec<Shape> {
+        let length = coarse.leaf.scale.length;
+        let (nodes, segments) = (self.level.leaf.segments() + 1, coarse.segments());
+        let stride = self.level.leaf.segments().div_ceil(segments);
+        let shape = |pair: &Eigenpair| {
+            let rods = pair.shape.chunks(nodes);
+            let shape = rods.map(|rod| rod.iter().step_by(stride).copied().collect());
+            normalized(&shape.collect::<Vec<Vec<Increment>>>(), length)
+        };
+        self.pairs.iter().map(shape).collect()
+    }
+}
+
+/// A shape in the scenario's unit of length, normalised.
+fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
+    let nodes = || shape.iter().flatten();
+    let largest =
+        |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
+    let (far, turned) = (largest(shift), largest(turn));
+    let (size, part): (f64, fn(&Increment) -> DVec3) = match far > NO_DISPLACEMENT * turned {
+        true => (far, shift),
+        false => (turned, turn),
+    };
+    let components: Vec<f64> = nodes().flat_map(|node| part(node).to_array()).collect();
+    let most = components.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    // The last of those that are equal up to rounding: a tip's.
+    let mut last = components.iter().rev();
+    let sign = last
+        .find(|c| c.abs() > 0.99 * most)
+        .map_or(1.0, |c| c.signum());
+    let rods = |part: fn(&Increment) -> DVec3, unit: f64| {
+        let rod = |rod: &Vec<Increment>| rod.iter().map(|node| part(node) * unit).collect();
+        shape.iter().map(rod).collect()
+    };
+    let unit = sign / size;
+    (rods(shift, unit * length), rods(turn, unit))
+}

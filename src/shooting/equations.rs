@@ -1,0 +1,381 @@
+//! The equilibrium equations of the paper as a system of ordinary differential
+//! equations in sigma = s/L, for all rods at once.
+//!
+//! With the orientation as a unit quaternion q instead of nine director
+//! components there are 13 N unknown functions where the paper has 18 N. Force
+//! and moment are carried by their components along the lab axes, in which
+//! eqs (1) and (2) have no derivatives of directors:
+//!
+//! ```text
+//! r' = L R v,   q' = L/2 (R u) q,   n' = -L f,   m' = n x r'
+//! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
+//! ```
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::limit::Limit;
+use crate::scenario::{Profile, Rod, Scenario, Turning, ascending, longest};
+use crate::shooting::arcs;
+use crate::shooting::arcs::Arc;
+use crate::shooting::state::{RodState, STATE};
+
+/// The boundary-value problem of a leaf, dimensionless.
+///
+/// A flat state holds [`STATE`] numbers per rod and, last, the potential
+/// energy of everything from the base up to sigma.
+#[derive(Clone, Debug)]
+pub struct Equations<'a> {
+    scenario: &'a Scenario,
+    /// Unit of length: the longest rod.
+    pub length: f64,
+    /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
+    pub force: f64,
+    pub lengths: Vec<f64>,
+    coupling: Vec<DVec3>,
+    gravity: DVec3,
+    tip_force: DVec3,
+    tip_moment: DVec3,
+    /// Positions and rotations at which the tips of the rods are held.
+    held: Vec<(DVec3, DQuat)>,
+    /// The smallest couple stiffness along each rod.
+    pub softest: Vec<f64>,
+    /// Growth rate per sigma of perturbations of each rod due to coupling.
+    coupled_rate: Vec<f64>,
+    /// The veins that can turn without resistance.
+    turnings: Vec<Turning>,
+    arcs: Vec<Arc>,
+    /// Fractions of the length where a profile has a kink, ascending.
+    kinks: Vec<f64>,
+    /// Homotopy parameter between 0, a leaf without loads that rests in the shape of arcs with a
+    /// common tip, and 1, the leaf of the scenario.
+    pub part: f64,
+    /// Homotopy parameter between 0, rods with their largest stiffness in every direction, and 1,
+    /// the rods of the scenario.
+    pub softened: f64,
+    /// Time limit of their solution.
+    pub limit: Limit,
+}
+
+/// Constraint on the tips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tip {
+    /// None.
+    Free,
+    /// A common position.
+    Joint,
+    /// A given position.
+    Pinned,
+    /// A given position and given directors.
+    Clamped,
+}
+
+/// The rotation vector from `b` to `a`, to first order.
+pub fn difference(a: DQuat, b: DQuat) -> DVec3 {
+    let turn = a * b.conjugate();
+    let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
+    sign * DVec3::new(turn.x, turn.y, turn.z)
+}
+
+/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Derivatives {
+    /// Of r' with respect to the rotation.
+    pub r_theta: DMat3,
+    /// Of r' with respect to n.
+    pub r_n: DMat3,
+    /// Of the rotation rate with respect to the rotation.
+    pub theta_theta: DMat3,
+    /// Of the rotation rate with respect to m.
+    pub theta_m: DMat3,
+    /// Of m' with respect to the rotation.
+    pub m_theta: DMat3,
+    /// Of m' with respect to n.
+    pub m_n: DMat3,
+}
+
+/// Material of a rod at one sigma.
+struct Material {
+    compliance: DVec3,
+    flexibility: DVec3,
+    rest_strain: DVec3,
+    rest_curvature: DVec3,
+}
+
+impl<'a> Equations<'a> {
+    pub fn new(scenario: &'a Scenario) -> Self {
+        let rods = &scenario.rods;
+        let length = longest(rods);
+        let bending = rods.iter().flat_map(|rod| &rod.couple_stiffness[1..]);
+        let logs: f64 = bending.map(|stiffness| stiffness.at(0.5).ln()).sum();
+        let stiffness = (logs / (2 * rods.len()) as f64).exp();
+        let force = stiffness / (length * length);
+        let lengths: Vec<f64> = rods.iter().map(|rod| rod.length / length).collect();
+        let coupling: Vec<DVec3> = (lengths.windows(2).zip(&scenario.coupling))
+            .map(|(gap, kappa)| {
+                DVec3::from_array(*kappa) * (0.5 * (gap[0] + gap[1]) * length * length / force)
+            })
+            .collect();
+        let least = |profiles: &[Profile; 3]| {
+            let each = profiles.iter().map(Profile::min);
+            each.fold(f64::INFINITY, f64::min)
+        };
+        let softest: Vec<f64> = (rods.iter())
+            .map(|rod| least(&rod.couple_stiffness) / (force * length * length))
+            .collect();
+        let coupled_rate = (0..rods.len())
+            .map(|j| {
+                let of = |gap: Option<usize>| gap.and_then(|gap| coupling.get(gap).copied());
+                let gaps = [of(j.checked_sub(1)), of(Some(j))];
+                let pull: DVec3 = gaps.into_iter().flatten().sum();
+                // Neighbours that move in the opposite direction double the pull; against
+                // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
+                let pull = 2.0 * lengths[j] * pull.max_element();
+                let stiffness = least(&rods[j].force_stiffness) / force;
+                let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
+                // In a vein that has grown, forces have longer arms.
+                let grown = rods[j].rest_stretch.max_abs().sqrt();
+                (grown * bend).max((pull / stiffness).sqrt())
+            })
+            .collect();
+        Equations {
+            scenario,
+            length,
+            force,
+            coupling,
+            coupled_rate,
+            gravity: DVec3::from_array(scenario.gravity) * (length / force),
+            tip_force: DVec3::from_array(scenario.tip_force) / force,
+            tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
+            held: (0..rods.len())
+                .filter_map(|j| {
+                    let held = scenario.held_tip.as_ref()?;
+                    let clamp = held.clamps.as_ref().map(|clamps| clamps[j].rotation());
+                    let position = DVec3::from_array(held.position) / length;
+                    Some((position, clamp.unwrap_or_default()))
+                })
+                .collect(),
+            softest,
+            turnings: scenario.turnings(),
+            arcs: arcs::arcs(scenario, &lengths),
+            kinks: kinks(scenario),
+            lengths,
+            part: 1.0,
+            softened: 1.0,
+            limit: Limit::default(),
+        }
+    }
+
+    pub fn rods(&self) -> usize {
+        self.lengths.len()
+    }
+
+    /// Length of a flat state.
+    pub fn size(&self) -> usize {
+        STATE * self.rods() + 1
+    }
+
+    /// Rate per sigma at which perturbations of rod `j` grow or turn: a rod
+    /// under the axial force T bends with the wavenumber sqrt(T/A).
+    pub fn rate(&self, j: usize, force: f64) -> f64 {
+        let grown = self.scenario.rods[j].rest_stretch.max_abs();
+        let tension = self.lengths[j] * (grown * force / self.softest[j]).sqrt();
+        tension.max(self.coupled_rate[j])
+    }
+
+    /// Rest length of rod `j` from the base up to `sigma`, with its growth.
+    pub fn grown(&self, j: usize, sigma: f64) -> f64 {
+        self.lengths[j] * self.scenario.rods[j].rest_stretch.integral(sigma)
+    }
+
+    /// Coupling of gap `g`: force per unit displacement and unit of sigma.
+    #[inline]
+    pub fn coupling(&self, g: usize) -> DVec3 {
+        self.part * self.coupling[g]
+    }
+
+    pub fn coupled(&self, g: usize) -> bool {
+        self.coupling[g] != DVec3::ZERO
+    }
+
+    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
+    pub fn stop(&self, from: f64, to: f64) -> f64 {
+        let next = self.kinks.partition_point(|kink| *kink <= from);
+        self.kinks.get(next).map_or(to, |kink| kink.min(to))
+    }
+
+    /// The state at the base for given forces and moments: conditions (a) and (c).
+    pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
+        RodState {
+            r: DVec3::ZERO,
+            q: DQuat::from_rotation_z(self.scenario.rods[j].angle),
+            n,
+            m,
+        }
+    }
+
+    /// The veins that can turn without resistance, if the leaf has its own shape at rest.
+    pub fn turnings(&self) -> &[Turning] {
+        match self.part == 1.0 && self.softened == 1.0 {
+            true => &self.turnings,
+            false => &[],
+        }
+    }
+
+    /// A flat state at the base without stress.
+    pub fn clamped(&self) -> Vec<f64> {
+        let mut y = vec![0.0; self.size()];
+        for j in 0..self.rods() {
+            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
+        }
+        y
+    }
+
+    fn material(&self, j: usize, sigma: f64) -> Material {
+        let rod = &self.scenario.rods[j];
+        let at = |p: &[Profile; 3]| DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma));
+        let mut stiffness = at(&rod.couple_stiffness);
+        if self.softened < 1.0 {
+            let stiffest = stiffness.max_element();
+            stiffness = stiffest * (stiffness / stiffest).powf(self.softened);
+        }
+        let (arc, part) = (self.arcs.get(j), self.part);
+        let stretch = rod.rest_stretch.at(sigma);
+        // The scenario's own law without rounding errors.
+        let (rest_strain, rest_curvature) = match part == 1.0 {
+            true => (DVec3::X * stretch, at(&rod.rest_curvature) * self.length),
+            false => {
+                let own = at(&rod.rest_curvature);
+                let first = arc.map_or(stretch, |arc| arc.stretch);
+                let bend = arc.map_or(self.length * own, |arc| arc.bend * DVec3::Z);
+                (
+                    DVec3::X * (part * stretch + (1.0 - part) * first),
+                    own * (part * self.length) + bend * (1.0 - part),
+                )
+            }
+        };
+        Material {
+            compliance: self.force * at(&rod.force_stiffness).recip(),
+            flexibility: self.force * self.length * self.length * stiffness.recip(),
+            rest_strain,
+            rest_curvature,
+        }
+    }
+
+    /// Strains (v, u) of rod `j` under forces and moments along its directors.
+    pub fn strains(&self, j: usize, sigma: f64, n: DVec3, m: DVec3) -> (DVec3, DVec3) {
+        let law = self.material(j, sigma);
+        (
+            law.rest_strain + law.compliance * n,
+            law.rest_curvature + law.flexibility * m,
+        )
+    }
+
+    /// Slopes of the flat state `y` at `sigma`.
+    pub fn slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
+        let mut energy = 0.0;
+        let mut pull = DVec3::ZERO;
+        for j in 0..self.rods() {
+            let rod = RodState::read(y, j);
+            let (law, length) = (self.material(j, sigma), self.lengths[j]);
+            let frame = DMat3::from_quat(rod.q);
+            let (n, m) = (frame.transpose() * rod.n, frame.transpose() * rod.m);
+            let tangent = length * (frame * (law.rest_strain + law.compliance * n));
+            let bend = length * (frame * (law.rest_curvature + law.flexibility * m));
+            energy += 0.5 * length * (n.dot(law.compliance * n) + m.dot(law.flexibility * m));
+            energy -= self.part * length * self.gravity.dot(rod.r);
+            let mut load = self.part * length * self.gravity - pull;
+            pull = DVec3::ZERO;
+            if j + 1 < self.rods() {
+                let gap = DVec3::from_slice(&y[STATE * (j + 1)..]) - rod.r;
+                pull = self.coupling(j) * gap;
+                energy += 0.5 * gap.dot(pull);
+                load += pull;
+            }
+            let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
+            RodState {
+                r: tangent,
+                q,
+                n: -load,
+                m: rod.n.cross(tangent),
+            }
+            .write(slopes, j);
+        }
+        slopes[STATE * self.rods()] = energy;
+    }
+
+    /// Derivatives of the slopes of rod `j` with respect to its own state: with the frame
+    /// turned by theta, R^T n changes by R^T (dn - theta x n).
+    pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> Derivatives {
+        let rod = RodState::read(y, j);
+        let (law, length) = (self.material(j, sigma), self.lengths[j]);
+        let frame = DMat3::from_quat(rod.q);
+        let spatial = |c: DVec3| length * (frame * DMat3::from_diagonal(c) * frame.transpose());
+        let (r_n, theta_m) = (spatial(law.compliance), spatial(law.flexibility));
+        let n = frame.transpose() * rod.n;
+        let tangent = cross(length * (frame * (law.rest_strain + law.compliance * n)));
+        let r_theta = r_n * cross(rod.n) - tangent;
+        Derivatives {
+            r_theta,
+            r_n,
+            theta_theta: theta_m * cross(rod.m),
+            theta_m,
+            m_theta: cross(rod.n) * r_theta,
+            m_n: cross(rod.n) * r_n - tangent,
+        }
+    }
+
+    /// Residuals of conditions (b), (d) and (e) in the state at the tip: six
+    /// numbers per rod. Joined tips: the distance of tip j from tip 0, for rod 0
+    /// the force; free tips: the force; held tips: the distance from
+    /// their given position. Then the moment, or for a clamped tip the rotation.
+    pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
+        let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
+        let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
+        (rods.iter().enumerate())
+            .flat_map(|(j, rod)| {
+                let first = match (self.tip(), j) {
+                    (Tip::Joint, 0) => force - self.part * self.tip_force,
+                    (Tip::Joint, _) => rod.r - rods[0].r,
+                    (Tip::Free, _) => rod.n - self.part * self.tip_force,
+                    (Tip::Pinned | Tip::Clamped, _) => rod.r - self.held[j].0,
+                };
+                let second = match self.tip() {
+                    Tip::Clamped => difference(rod.q, self.held[j].1),
+                    _ => rod.m - self.part * self.tip_moment,
+                };
+                [first.to_array(), second.to_array()].concat()
+            })
+            .collect()
+    }
+
+    pub fn tip(&self) -> Tip {
+        match &self.scenario.held_tip {
+            Some(held) if held.clamps.is_some() => Tip::Clamped,
+            Some(_) => Tip::Pinned,
+            None if self.scenario.joined => Tip::Joint,
+            None => Tip::Free,
+        }
+    }
+
+    /// Potential of the dead tip force at the tip.
+    pub fn tip_potential(&self, y: &[f64]) -> f64 {
+        let tips = if self.scenario.joined { 1 } else { self.rods() };
+        let work: f64 = (0..tips)
+            .map(|j| self.tip_force.dot(RodState::read(y, j).r))
+            .sum();
+        -self.part * work
+    }
+}
+
+fn kinks(scenario: &Scenario) -> Vec<f64> {
+    let profiles = scenario.rods.iter().flat_map(Rod::profiles);
+    ascending(profiles.flat_map(Profile::kinks).copied())
+}
+
+/// The matrix \[a\] with \[a\] b = a x b.
+fn cross(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
+}
+
+#[cfg(test)]
+mod tests;

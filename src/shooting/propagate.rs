@@ -1,0 +1,281 @@
+//! Exact sensitivities: the propagation of a perturbation of one rod through the
+//! leaf. The linearised equations are integrated with the steps of the solution
+//! itself.
+
+use std::ops::Range;
+
+use crate::shooting::dop853::{Integrator, combine};
+use crate::shooting::equations::{Derivatives, Equations};
+use crate::shooting::state::TANGENT;
+use crate::tableau::{A, B, C, STAGES};
+use glam::DMat3;
+
+/// The linearised equations at the stages of one step.
+pub struct LinearStep {
+    width: f64,
+    /// Stage by stage, rod by rod.
+    derivatives: Vec<Derivatives>,
+}
+
+impl LinearStep {
+    /// For the last step of the integrator.
+    pub fn of(equations: &Equations, integrator: &Integrator) -> Self {
+        let (width, begin) = (integrator.width, integrator.sigma - integrator.width);
+        LinearStep {
+            width,
+            derivatives: (0..STAGES)
+                .flat_map(|i| {
+                    let (y, sigma) = (&integrator.stages[i], begin + C[i] * width);
+                    (0..equations.rods()).map(move |j| equations.derivatives(j, sigma, y))
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Perturbations of `W` different kinds of a range of rods, all others being
+/// fixed: [`TANGENT`] rows of `W` numbers per rod.
+#[derive(Clone, Debug)]
+pub struct Perturbations<const W: usize> {
+    pub rods: Range<usize>,
+    /// Row after row.
+    pub all: Vec<f64>,
+    stage: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
+}
+
+impl<const W: usize> Perturbations<W> {
+    /// Unit perturbations of the last `W` components of rod `j`.
+    pub fn unit(rods: Range<usize>, j: usize) -> Self {
+        let mut all = vec![0.0; TANGENT * rods.len() * W];
+        for k in 0..W {
+            all[(TANGENT * (j - rods.start) + TANGENT - W + k) * W + k] = 1.0;
+        }
+        Perturbations {
+            rods,
+            stage: all.clone(),
+            slopes: vec![all.clone(); STAGES],
+            all,
+        }
+    }
+
+    pub fn rows(&self) -> &[[f64; W]] {
+        self.all.as_chunks().0
+    }
+
+    /// Propagates them through a step.
+    pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
+        for i in 0..STAGES {
+            combine(&self.all, step.width, A[i], &self.slopes, &mut self.stage);
+            let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
+            let (stage, out) = (self.stage.as_chunks().0, self.slopes[i].as_chunks_mut().0);
+            slopes::<W>(equations, derivatives, self.rods.start, stage, out);
+        }
+        combine(&self.all, step.width, &B, &self.slopes, &mut self.stage);
+        std::mem::swap(&mut self.all, &mut self.stage);
+    }
+}
+
+/// The linearised equations of rods `first..`.
+fn slopes<const W: usize>(
+    equations: &Equations,
+    derivatives: &[Derivatives],
+    first: usize,
+    rows: &[[f64; W]],
+    slopes: &mut [[f64; W]],
+) {
+    for (j, d) in derivatives.iter().enumerate() {
+        let at = TANGENT * j;
+        let part = |k: usize| &rows[at + 3 * k..at + 3 * k + 3];
+        let (theta, n, m) = (part(1), part(2), part(3));
+        let out = &mut slopes[at..at + TANGENT];
+        products(&mut out[0..3], [(&d.r_theta, theta), (&d.r_n, n)]);
+        products(&mut out[3..6], [(&d.theta_theta, theta), (&d.theta_m, m)]);
+        products(&mut out[9..12], [(&d.m_theta, theta), (&d.m_n, n)]);
+        for k in 0..3 {
+            let mut force = [0.0; W];
+            // A rod outside the range is fixed, but its coupling still acts.
+            let mut pull = |gap: usize, neighbour: Option<usize>| {
+                let kappa = equations.coupling(gap)[k];
+                if kappa == 0.0 {
+                    return;
+                }
+                for w in 0..W {
+                    let other = neighbour.map_or(0.0, |other| rows[TANGENT * other + k][w]);
+                    force[w] += kappa * (rows[at + k][w] - other);
+                }
+            };
+            if first + j > 0 {
+                pull(first + j - 1, j.checked_sub(1));
+            }
+            if first + j + 1 < equations.rods() {
+                let next = Some(j + 1).filter(|next| *next < derivatives.len());
+                pull(first + j, next);
+            }
+            out[6 + k] = force;
+        }
+    }
+}
+
+/// out = sum of matrix times rows.
+#[inline]
+fn products<const W: usize>(out: &mut [[f64; W]], terms: [(&DMat3, &[[f64; W]]); 2]) {
+    for r in 0..3 {
+        let mut sum = [0.0; W];
+        for (matrix, rows) in terms {
+            for c in 0..3 {
+                let factor = matrix.col(c)[r];
+                for w in 0..W {
+                    sum[w] += factor * rows[c][w];
+                }
+            }
+        }
+        out[r] = sum;
+    }
+}
+
+/// The rods coupled with rod `j`, directly or through others.
+pub fn group(equations: &Equations, j: usize) -> Range<usize> {
+    let mut group = j..j + 1;
+    while group.start > 0 && equations.coupled(group.start - 1) {
+        group.start -= 1;
+    }
+    while group.end < equations.rods() && equations.coupled(group.end - 1) {
+        group.end += 1;
+    }
+    group
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::scenario::Scenario;
+    use crate::shooting::state::RodState;
+
+    const END: f64 = 0.8;
+
+    /// Two coupled veins and a third one, all with different properties.
+    fn three() -> Scenario {
+        let text = r#"
+            name = "three"
+            leaf = { rods = 3, length = [1.0, 1.2, 0.9], fan = [-0.5, 0.4, 1.0] }
+            stiffness = { torsion = 0.8, bending_2 = { at = [0.0, 1.0], value = [1.0, 2.0] }, bending_3 = [1.5, 0.7, 1.1], axial = 20.0, shear_2 = inf, shear_3 = 10.0 }
+            rest = { twist = 0.5, bend_2 = [1.0, -0.5, 0.3], bend_3 = 0.8 }
+            coupling = { x = [1.0, 0.0], y = [3.0, 0.0], z = [2.0, 0.0] }
+            load = { gravity = [0.2, -0.3, -2.0] }
+        "#;
+        Scenario::from_toml(text).unwrap()
+    }
+
+    /// An arbitrary state of all rods, not at the clamp.
+    fn begin(equations: &Equations) -> Vec<f64> {
+        let mut y = vec![0.0; equations.size()];
+        for j in 0..3 {
+            let side = j as f64 - 0.7;
+            RodState {
+                r: DVec3::new(0.1 * side, 0.2, -0.1),
+                q: DQuat::from_scaled_axis(DVec3::new(0.5, side, -1.0)),
+                n: DVec3::new(2.0, side, -1.0),
+                m: DVec3::new(0.5, -side, 2.0),
+            }
+            .write(&mut y, j);
+        }
+        y
+    }
+
+    /// The state with the `k`-th component of rod `j` perturbed.
+    fn perturbed(y: &[f64], j: usize, k: usize, by: f64) -> Vec<f64> {
+        let mut y = y.to_vec();
+        let mut rod = RodState::read(&y, j);
+        let change = by * DVec3::AXES[k % 3];
+        match k / 3 {
+            0 => rod.r += change,
+            1 => rod.q = DQuat::from_scaled_axis(change) * rod.q,
+            2 => rod.n += change,
+            _ => rod.m += change,
+        }
+        rod.write(&mut y, j);
+        y
+    }
+
+    fn end(equations: &Equations, y: Vec<f64>) -> Vec<f64> {
+        let mut integrator = Integrator::new(equations, 0.0, y, 1e-13);
+        integrator.run(END, |_| ()).unwrap();
+        integrator.y
+    }
+
+    fn differences(equations: &Equations, a: &[f64], b: &[f64]) -> Vec<f64> {
+        let of_rod = |j: usize| {
+            let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+            let turn = (a.q * b.q.conjugate()).to_scaled_axis();
+            [a.r - b.r, turn, a.n - b.n, a.m - b.m]
+        };
+        let all = (0..equations.rods()).flat_map(of_rod);
+        all.flat_map(|v| v.to_array()).collect()
+    }
+
+    /// Responses of its group to unit perturbations of rod `j`.
+    fn linear<const W: usize>(equations: &Equations, j: usize) -> Perturbations<W> {
+        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+        let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);
+        let mut advance = |integrator: &Integrator| {
+            perturbations.advance(equations, &LinearStep::of(equations, integrator));
+        };
+        integrator.run(END, &mut advance).unwrap();
+        perturbations
+    }
+
+    /// Central differences of order 4.
+    #[test]
+    fn sensitivities_are_the_derivatives_of_the_integration() {
+        let scenario = three();
+        let equations = Equations::new(&scenario);
+        let begin = begin(&equations);
+        for j in 0..3 {
+            let linear = linear::<TANGENT>(&equations, j);
+            assert_eq!(linear.rods, if j < 2 { 0..2 } else { 2..3 });
+            for k in 0..TANGENT {
+                let central = |h: f64| {
+                    let side = |h| end(&equations, perturbed(&begin, j, k, h));
+                    differences(&equations, &side(h), &side(-h))
+                };
+                let (wide, narrow) = (central(2e-3), central(1e-3));
+                for (i, (wide, narrow)) in wide.iter().zip(&narrow).enumerate() {
+                    let slope = (8.0 * narrow - wide) / 12e-3;
+                    let rod = i / TANGENT;
+                    let found = match linear.rods.contains(&rod) {
+                        true => linear.rows()[i - TANGENT * linear.rods.start][k],
+                        false => 0.0,
+                    };
+                    let what = format!("number {i} by {k} of rod {j}: {found}, {slope}");
+                    assert!((found - slope).abs() < 1e-8 * (1.0 + slope.abs()), "{what}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn at_the_clamp_only_forces_and_moments_are_perturbed() {
+        let scenario = three();
+        let equations = Equations::new(&scenario);
+        let (all, some) = (linear::<TANGENT>(&equations, 1), linear::<6>(&equations, 1));
+        for (all, some) in all.rows().iter().zip(some.rows()) {
+            assert_eq!(all[6..], some[..]);
+        }
+    }
+
+    #[test]
+    fn coupled_rods_are_a_group() {
+        let mut scenario = three();
+        assert_eq!(group(&Equations::new(&scenario), 0), 0..2);
+        scenario.coupling[1] = [0.0, 1e-9, 0.0];
+        for j in 0..3 {
+            assert_eq!(group(&Equations::new(&scenario), j), 0..3);
+        }
+        scenario.coupling[0] = [0.0; 3];
+        let groups = [0, 1, 2].map(|j| group(&Equations::new(&scenario), j));
+        assert_eq!(groups, [0..1, 1..3, 1..3]);
+    }
+}
