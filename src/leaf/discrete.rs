@@ -67,7 +67,7 @@ impl DiscreteLeaf {
     }
 
     /// The smallest compliance of any segment, in units of L^2/A.
-    pub fn stiffest(&self) -> f64 {
+    pub fn least_compliance(&self) -> f64 {
         self.sections
             .iter()
             .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))

@@ -75,10 +75,10 @@ pub struct Snapshot {
 pub enum Stopped {
     /// Energy appeared without cause, or a value is not a number.
     #[error(
-        "diverged at t = {time:.6e}: energy grew from nowhere {}; use a shorter step, or {otherwise}",
+        "diverged at t = {time:.6e}: the energy grew {}, which is numerical instability; use a shorter step, or {otherwise}",
         match .percent.is_finite() {
             true => format!("by {percent:.0} % of all that moved"),
-            false => "beyond all numbers".into(),
+            false => "without bound".into(),
         }
     )]
     Diverged {

@@ -32,7 +32,7 @@ pub use crate::relax::result::equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
 };
 pub use crate::relax::result::margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
-pub(crate) use crate::relax::sensitivity::parameter::Number;
+pub(crate) use crate::relax::sensitivity::parameter::Parameter;
 pub(crate) use crate::relax::settle::segments::check_segments;
 pub(crate) use crate::relax::settle::start::start;
 pub(crate) use crate::relax::shooting::{START as SHOOTING_START, check_intervals};

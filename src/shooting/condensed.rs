@@ -20,7 +20,7 @@ const SINGULAR: f64 = 1e-10;
 const ALONG_TURN: f64 = 0.9;
 
 /// The condensed equations, factorised.
-pub struct March {
+pub struct CondensedEquations {
     maps: Vec<Mat<f64>>,
     /// Orthonormal bases of the free perturbations at the inner nodes.
     bases: Vec<Mat<f64>>,
@@ -37,7 +37,7 @@ pub struct March {
     units: Units,
 }
 
-impl March {
+impl CondensedEquations {
     /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turns` of
     /// veins that can turn without resistance, at the base, are left undetermined where they are
     /// what the conditions determine least.
@@ -66,7 +66,7 @@ impl March {
         }
         let svd = conditions.svd().ok()?;
         let determined = svd.S().column_vector().nrows();
-        let mut march = March {
+        let mut march = CondensedEquations {
             maps,
             bases,
             growths,
@@ -248,11 +248,11 @@ mod tests {
         Scenario::from_toml(&text).unwrap()
     }
 
-    fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<March> {
+    fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<CondensedEquations> {
         let scenario = scenario(joined);
         let equations = Equations::new(&scenario);
         let units = Units::new(&equations, &Trajectory::straight(&equations));
-        March::new(&equations, &units, maps, &[])
+        CondensedEquations::new(&equations, &units, maps, &[])
     }
 
     /// Pseudo-random numbers in -1..1.

@@ -12,7 +12,7 @@ use crate::memory;
 use crate::rotation::angle_about;
 use crate::scenario::Turning;
 use crate::shape::equally_spaced;
-use crate::shooting::condensed::March;
+use crate::shooting::condensed::CondensedEquations;
 use crate::shooting::equations::Equations;
 use crate::shooting::intervals::{
     GROWTH, Integrated, Units, choose_intervals, integrate, responses, sensitivities,
@@ -78,7 +78,7 @@ pub struct Newton<'e, 'a, 'p> {
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
     /// The last linearisation.
-    pub condensed: Option<March>,
+    pub condensed: Option<CondensedEquations>,
     /// Growth of perturbations over each interval, at that linearisation.
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
@@ -230,7 +230,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.condensed = March::new(self.equations, &self.units, maps, &self.turns());
+        self.condensed = CondensedEquations::new(self.equations, &self.units, maps, &self.turns());
         match self.condensed {
             Some(_) => Ok(residuals),
             None => Err(no_progress(f64::INFINITY)),
@@ -404,7 +404,7 @@ impl Newton<'_, '_, '_> {
 }
 
 impl Residuals {
-    fn largest(&self, condensed: Option<&March>) -> f64 {
+    fn largest(&self, condensed: Option<&CondensedEquations>) -> f64 {
         let tip = condensed.map(|condensed| condensed.scaled(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();
         largest(defects.map(|value| value.abs()))

@@ -110,7 +110,7 @@ impl Simulation {
         let state = start::state(&leaf, &grid, tolerance)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let doubt = doubt::unstable(&discrete, &physics, &state);
-        let rigid = discrete.stiffest() == 0.0;
+        let rigid = discrete.least_compliance() == 0.0;
         let mut begun = None;
         let choice = match Choice::without_costs(options, &physics, rigid) {
             Some(choice) => choice,

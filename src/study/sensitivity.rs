@@ -2,7 +2,7 @@
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
-    Equilibrium, Number, Options, Progress, RelaxError, relax_on_grids, sensitivities,
+    Equilibrium, Options, Parameter, Progress, RelaxError, relax_on_grids, sensitivities,
 };
 
 /// Why there are no derivatives.
@@ -34,7 +34,7 @@ pub fn relax_with_sensitivities(
     let scenario = base.scenario();
     let values = keys.iter().map(|keys| Ok((keys, base.value(keys)?)));
     let values = values.collect::<Result<Vec<(&Keys, f64)>, VaryError>>()?;
-    let numbers: Vec<(String, Number)> = (values.chunks(1).zip(keys))
+    let numbers: Vec<(String, Parameter)> = (values.chunks(1).zip(keys))
         .map(|(own, keys)| {
             let number = base.parameter(own, 0, keys.unit(scenario));
             (keys.to_string(), number)
@@ -57,7 +57,7 @@ pub fn relax_with_sensitivities(
 
 /// Whether of so many groups of veins that turn about their base without resistance fewer do after
 /// a change of this number: then the smallest change decides where they turn to.
-fn decides_where_it_turns(number: &Number, turnings: usize) -> bool {
+fn decides_where_it_turns(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
         .any(|(_, scenario)| scenario.turnings().len() < turnings)

@@ -83,7 +83,7 @@ fn on_sheet(
     let start = manifold.beside(&start, &point.across, away).ok()?;
     let rates = manifold.rates(&start, false).ok()?;
     let normals = [&along, &point.across];
-    let found = manifold.deflated(start, normals, &[], Some(&rates), false);
+    let found = manifold.bordered(start, normals, &[], Some(&rates), false);
     let found = found.ok()?;
     let index = found.solved.negative;
     (indices.contains(&index) && inside(found.solution.params)).then_some(Neighbour {

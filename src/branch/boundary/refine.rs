@@ -95,7 +95,7 @@ pub fn refine(
     let rigid = Manifold::new(plane, grid.clone())
         .leaves
         .at(step.point.solution.params)?
-        .stiffest();
+        .least_compliance();
     if rigid * NEARLY_RIGID < 1.0
         && let Some((grid, point)) = on_coarser(plane, grid, &step.point)
     {
@@ -134,7 +134,8 @@ fn refine_from(
         let mut start = near.solution.clone();
         let believed = table.tips.best().map_or(0, |best| best.columns + 1);
         predict_spot(&levels, &params, believed, &mut start);
-        let rigid = manifold.leaves.at(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
+        let rigid =
+            manifold.leaves.at(near.solution.params)?.least_compliance() * NEARLY_RIGID < 1.0;
         let (point, along) = match (step.special, rigid) {
             (None, false) => {
                 let left = LEFT * enough;

@@ -183,7 +183,7 @@ impl Search {
         let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, Stuck> {
             let solution = manifold.moved(from, &self.across, step)?;
             let normals = [&self.along, &self.across];
-            let sample = manifold.deflated(solution, normals, &border, Some(&rates), false)?;
+            let sample = manifold.bordered(solution, normals, &border, Some(&rates), false)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,

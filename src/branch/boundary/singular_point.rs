@@ -216,14 +216,19 @@ impl SingularPoint {
     ) -> Result<[f64; 2], Stuck> {
         let modes = &soft[..self.neutral.min(soft.len())];
         let border = manifold.momenta(soft);
-        let stiff = manifold.leaves.at(sample.solution.params)?.stiffest() * STIFF <= 1.0;
+        let stiff = manifold
+            .leaves
+            .at(sample.solution.params)?
+            .least_compliance()
+            * STIFF
+            <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
             let mut at = |step: f64| {
                 let mut solution = manifold.beside(&sample.solution, direction, step)?;
                 if stiff {
                     let (normals, rates) = ([&basis[0], &basis[1]], Some(&sample.rates[..]));
-                    let corrected = manifold.deflated(solution, normals, &border, rates, false)?;
+                    let corrected = manifold.bordered(solution, normals, &border, rates, false)?;
                     solution = corrected.solution;
                 }
                 Ok::<_, Stuck>((step, manifold.curvature(solution, modes)?))

@@ -145,7 +145,7 @@ impl Search<'_, '_> {
         let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
         let moved = equations.moved(&self.from.solution(), tangent, distance)?;
         let border = equations.momenta(self.soft);
-        let sample = equations.deflated(moved, [tangent], &border, None, self.exactly)?;
+        let sample = equations.bordered(moved, [tangent], &border, None, self.exactly)?;
         let eigen = sample.solved.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));

@@ -120,7 +120,7 @@ fn crossing_beside(
 ) -> Result<Critical, Stuck> {
     let border = equations.momenta(soft);
     let moved = equations.moved(&vertex.solution(), across, -beside)?;
-    let sample = equations.deflated(moved, [across], &border, None, false)?;
+    let sample = equations.bordered(moved, [across], &border, None, false)?;
     let from = Point {
         state: sample.solution.state,
         fraction: sample.solution.params[0],

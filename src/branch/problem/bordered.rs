@@ -42,7 +42,7 @@ impl<const N: usize> Equations<'_, N> {
     /// only affect the rate of convergence, and leaves at other parameters cost more than an
     /// iteration. Unless `exactly`, a converged leaf with stiff segments is corrected once more:
     /// an error in the length of such a segment causes a large force.
-    pub fn deflated(
+    pub fn bordered(
         &mut self,
         mut solution: Solution<N>,
         normals: [&Direction<N>; N],
@@ -54,7 +54,8 @@ impl<const N: usize> Equations<'_, N> {
         let normals: [_; N] = from_fn(|k| (&duals[k], normals[k].params.as_slice(), 0.0));
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        let mut corrected = !exactly && self.leaves.at(solution.params)?.stiffest() * STIFF > 1.0;
+        let mut corrected =
+            !exactly && self.leaves.at(solution.params)?.least_compliance() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
             let rates = match rates {
                 Some(rates) => rates.to_vec(),

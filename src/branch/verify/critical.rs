@@ -115,7 +115,7 @@ impl Softening {
         table: &mut Table,
     ) -> Result<(Values, f64), Stuck> {
         let leaf = equations.leaves.at([critical.fraction])?;
-        let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
+        let rigid = leaf.least_compliance() * NEARLY_RIGID < 1.0;
         let mut stiffest = stiffest_condensed(leaf);
         let segments = leaf.segments();
         let fold = critical.kind == Kind::Fold;

@@ -27,7 +27,7 @@ pub struct Response {
 
 impl Forces {
     /// Zero, for `rods` rods.
-    pub fn none(rods: usize) -> Forces {
+    pub fn zeros(rods: usize) -> Forces {
         Forces {
             nodes: vec![Vec::new(); rods],
             gaps: vec![Vec::new(); rods],
@@ -81,7 +81,7 @@ impl Forces {
 
 impl Response {
     /// Zero, for `rods` rods of `segments` segments.
-    pub fn none(rods: usize, segments: usize) -> Response {
+    pub fn zeros(rods: usize, segments: usize) -> Response {
         Response {
             nodes: vec![vec![[0.0; 6]; segments]; rods],
             carried: vec![DVec3::ZERO; rods * segments],

@@ -161,7 +161,7 @@ impl DiscreteLeaf {
     /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
     /// with these segments.
     pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
-        let mut forces = Forces::none(self.rods());
+        let mut forces = Forces::zeros(self.rods());
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {

@@ -54,7 +54,7 @@ const NORMALISED: usize = 8;
 const PARALLEL_SEGMENTS: usize = 3000;
 
 /// Number of rods that are not divided further: about two portions for every thread.
-fn share(rods: usize) -> usize {
+fn packs_per_task(rods: usize) -> usize {
     (rods / (2 * rayon::current_num_threads())).max(1)
 }
 
@@ -103,7 +103,7 @@ impl Explicit {
         state: &State,
         step: Option<f64>,
     ) -> Result<Self, Rigid> {
-        if leaf.stiffest() == 0.0 {
+        if leaf.least_compliance() == 0.0 {
             return Err(Rigid);
         }
         let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
@@ -342,7 +342,7 @@ impl Explicit {
             let next = (x.par_chunks_mut(length).zip(y.par_chunks_mut(length)))
                 .zip(z.par_chunks_mut(length));
             (self.packs.par_iter_mut().zip(next).enumerate())
-                .with_min_len(share(layout.packs()))
+                .with_min_len(packs_per_task(layout.packs()))
                 .for_each_init(Block::new, |block, (p, (pack, ((x, y), z)))| {
                     one(block, p, pack, [x, y, z]);
                 });

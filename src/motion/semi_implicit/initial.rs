@@ -27,7 +27,7 @@ impl SemiImplicit {
     pub(super) fn initialise(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, INVERSE_STEP_SQUARED);
         let violation = self.leaf.strain_forces(&mut self.state);
-        if self.leaf.stiffest() > 0.0 {
+        if self.leaf.least_compliance() > 0.0 {
             return self.set_accelerations();
         }
         if violation > VIOLATION {

@@ -40,7 +40,7 @@ pub fn unstrained(leaf: &DiscreteLeaf, near: &State) -> Option<State> {
 fn held(leaf: &DiscreteLeaf, system: &mut System, near: &State, rate: f64) -> Option<State> {
     let mut state = near.clone();
     let mut floor = FIRST_COMPLIANCE;
-    let last = leaf.stiffest().max(LAST_COMPLIANCE);
+    let last = leaf.least_compliance().max(LAST_COMPLIANCE);
     leaf.softened(floor).strain_forces(&mut state);
     let mut hold = |leaf: &DiscreteLeaf, accuracy: f64| {
         let newton = Newton {

@@ -14,7 +14,7 @@ use crate::leaf::{DiscreteLeaf, Forces, Leaf, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::result::equilibrium::{Reaction, Sensitivity};
-use crate::relax::sensitivity::parameter::Number;
+use crate::relax::sensitivity::parameter::Parameter;
 use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
 use glam::DVec3;
@@ -32,7 +32,7 @@ const FEW_UNKNOWNS: usize = 4_000;
 /// are needed.
 type Known<'n, 'a> = (
     &'n String,
-    &'n Number<'a>,
+    &'n Parameter<'a>,
     Vec<(f64, Scenario)>,
     Vec<(f64, f64, Arc<Scenario>)>,
 );
@@ -46,7 +46,7 @@ type Changes = [Vec<DVec3>; 5];
 /// admissible differences, and all numbers if the leaf is at a singular point.
 pub(crate) fn sensitivities(
     levels: &[Level],
-    numbers: &[(String, Number)],
+    numbers: &[(String, Parameter)],
     tolerance: f64,
     modes: usize,
 ) -> Vec<Sensitivity> {
@@ -252,7 +252,7 @@ impl Grid<'_> {
 pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
     let n = leaf.segments();
     let force = |(tip, axis): (usize, usize)| {
-        let mut unit = Forces::none(leaf.rods());
+        let mut unit = Forces::zeros(leaf.rods());
         unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;
         unit
     };

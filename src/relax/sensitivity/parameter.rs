@@ -30,7 +30,7 @@ const ONE_SIDED: [(f64, f64); 5] = [
 ];
 
 /// A numerical parameter of a scenario.
-pub(crate) struct Number<'a> {
+pub(crate) struct Parameter<'a> {
     /// The scenario with another value of the parameter, if that is admissible.
     pub make: Box<dyn Fn(f64) -> Option<Scenario> + Send + Sync + 'a>,
     /// Its value.
@@ -41,7 +41,7 @@ pub(crate) struct Number<'a> {
     pub linear: bool,
 }
 
-impl Number<'_> {
+impl Parameter<'_> {
     fn size(&self) -> f64 {
         match self.value.abs() {
             size if size > 0.0 => size,

@@ -12,7 +12,7 @@ use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::transfer::predict::weights;
-use crate::relax::{AtRest, Level, Lost, Nearby, Number, unit_forces};
+use crate::relax::{AtRest, Level, Lost, Nearby, Parameter, unit_forces};
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
@@ -208,7 +208,7 @@ impl CaseAt {
     /// Its response to steps of the numbers on these grids, each of which must be one of its
     /// own; empty if there are no steps.
     pub fn answer(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
-        let none = |level: &Level| Response::none(level.leaf.rods(), level.leaf.segments());
+        let none = |level: &Level| Response::zeros(level.leaf.rods(), level.leaf.segments());
         match &self.responses {
             Some(responses) if steps.iter().any(|step| *step != 0.0) => responses.to(levels, steps),
             _ => Ok(levels.iter().map(none).collect()),
@@ -271,7 +271,7 @@ impl CaseAt {
     pub fn result_rate(
         &self,
         quantity: Quantity,
-        (number, rate, responses): (&Number, &LeafRate, &[Response]),
+        (number, rate, responses): (&Parameter, &LeafRate, &[Response]),
     ) -> f64 {
         match quantity {
             Quantity::Tip(axis) => {

@@ -9,7 +9,7 @@ use super::model::{Change, Model, Point};
 use super::quantity::Quantity;
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
-use crate::relax::{Grids, Lost, Number};
+use crate::relax::{Grids, Lost, Parameter};
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
@@ -38,10 +38,10 @@ impl Model<'_> {
         let of = &self.cases[case];
         let values = self.values(of, theta);
         let first = values.len() - theta.len();
-        let numbers: Vec<Number> = (self.coordinates.iter().enumerate())
+        let numbers: Vec<Parameter> = (self.coordinates.iter().enumerate())
             .map(|(k, free)| self.base.parameter(&values, first + k, free.unit))
             .collect();
-        let changes = || -> Option<Vec<Change>> { numbers.iter().map(Number::rate).collect() };
+        let changes = || -> Option<Vec<Change>> { numbers.iter().map(Parameter::rate).collect() };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
         let leaf = &found.at.levels[0].leaf.leaf;
         let own: Vec<Change>;
@@ -84,7 +84,7 @@ impl CaseAt {
     fn rates(
         &self,
         responses: &Responses,
-        (numbers, rates): (&[Number], &[LeafRate]),
+        (numbers, rates): (&[Parameter], &[LeafRate]),
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();

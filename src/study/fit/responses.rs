@@ -82,13 +82,13 @@ impl Responses {
         let on = |(k, level): (usize, &Level)| {
             let (rods, segments) = (level.leaf.rods(), level.leaf.segments());
             if !self.each.is_empty() {
-                let mut sum = Response::none(rods, segments);
+                let mut sum = Response::zeros(rods, segments);
                 for (responses, step) in self.each.iter().zip(steps) {
                     sum.add(*step, &responses[k]);
                 }
                 return Ok(sum);
             }
-            let mut sum = Forces::none(rods);
+            let mut sum = Forces::zeros(rods);
             for (forces, step) in self.forces[k].iter().zip(steps) {
                 sum.add(*step, forces);
             }

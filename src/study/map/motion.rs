@@ -62,7 +62,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
                     let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
                     failed(MapOutcome::NotConverged, format!("{at} {bent}"))
                 }
-                _ => failed(MapOutcome::Diverged, format!("energy from nowhere {at}")),
+                _ => failed(MapOutcome::Diverged, format!("numerical instability {at}")),
             };
         }
         if limit.reached() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::relax::Number;
+use crate::relax::Parameter;
 use crate::scenario::{self, Entries, Form, Key, Scenario};
 
 /// A scenario with some entries replaced, into which numbers are substituted.
@@ -194,9 +194,9 @@ impl Base {
         values: &'v [(&'v Keys, f64)],
         k: usize,
         unit: f64,
-    ) -> Number<'v> {
+    ) -> Parameter<'v> {
         let (keys, value) = values[k];
-        Number {
+        Parameter {
             make: Box::new(move |value| {
                 let mut values = values.to_vec();
                 values[k].1 = value;

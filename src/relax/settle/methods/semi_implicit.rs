@@ -67,7 +67,7 @@ pub fn softens(leaf: &Leaf) -> bool {
 impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
-        let stiffest = leaf.stiffest();
+        let stiffest = leaf.least_compliance();
         let moving_compliance = moving_compliance(&leaf.leaf, self.pushes);
         if stiffest >= moving_compliance {
             return self.move_to_rest(leaf, system, self.accuracy);
