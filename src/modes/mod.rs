@@ -18,6 +18,7 @@ mod lanczos;
 mod loaded;
 mod masses;
 mod quotient;
+mod starts;
 
 use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Field, Increment, State, System};
 use crate::limit::Limit;
@@ -352,31 +353,6 @@ impl Vibration<'_> {
         found.extend(more);
         found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
         bound
-    }
-
-    /// A load that excites all approximate modes not found yet.
-    fn near_start(&self, found: usize) -> Vec<f64> {
-        let mut load = vec![0.0; self.pattern.size()];
-        for near in &self.near[found..] {
-            (load.iter_mut().zip(near)).for_each(|(load, near)| *load += near);
-        }
-        self.masses.times(&load)
-    }
-
-    /// A load without any symmetry, different in every search.
-    fn start(&self, search: usize) -> Vec<f64> {
-        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
-        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
-        let mut load = vec![0.0; self.pattern.size()];
-        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
-            let sigma = self.leaf.grid.sigma()[i];
-            let wave = (7.0 * search as f64 * sigma).sin();
-            for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {
-                let k = 18 * (j + 97 * search) + c;
-                load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
-            }
-        }
-        self.masses.times(&load)
     }
 
     /// A vector as turns and shifts of all nodes.

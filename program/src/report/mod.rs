@@ -3,9 +3,11 @@
 mod centerlines;
 mod chart;
 mod check;
+mod equilibria;
 mod fit;
 pub mod json;
 mod map;
+mod margin;
 pub mod numbers;
 mod relax;
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! factorised in linear time and preconditions conjugate gradients for K; E is weak compared
 //! with a rod's own stiffness ([`solve`]).
 
+mod coupling;
 mod kernels;
 mod solve;
 
@@ -110,7 +111,7 @@ impl System {
         let joined = leaf.tips_move_together();
         let coupled = leaf.coupled();
         let gaps = match coupled {
-            true => gaps(leaf).collect(),
+            true => coupling::of_gaps(leaf).collect(),
             false => Vec::new(),
         };
         let count = rods.div_ceil(GROUP);
@@ -136,9 +137,9 @@ impl System {
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
         if self.coupled {
             self.gaps.clear();
-            self.gaps.extend(gaps(leaf));
+            self.gaps.extend(coupling::of_gaps(leaf));
             for (g, group) in self.groups.iter_mut().enumerate() {
-                group.coupling = coupling(rods_of(g, self.rods), &self.gaps);
+                group.coupling = coupling::of_group(rods_of(g, self.rods), &self.gaps);
             }
         }
     }
@@ -350,32 +351,6 @@ impl System {
     }
 }
 
-/// Coupling of every gap per weight.
-fn gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
-    let gap = move |g: usize| {
-        // A node in the mirror plane is not displaced across it.
-        let free = match leaf.leaf.in_plane(g) {
-            true => DVec3::new(1.0, 0.0, 1.0),
-            false => DVec3::ONE,
-        };
-        free * leaf.coupling(g - 1)
-    };
-    (1..leaf.rods()).map(gap)
-}
-
-/// Coupling of the rods of a group with the previous and the next rods.
-fn coupling(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
-    let mut coupling = [[Four::default(); 3]; 2];
-    for (lane, j) in rods.enumerate() {
-        for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
-            for c in 0..3 {
-                coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
-            }
-        }
-    }
-    coupling
-}
-
 impl Group {
     /// Allocates the equations of a group of the rods of `leaf`.
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
@@ -395,7 +370,7 @@ impl Group {
             solution: zeros.clone(),
             sums: Sums::default(),
             masses,
-            coupling: coupling(rods_of(group, leaf.rods()), gaps),
+            coupling: coupling::of_group(rods_of(group, leaf.rods()), gaps),
             residual: zeros.clone(),
             z: zeros.clone(),
             b_p: zeros,

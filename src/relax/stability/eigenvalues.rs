@@ -1,6 +1,8 @@
 //! The modes of the settled leaf, extrapolated over nested grids, in the units of the
 //! scenario.
 
+mod shapes;
+
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, System, shift, turn};
 use crate::modes;
 use crate::modes::{Eigenpair, Wanted};
@@ -15,6 +17,7 @@ use crate::relax::transfer::predict::predict;
 use crate::relax::transfer::prolong::prolong;
 use crate::relax::transfer::stencil::Stencil;
 use glam::DVec3;
+use shapes::normalized;
 use std::borrow::Cow;
 
 /// Largest number of unknowns of the finest grid for which modes are computed without their
@@ -111,7 +114,7 @@ impl List {
             count: run.options.modes,
             above: None,
             decides: false,
-            exact: run.options.modes > 0,
+            exact: false,
         }
     }
 }
@@ -157,7 +160,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
         coarser: None,
         segments: Vec::new(),
     };
-    let sharp = requested && options.mode_shapes;
+    let sharp = requested && options.mode_shapes || list.exact;
     let few = requested && !list.decides && count < FEW;
     let compares =
         (few || run.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
@@ -373,29 +376,4 @@ impl OnGrid<'_> {
         };
         self.pairs.iter().map(shape).collect()
     }
-}
-
-/// A shape in the scenario's unit of length, normalised.
-fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
-    let nodes = || shape.iter().flatten();
-    let largest =
-        |part: fn(&Increment) -> DVec3| nodes().map(|node| part(node).length()).fold(0.0, f64::max);
-    let (far, turned) = (largest(shift), largest(turn));
-    let (size, part): (f64, fn(&Increment) -> DVec3) = match far > NO_DISPLACEMENT * turned {
-        true => (far, shift),
-        false => (turned, turn),
-    };
-    let components: Vec<f64> = nodes().flat_map(|node| part(node).to_array()).collect();
-    let most = components.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    // The last of those that are equal up to rounding: a tip's.
-    let mut last = components.iter().rev();
-    let sign = last
-        .find(|c| c.abs() > 0.99 * most)
-        .map_or(1.0, |c| c.signum());
-    let rods = |part: fn(&Increment) -> DVec3, unit: f64| {
-        let rod = |rod: &Vec<Increment>| rod.iter().map(|node| part(node) * unit).collect();
-        shape.iter().map(rod).collect()
-    };
-    let unit = sign / size;
-    (rods(shift, unit * length), rods(turn, unit))
 }
