@@ -69,6 +69,12 @@ impl Run {
     }
 }
 
+impl Default for Workplace {
+    fn default() -> Self {
+        Workplace::new()
+    }
+}
+
 impl Workplace {
     pub fn new() -> Self {
         let place = Workplace::empty();
