@@ -19,7 +19,7 @@ use crate::shooting::equations::Equations;
 use crate::shooting::intervals::{
     GROWTH, Integrated, Units, choose_intervals, integrate, responses, sensitivities,
 };
-use crate::shooting::solution::{Correction, Log, Neutral, Reason};
+use crate::shooting::solution::{Correction, Log, Reason};
 use crate::shooting::state::{RodState, TANGENT};
 use crate::shooting::trajectory::{Nodes, Trajectory};
 use glam::{DQuat, DVec3};

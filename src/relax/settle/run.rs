@@ -6,7 +6,6 @@ mod error;
 use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, System, whole_fields};
 use crate::newton::{Contraction, Stop, Work};
-use crate::relax::accuracy::defect;
 use crate::relax::accuracy::defect::{Estimate, Linear};
 use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::path::{Path, Route, Stage};

@@ -1,6 +1,10 @@
 //! Directions in which the equations are nearly singular, and why there is no convergence.
 
-use super::*;
+use super::{LARGEST_GROWTH, NEARLY_SINGULAR, NUDGE, Newton, STATIONS, size_of};
+use crate::largest::largest;
+use crate::shooting::solution::{Neutral, Reason};
+use crate::shooting::trajectory::{Nodes, Trajectory};
+use glam::DVec3;
 
 impl Newton<'_, '_, '_> {
     /// Smallest singular value of the condensed equations over the largest.

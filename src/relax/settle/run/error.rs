@@ -1,6 +1,13 @@
 //! The error of what a run has found, from its grids and the defect on them.
 
-use super::*;
+use super::{
+    COARSEST, CORRECTED, CORRECTIONS, EXTRAPOLATED, LARGEST, LAYERS, LEAST_ALONE, OUT_OF_REACH,
+    ROUNDING, Run, SAFETY, is_large,
+};
+use crate::largest::larger;
+use crate::relax::accuracy::defect;
+use crate::relax::accuracy::defect::Estimate;
+use crate::relax::request::method::Method;
 
 impl Run<'_, '_> {
     /// Segments of the grid whose linear equations tell the error; of the finest if none do.

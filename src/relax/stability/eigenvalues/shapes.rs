@@ -1,6 +1,8 @@
 //! Normalised shapes of modes.
 
-use super::*;
+use super::{NO_DISPLACEMENT, Shape};
+use crate::leaf::{Increment, shift, turn};
+use glam::DVec3;
 
 /// A shape in the scenario's unit of length, normalised.
 pub(super) fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
