@@ -1,9 +1,7 @@
 //! Converts errors to exceptions.
 
 use std::error::Error;
-use std::iter::successors;
 
-use leafdyn::relax::RefusedOption;
 use leafdyn::scenario::{Key, Place, ScenarioError};
 use leafdyn::study::VaryError;
 use pyo3::exceptions::PyValueError;
@@ -102,19 +100,9 @@ pub fn entry_error(py: Python, key: &str, in_set: bool, problem: String) -> PyEr
     scenario_error(py, &error)
 }
 
-/// A `ValueError`, for a request that cannot be met: an option as the argument that it is.
-pub fn value_error(error: impl Error + 'static) -> PyErr {
-    let first: &(dyn Error + 'static) = &error;
-    let mut causes = successors(Some(first), |&error| error.source());
-    let refused = causes.find_map(|error| error.downcast_ref::<RefusedOption>());
-    PyValueError::new_err(match refused {
-        Some(RefusedOption {
-            option,
-            value,
-            reason,
-        }) => format!("{option}={value}: {reason}"),
-        None => error.to_string(),
-    })
+/// A `ValueError`, for a request that cannot be met.
+pub fn value_error(error: impl Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// The exception for a number that cannot vary, or for a scenario refused with it.

@@ -12,13 +12,13 @@ from leaves import fan, program
 
 import leafdyn
 
-TESTS = Path(__file__).parents[2] / "tests"
+ROOT = Path(__file__).parents[2]
 
 
 def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
     """The valid scenario of the tests in Rust, and every line that they put into it with parts of the message."""
-    source = (TESTS / "hostile_scenarios.rs").read_text()
-    valid = (TESTS / "common" / "valid.rs").read_text().split('r#"', 1)[1].split('"#', 1)[0]
+    source = (ROOT / "program/tests/hostile/scenarios.rs").read_text()
+    valid = (ROOT / "tests/support/valid.rs").read_text().split('r#"', 1)[1].split('"#', 1)[0]
     rows = []
     for table in re.findall(r'r#"([^#]*)"#;\s*all_refused\(table, refused\)', source):
         for row in filter(str.strip, table.splitlines()):
