@@ -335,6 +335,48 @@ fn crossings_are_where_their_errors_say() {
     }
 }
 
+/// Two round columns side by side buckle together at the second load of Euler, and against each other at
+/// that of a column on a foundation twice as stiff as what couples them: where the loads are one, two curves cross
+/// along each of which two modes become neutral. They are followed through it, and say where it is.
+#[test]
+fn curves_of_two_modes_each_pass_where_they_cross() {
+    const COLUMNS: &str = r#"
+        name = "columns"
+        leaf = { rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false }
+        stiffness = { torsion = 10.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+        coupling = { y = 1.0, z = 1.0 }
+        load = { tip_force = [-1.0, 0.0, 0.0] }
+    "#;
+    let across = "coupling.y+coupling.z=200..280";
+    let along = "load.tip_force[0]=-1..-30";
+    let found = followed(1e-6, COLUMNS, "", [along, across]).unwrap();
+    assert!(found.complete, "{:?}", found.remark);
+    // From the determinant of the fourth-order equation of a clamped column on a foundation.
+    let (load, coupling) = (-2.25 * PI * PI, 235.462_426_716);
+    let crossing = |curve: &BoundaryCurve| {
+        let special = curve.points.iter().filter(|point| point.kind == "crossing");
+        let special: Vec<_> = special.collect();
+        for point in &special {
+            let ([p, c], [pe, ce]) = (point.values, point.errors);
+            assert!((p - load).abs() <= pe && pe < 1e-4, "{point:?}");
+            assert!((c - coupling).abs() <= ce && ce < 1e-3, "{point:?}");
+        }
+        special.len()
+    };
+    let each: Vec<_> = found
+        .curves
+        .iter()
+        .map(|curve| (curve.multiplicity, crossing(curve)))
+        .collect();
+    // The curve of Euler's first load meets no other.
+    let meets: Vec<_> = each.iter().map(|(modes, met)| (*modes, *met > 0)).collect();
+    assert_eq!(meets, [(2, false), (2, true), (2, true)]);
+    for curve in &found.curves {
+        let at: Vec<_> = ends(curve).iter().map(|point| point.values[1]).collect();
+        assert_eq!(at, [200.0, 280.0]);
+    }
+}
+
 /// Following the undulation boundary and verifying its points takes few matrices, 24.4 a point,
 /// the first trace among them: work must not grow unnoticed. The leaf waves beyond, however
 /// close behind it another mode becomes unstable.

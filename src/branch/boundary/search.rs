@@ -1,8 +1,13 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
 use super::manifold::{Direction, Manifold, Sample, Solution};
 use crate::branch::problem::equations::{ITERATIONS, Stuck};
 use crate::branch::problem::field::{add, combined, dot, times};
+use crate::largest::largest;
 use crate::leaf::Field;
 use crate::newton::{Contraction, converged};
 
@@ -25,6 +30,8 @@ pub struct Eigen {
     /// Eigenvectors of H: first theirs, then the others; and the eigenvalues of the others.
     pub vectors: Vec<Vec<f64>>,
     pub others: Vec<f64>,
+    /// Their rounding error: that of the forces on so many segments.
+    pub rounding: f64,
 }
 
 /// A search for a point of a boundary.
@@ -53,27 +60,51 @@ pub struct Found {
 }
 
 /// The eigenvalues of H; the first `neutral` modes of the border become neutral.
+///
+/// Modes that a symmetry keeps apart do not mix, and H couples them by no more than rounding. Where
+/// their eigenvalues coincide, its eigenvectors are any mixture of them: then each part has its
+/// own.
 pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
-    let all = sample.solved.h.clone().symmetric_eigen();
-    let count = all.eigenvalues.len();
-    // The neutral modes come first in the border.
-    let weight = |k: usize| -> f64 {
-        let own = (0..neutral).map(|i| all.eigenvectors[(i, k)].powi(2));
-        own.sum()
+    let h = &sample.solved.h;
+    let (own, count) = (neutral.min(h.nrows()), h.nrows());
+    let coupling = h.view((0, own), (own, count - own));
+    let segments = sample.solution.state.segments() as f64;
+    let rounding = sample.noise * segments * segments;
+    let apart = largest(coupling.iter().map(|v| v.abs())) <= rounding;
+    let mut pairs = match apart {
+        true => [eigenpairs(h, 0..own), eigenpairs(h, own..count)].concat(),
+        false => eigenpairs(h, 0..count),
     };
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
-    let values: Vec<f64> = order.iter().map(|&k| all.eigenvalues[k]).collect();
-    let (own, others) = values.split_at(neutral.min(count));
+    // The neutral modes come first in the border.
+    let weight = |vector: &[f64]| -> f64 { vector[..own].iter().map(|v| v * v).sum() };
+    pairs.sort_by(|(_, a), (_, b)| weight(b).total_cmp(&weight(a)));
+    let (values, vectors): (Vec<f64>, Vec<Vec<f64>>) = pairs.into_iter().unzip();
+    let (own, others) = values.split_at(own);
     let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
     let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
-    let vector = |&k: &usize| all.eigenvectors.column(k).iter().copied().collect();
     Eigen {
         value: own.iter().sum::<f64>() / neutral as f64,
         spread: most - least,
-        vectors: order.iter().map(vector).collect(),
+        vectors,
         others: others.to_vec(),
+        rounding,
     }
+}
+
+/// Eigenvalues and eigenvectors of the part of a symmetric matrix in these rows and columns.
+fn eigenpairs(h: &DMatrix<f64>, rows: Range<usize>) -> Vec<(f64, Vec<f64>)> {
+    let (first, count) = (rows.start, rows.len());
+    let all = h
+        .view((first, first), (count, count))
+        .into_owned()
+        .symmetric_eigen();
+    let pair = |k: usize| {
+        let mut vector = vec![0.0; h.nrows()];
+        let own = all.eigenvectors.column(k);
+        vector[rows.clone()].copy_from_slice(own.as_slice());
+        (all.eigenvalues[k], vector)
+    };
+    (0..count).map(pair).collect()
 }
 
 impl Search {

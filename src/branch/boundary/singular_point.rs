@@ -22,7 +22,7 @@ const FORCED: f64 = 1e-5;
 /// arclength, do not vanish together.
 const TOGETHER: f64 = 1e-5;
 
-/// Eigenvalues below this belong to neutral modes.
+/// Eigenvalues below this, or below their rounding error, belong to neutral modes.
 const NEUTRAL: f64 = 1e-7;
 
 /// A point of a boundary on one grid.
@@ -254,7 +254,8 @@ impl SingularPoint {
         let solved = &sample.solved;
         let p = solved.modes.len();
         let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
-        let left = others.filter(|(value, _)| value.abs() < NEUTRAL);
+        let least = eigen.least();
+        let left = others.filter(|(value, _)| value.abs() < least);
         let mut frozen: Vec<&Vec<f64>> = left.map(|(_, vector)| vector).collect();
         if self.kind == Kind::Branching {
             // Another branch may leave along a neutral mode: exclude that from the tangent plane.
@@ -345,6 +346,13 @@ impl SingularPoint {
     }
 }
 
+impl Eigen {
+    /// The least eigenvalue that does not belong to a neutral mode.
+    fn least(&self) -> f64 {
+        NEUTRAL.max(self.rounding)
+    }
+}
+
 /// The modes for the next border: from the eigenvectors of H.
 fn soft(manifold: &Manifold, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
     let modes = eigen.vectors.iter();
@@ -355,7 +363,8 @@ fn soft(manifold: &Manifold, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
 /// Morse index beyond the boundary: from the inertia of the bordered matrix, which is that of
 /// the matrix and that of H together. Only the boundary's own neutral modes count as negative.
 fn index(sample: &Sample, eigen: &Eigen) -> usize {
-    let held_negative = eigen.others.iter().filter(|&&h| h < NEUTRAL).count();
+    let least = eigen.least();
+    let held_negative = eigen.others.iter().filter(|&&h| h < least).count();
     sample.solved.negative.saturating_sub(held_negative)
 }
 
