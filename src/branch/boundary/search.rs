@@ -11,6 +11,9 @@ use crate::largest::largest;
 use crate::leaf::Field;
 use crate::newton::{Contraction, converged};
 
+/// Eigenvalues below this, or below their rounding error, belong to neutral modes.
+pub const NEUTRAL: f64 = 1e-7;
+
 /// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 30;
 
@@ -32,6 +35,13 @@ pub struct Eigen {
     pub others: Vec<f64>,
     /// Their rounding error: that of the forces on so many segments.
     pub rounding: f64,
+}
+
+impl Eigen {
+    /// The least eigenvalue that does not belong to a neutral mode.
+    pub fn least(&self) -> f64 {
+        NEUTRAL.max(self.rounding)
+    }
 }
 
 /// A search for a point of a boundary.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::manifold::{Direction, Manifold, Sample, Solution};
-use super::search::{self, Eigen, Found, Search};
+use super::search::{self, Eigen, Found, NEUTRAL, Search};
 use crate::branch::events::critical::{Critical, Kind};
 use crate::branch::problem::bordered::STIFF;
 use crate::branch::problem::equations::Stuck;
@@ -21,9 +21,6 @@ const FORCED: f64 = 1e-5;
 /// Eigenvalues that differ by more than this, relative to their derivative with respect to
 /// arclength, do not vanish together.
 const TOGETHER: f64 = 1e-5;
-
-/// Eigenvalues below this, or below their rounding error, belong to neutral modes.
-const NEUTRAL: f64 = 1e-7;
 
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
@@ -343,13 +340,6 @@ impl SingularPoint {
             speed: -self.speed,
             ..self.clone()
         }
-    }
-}
-
-impl Eigen {
-    /// The least eigenvalue that does not belong to a neutral mode.
-    fn least(&self) -> f64 {
-        NEUTRAL.max(self.rounding)
     }
 }
 
