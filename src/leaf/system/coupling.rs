@@ -1,6 +1,7 @@
 //! The coupling of neighbouring rods, in the lanes of their groups.
 
-use super::{DiscreteLeaf, Four};
+use crate::lanes::Four;
+use crate::leaf::DiscreteLeaf;
 use glam::DVec3;
 use std::ops::Range;
 

@@ -17,7 +17,7 @@ use crate::relax::transfer::predict::predict;
 use crate::relax::transfer::prolong::prolong;
 use crate::relax::transfer::stencil::Stencil;
 use glam::DVec3;
-use shapes::normalized;
+use shapes::{Shape, normalized};
 use std::borrow::Cow;
 
 /// Largest number of unknowns of the finest grid for which modes are computed without their
@@ -56,10 +56,6 @@ const COMPARED: usize = 3;
 /// farther away is another equilibrium.
 const ITERATIONS: usize = 12;
 const SAME_PLACE: f64 = 0.02;
-
-/// A mode with smaller displacements than this, in lengths per radian of its rotation, is one
-/// of rotation alone.
-const NO_DISPLACEMENT: f64 = 1e-6;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
@@ -338,9 +334,6 @@ fn settle(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> Option<Lev
     (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
     (guess.shift_to(&state) < SAME_PLACE).then_some(Level { leaf, state })
 }
-
-/// Displacements and rotations of all nodes, rod by rod.
-type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
 impl OnGrid<'_> {
     /// The shapes interpolated to a finer grid.

@@ -1,8 +1,14 @@
 //! Normalised shapes of modes.
 
-use super::{NO_DISPLACEMENT, Shape};
 use crate::leaf::{Increment, shift, turn};
 use glam::DVec3;
+
+/// A mode with smaller displacements than this, in lengths per radian of its rotation, is one
+/// of rotation alone.
+const NO_DISPLACEMENT: f64 = 1e-6;
+
+/// Displacements and rotations of all nodes, rod by rod.
+pub(super) type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
 /// A shape in the scenario's unit of length, normalised.
 pub(super) fn normalized(shape: &[Vec<Increment>], length: f64) -> Shape {
