@@ -1,15 +1,15 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
 use crate::largest::largest;
-use crate::leaf::{Grid, RodFields, State};
-use crate::memory;
+use crate::leaf::{Grid, State};
 use crate::newton::Stop;
-use crate::relax::accuracy::nodal_fields::finer_nodes;
 use crate::relax::accuracy::richardson::distance;
-use crate::relax::request::options::MAX_NODES;
-use crate::relax::settle::iteration::{InitialGuess, Settled};
-use crate::relax::settle::run::{BUDGET, Run};
-use crate::relax::settle::segments::{COARSEST_TURN, FINEST};
+use crate::relax::nested::{Found, NestedEquilibrium};
+use crate::relax::request::problem::Problem;
+use crate::relax::settle::effort::{BUDGET, Effort};
+use crate::relax::settle::iteration::{InitialGuess, Settled, settle};
+use crate::relax::settle::push::check_stability;
+use crate::relax::settle::segments::COARSEST_TURN;
 use crate::relax::transfer::level::{Level, positions};
 use crate::relax::transfer::predict::predict;
 use crate::relax::transfer::prolong::{prolong, restrict};
@@ -24,208 +24,217 @@ const FINEST_COMPARED: usize = 256;
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 pub(super) const FINEST_RESOLVING: usize = 2048;
 
-impl Run<'_, '_> {
-    /// From the start to rest, on as many grids as the tolerance needs; returns
-    /// whether the finest grid allowed reaches it.
-    pub fn solve(&mut self, grid: Grid) -> Result<bool, Stop> {
-        self.settle_from_start(grid)?;
-        self.refine()
-    }
+/// From the start to rest, on as many grids as the tolerance needs.
+pub fn solve(problem: &Problem, grid: Grid, effort: &mut Effort) -> Found {
+    let found = settle_from_start(problem, grid, effort)?;
+    refine(problem, found, effort)
+}
 
-    /// The same from initial guesses on nested grids, each close to an equilibrium.
-    pub fn follow(&mut self, guesses: Vec<(Grid, State)>) -> Result<bool, Stop> {
-        self.follow_on_these(guesses)?;
-        self.refine()
-    }
+/// The same from initial guesses on nested grids, each close to an equilibrium.
+pub fn follow(
+    problem: &Problem,
+    begun: NestedEquilibrium,
+    guesses: Vec<(Grid, State)>,
+    effort: &mut Effort,
+) -> Found {
+    let found = follow_on_these(problem, begun, guesses, effort)?;
+    refine(problem, found, effort)
+}
 
-    /// The same on these grids alone, whatever their accuracy; stability is not checked beyond
-    /// the positive definite matrix of the iteration.
-    pub fn follow_on_these(&mut self, guesses: Vec<(Grid, State)>) -> Result<(), Stop> {
-        for (grid, state) in guesses {
-            let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Coarser(state));
-            self.push(level);
-            rest?;
+/// The same on these grids alone, whatever their accuracy; stability is not checked beyond
+/// the positive definite matrix of the iteration.
+pub fn follow_on_these(
+    problem: &Problem,
+    begun: NestedEquilibrium,
+    guesses: Vec<(Grid, State)>,
+    effort: &mut Effort,
+) -> Found {
+    (guesses.into_iter()).try_fold(begun, |found, (grid, state)| {
+        settle_next(problem, found, (grid, InitialGuess::Coarser(state)), effort)
+    })
+}
+
+/// Continues a leaf at rest to a `finer` grid, with all of its unknowns.
+pub fn continue_on(
+    problem: &Problem,
+    found: NestedEquilibrium,
+    finer: Grid,
+    effort: &mut Effort,
+) -> Found {
+    let mut found = settle_on(problem, found, finer, effort)?;
+    found.solved = problem.leaf.rods();
+    refine(problem, found, effort)
+}
+
+/// Refines until the tolerance is kept by a leaf whose stability is known, or no finer grid is
+/// allowed.
+pub fn refine(problem: &Problem, mut found: NestedEquilibrium, effort: &mut Effort) -> Found {
+    loop {
+        found = found.estimated(problem, &mut effort.spare_system, &mut effort.work);
+        let mut known = false;
+        if found.is_accurate() {
+            (found, known) = check_stability(problem, found, false, effort)?;
         }
-        Ok(())
-    }
-
-    /// Refines until the tolerance is reached.
-    pub fn refine(&mut self) -> Result<bool, Stop> {
-        loop {
-            self.estimate_accuracy();
-            if self.accurate() && self.check_stability(false)? && !self.needs_another_grid() {
-                return Ok(true);
+        if known {
+            let another = needs_another_grid(problem, &found);
+            found.added_for_nodes |= another;
+            if !another {
+                found.keeps_tolerance = true;
+                return Ok(found);
             }
-            if self.out_of_time() {
-                return Err(Stop::StepLimit);
-            }
-            let Some(finer) = self.finer() else {
-                self.check_stability(true)?;
-                return Ok(false);
-            };
-            self.settle_on(finer)?;
         }
-    }
-
-    /// Whether all nodes of the finest grid are requested and the leaf is not accurate enough
-    /// there; then one more grid is added.
-    fn needs_another_grid(&mut self) -> bool {
-        let enough = !self.options.every_node || self.integrated().is_some();
-        if enough || self.added_for_nodes || self.finer().is_none() {
-            return false;
+        if problem.out_of_time() {
+            return found.failed(Stop::StepLimit);
         }
-        self.added_for_nodes = self.finer_nodes(self.levels.len()).0 + 1 < self.levels.len();
-        self.added_for_nodes
-    }
-
-    /// The finest of the first `wanted` grids between whose nodes the leaf keeps the tolerance, as
-    /// far as it does at the nodes of the coarsest, with the fields and the additional error there.
-    pub fn finer_nodes(&self, wanted: usize) -> (usize, Vec<Vec<RodFields>>, f64) {
-        let error = self.error().unwrap_or(0.0);
-        let allowed = match error <= self.tolerance {
-            true => self.tolerance - error,
-            false => f64::INFINITY,
+        let Some(finer) = found.finer() else {
+            (found, _) = check_stability(problem, found, true, effort)?;
+            found.keeps_tolerance = false;
+            return Ok(found);
         };
-        let columns = self.table.columns();
-        finer_nodes(&self.levels, columns, wanted, [error, allowed])
+        found = settle_on(problem, found, finer, effort)?;
     }
+}
 
-    /// Continues to a `finer` grid with all unknowns of a leaf at rest.
-    pub fn continue_on(&mut self, finer: Grid) -> Result<bool, Stop> {
-        self.solved = self.leaf.rods();
-        self.settle_on(finer)?;
-        self.refine()
+/// Whether all nodes of the finest grid are requested and the leaf is not accurate enough
+/// there; then one more grid is added.
+fn needs_another_grid(problem: &Problem, found: &NestedEquilibrium) -> bool {
+    let enough = !problem.options.every_node || found.integrated().is_some();
+    if enough || found.added_for_nodes || found.finer().is_none() {
+        return false;
     }
+    found.finer_nodes(found.levels.len()).0 + 1 < found.levels.len()
+}
 
-    /// The next finer grid, if the limits on its size allow it and rounding leaves something
-    /// to gain.
-    pub fn finer(&self) -> Option<Grid> {
-        let grid = self.levels.last()?.leaf.grid.refined();
-        let (rods, segments) = (self.leaf.rods(), grid.segments());
-        let allowed = self.segments().is_none()
-            && segments <= FINEST
-            && rods * segments <= MAX_NODES
-            && memory::grid(rods, segments).is_ok()
-            && !self.beyond_rounding(segments);
-        allowed.then_some(grid)
-    }
-
-    /// Settles the leaf on the next finer grid, from a guess by the grids before.
-    pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
-        let level = self.levels.last().expect("the leaf has settled");
-        let mut state = prolong(&level.leaf, &level.state);
-        let guess = match self.levels_for_prediction().as_slice() {
-            [_] => InitialGuess::Coarser(state),
-            levels => {
-                predict(levels, &mut state);
-                InitialGuess::Predicted(state)
-            }
-        };
-        let Settled { level, rest, .. } = self.settle(finer, guess);
-        self.push(level);
-        rest.map(drop)
-    }
-
-    /// The levels from which the next one is predicted: those of the extrapolation, but at
-    /// least the finest two where there are two.
-    fn levels_for_prediction(&self) -> Vec<&Level> {
-        let count = (self.table.columns() + 1).max(2).min(self.levels.len());
-        self.levels[self.levels.len() - count..].iter().collect()
-    }
-
-    /// Whether the tolerance is reached; always true on a fixed grid.
-    fn accurate(&self) -> bool {
-        self.segments().is_some() || self.error().is_some_and(|error| error <= self.tolerance)
-    }
-
-    /// From the start to rest on the first grid that resolves it. A leaf that had to move far
-    /// must reach the same equilibrium on two grids.
-    fn settle_from_start(&mut self, mut grid: Grid) -> Result<(), Stop> {
-        let mut before: Option<Level> = None;
-        let mut failed: Vec<Grid> = Vec::new();
-        loop {
-            let settled = self.settle(grid.clone(), InitialGuess::Start);
-            let Settled { level, rest, moved } = settled;
-            let finer = grid.refined();
-            let fixed = self.segments().is_some();
-            let last = fixed || finer.segments() > FINEST_COMPARED || self.out_of_time();
-            match rest {
-                // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
-                _ if self.too_coarse(level.leaf.segments())
-                    && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
-                Ok(_) if !moved || fixed => {
-                    self.push(level);
-                    return Ok(());
-                }
-                Ok(_) => {
-                    if let Some(coarser) = before.take()
-                        && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_PLACE
-                    {
-                        self.push(coarser);
-                        self.push(level);
-                        return Ok(());
-                    }
-                    if before.is_none()
-                        && let [.., coarse, _] = failed.as_slice()
-                        && self.is_confirmed_on(&level, coarse.tripled())
-                    {
-                        self.push(level);
-                        self.add_coarser(&failed);
-                        return Ok(());
-                    }
-                    if last {
-                        // An equilibrium, but not one to which two grids led.
-                        self.unconfirmed = true;
-                        self.push(level);
-                        return Ok(());
-                    }
-                    before = Some(level);
-                }
-                Err(stop) => {
-                    let at_limit = self.spent > BUDGET
-                        || match stop {
-                            Stop::Unresolved => {
-                                fixed || finer.segments() > FINEST_RESOLVING || self.out_of_time()
-                            }
-                            _ => last,
-                        };
-                    if self.whole.is_some() || at_limit {
-                        self.push(level);
-                        return Err(stop);
-                    }
-                    before = None;
-                    failed.push(grid);
-                }
-            }
-            grid = finer;
+/// Settles the leaf on the next finer grid, from a guess by the grids before.
+fn settle_on(
+    problem: &Problem,
+    found: NestedEquilibrium,
+    finer: Grid,
+    effort: &mut Effort,
+) -> Found {
+    let level = found.levels.last().expect("the leaf has settled");
+    let mut state = prolong(&level.leaf, &level.state);
+    let guess = match found.levels_for_prediction().as_slice() {
+        [_] => InitialGuess::Coarser(state),
+        levels => {
+            predict(levels, &mut state);
+            InitialGuess::Predicted(state)
         }
-    }
+    };
+    settle_next(problem, found, (finer, guess), effort)
+}
 
-    /// Whether the leaf reaches the same equilibrium on a grid with three quarters of the
-    /// segments.
-    fn is_confirmed_on(&mut self, level: &Level, grid: Grid) -> bool {
-        let Settled {
-            level: other, rest, ..
-        } = self.settle(grid, InitialGuess::Start);
-        let (a, b) = (positions(level, 4), positions(&other, 3));
-        rest.is_ok() && distance(&a, &b) < SAME_PLACE
+/// Settles the leaf on the next finer grid from this guess.
+fn settle_next(
+    problem: &Problem,
+    mut found: NestedEquilibrium,
+    next: (Grid, InitialGuess),
+    effort: &mut Effort,
+) -> Found {
+    let Settled { level, rest, .. } = settle(problem, &mut found.history, next, effort);
+    let found = found.with(level);
+    match rest {
+        Ok(_) => Ok(found),
+        Err(stop) => found.failed(stop),
     }
+}
 
-    /// Adds up to two of the coarser grids that failed from the start, settled from the
-    /// restricted equilibrium of the only grid so far.
-    fn add_coarser(&mut self, grids: &[Grid]) {
-        for grid in grids.iter().rev().take(2) {
-            let fine = &self.levels[0];
-            let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
-            let settled = self.settle(grid.clone(), InitialGuess::Coarser(guess));
-            let there = distance(&positions(&settled.level, 1), &fine) < SAME_PLACE;
-            if settled.rest.is_err() || settled.moved || !there {
-                break;
+/// From the start to rest on the first grid that resolves it. A leaf that had to move far
+/// must reach the same equilibrium on two grids.
+fn settle_from_start(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> Found {
+    let mut found = NestedEquilibrium::begun(problem);
+    let mut before: Option<Level> = None;
+    let mut failed: Vec<Grid> = Vec::new();
+    loop {
+        let from_start = (grid.clone(), InitialGuess::Start);
+        let settled = settle(problem, &mut found.history, from_start, effort);
+        let Settled { level, rest, moved } = settled;
+        let finer = grid.refined();
+        let fixed = problem.segments().is_some();
+        let last = fixed || finer.segments() > FINEST_COMPARED || problem.out_of_time();
+        match rest {
+            // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
+            _ if problem.too_coarse(level.leaf.segments())
+                && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
+            Ok(_) if !moved || fixed => return Ok(found.with(level)),
+            Ok(_) => {
+                if let Some(coarser) = before.take()
+                    && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_PLACE
+                {
+                    return Ok(found.on(vec![coarser, level]));
+                }
+                if before.is_none()
+                    && let [.., coarse, _] = failed.as_slice()
+                    && is_confirmed_on(problem, &mut found, &level, coarse.tripled(), effort)
+                {
+                    let found = found.with(level);
+                    return Ok(with_coarser(problem, found, &failed, effort));
+                }
+                if last {
+                    // An equilibrium, but not one to which two grids led.
+                    found.unconfirmed = true;
+                    return Ok(found.with(level));
+                }
+                before = Some(level);
             }
-            self.levels.insert(0, settled.level);
+            Err(stop) => {
+                let at_limit = effort.spent > BUDGET
+                    || match stop {
+                        Stop::Unresolved => {
+                            fixed || finer.segments() > FINEST_RESOLVING || problem.out_of_time()
+                        }
+                        _ => last,
+                    };
+                if problem.whole.is_some() || at_limit {
+                    return found.with(level).failed(stop);
+                }
+                before = None;
+                failed.push(grid);
+            }
         }
-        self.tabulate();
+        grid = finer;
     }
+}
+
+/// Whether the leaf reaches the same equilibrium on a grid with three quarters of the
+/// segments.
+fn is_confirmed_on(
+    problem: &Problem,
+    found: &mut NestedEquilibrium,
+    level: &Level,
+    grid: Grid,
+    effort: &mut Effort,
+) -> bool {
+    let from_start = (grid, InitialGuess::Start);
+    let Settled {
+        level: other, rest, ..
+    } = settle(problem, &mut found.history, from_start, effort);
+    let (a, b) = (positions(level, 4), positions(&other, 3));
+    rest.is_ok() && distance(&a, &b) < SAME_PLACE
+}
+
+/// With up to two of the coarser grids that failed from the start, settled from the
+/// restricted equilibrium of the only grid so far.
+fn with_coarser(
+    problem: &Problem,
+    mut found: NestedEquilibrium,
+    grids: &[Grid],
+    effort: &mut Effort,
+) -> NestedEquilibrium {
+    for grid in grids.iter().rev().take(2) {
+        let fine = &found.levels[0];
+        let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
+        let restricted = (grid.clone(), InitialGuess::Coarser(guess));
+        let settled = settle(problem, &mut found.history, restricted, effort);
+        let there = distance(&positions(&settled.level, 1), &fine) < SAME_PLACE;
+        if settled.rest.is_err() || settled.moved || !there {
+            break;
+        }
+        let coarser = std::iter::once(settled.level);
+        let levels = coarser.chain(std::mem::take(&mut found.levels)).collect();
+        found = found.on(levels);
+    }
+    found
 }
 
 /// Largest rotation between the ends of a segment.

@@ -2,24 +2,25 @@
 
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
-use crate::newton::Stop;
 use crate::refusal::RefusedOption;
-use crate::relax::path::Path;
+use crate::relax::grids::{follow, solve};
+use crate::relax::loading::arrival::{arrive, guess, load_slowly};
+use crate::relax::nested::{Found, History, NestedEquilibrium, along};
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{
     MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE, check_tolerance,
 };
+use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::{Equilibrium, Outcome};
 use crate::relax::result::plausible;
 use crate::relax::result::report;
-use crate::relax::settle::methods::explicit;
-use crate::relax::settle::run::Run;
+use crate::relax::settle::effort::Effort;
+use crate::relax::settle::methods::{explicit, softens};
 use crate::relax::settle::segments::{check_segments, least, reducible};
 use crate::relax::shooting;
 use crate::relax::stability::decide::{Decision, Verdict, decide};
 use crate::relax::stability::eigenvalues;
 use crate::relax::stability::eigenvalues::List;
-use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
 use crate::shooting::Start;
 use std::time::Instant;
@@ -122,14 +123,20 @@ fn relax_once(
     Ok(found)
 }
 
+/// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
+/// steps of Newton's method without softened rods, rests where slow loading leads: so did all of
+/// 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
+/// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
+const FIRST_VALLEY: (f64, usize) = (2.0, 8);
+
 /// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
-/// also returns the leaf on each grid that was extrapolated, from coarse to fine.
+/// also returns the leaf on these grids.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
     shape_alone: bool,
     progress: &mut dyn FnMut(&Progress),
-) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
+) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     let clock = Instant::now();
@@ -142,102 +149,121 @@ pub(crate) fn relax_on_grids(
     let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
     let first = check_segments(&leaf, method.segments(), least)?;
     let half = reducible(method).then(|| leaf.half()).flatten();
-    let planar = reducible(method) && leaf.is_planar();
+    let problem = Problem {
+        planar: reducible(method) && leaf.is_planar(),
+        shape_alone,
+        ..Problem::new(&leaf, options, tolerance)
+    };
+    let mut effort = Effort::new(progress);
     let grid = Grid::new(first, leaf.kinks());
-    let mut run = Run::new(&leaf, options, tolerance, progress);
-    run.planar = planar;
-    run.shape_alone = shape_alone;
-    let slowly = run.loads_slowly();
-    run.path = slowly.then_some(Path::STABLE).or_else(|| run.released());
-    if slowly && run.may_settle_at_once() {
-        // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
-        // the path need not be walked.
-        run = run.of(half.as_ref().unwrap_or(&leaf), half.as_ref().map(|_| &leaf));
-        run.stays_in_valley = true;
-        let end = run.solve(grid.clone());
-        run.stays_in_valley = false;
-        if run.is_answer(&end) && run.is_in_first_valley() {
-            let run = match half.is_some() {
-                true => run.completed(&leaf),
-                false => run,
-            };
-            return Ok(finished(run, end, clock));
+    let found = rest(&problem, half.as_ref(), grid, &mut effort);
+    Ok(decided(&problem, found, clock, &mut effort))
+}
+
+/// Brings the leaf to rest, its `half` where that is enough.
+fn rest<'a>(
+    problem: &Problem<'a>,
+    half: Option<&'a Leaf>,
+    grid: Grid,
+    effort: &mut Effort,
+) -> Found {
+    let slowly = problem.loads_slowly();
+    // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
+    // the path need not be walked.
+    let in_valley = slowly
+        && matches!(problem.options.method, Method::SemiImplicit(_))
+        && !softens(problem.leaf);
+    if in_valley || !slowly && half.is_some() {
+        let reduced = Problem {
+            stays_in_valley: in_valley,
+            ..problem.reduced(half)
+        };
+        let found = solve(&reduced, grid.clone(), effort);
+        if half.is_some() {
+            effort.spare_system = None;
         }
-        run = run.of(&leaf, None);
-    }
-    if slowly {
-        let (run, end) = run.load_slowly(half.as_ref());
-        return Ok(finished(run, end, clock));
-    }
-    if let Some(half) = &half {
-        run = run.of(half, Some(&leaf));
-        let end = run.solve(grid.clone());
-        if run.is_answer(&end) {
-            return Ok(finished(run.completed(&leaf), end, clock));
+        if let Ok(found) = found
+            && found.is_stable()
+            && (!slowly || is_in_first_valley(&found.history))
+        {
+            let path = problem.path();
+            return Ok(found.completed(&reduced).along(path));
         }
         // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
         // solve the full leaf.
-        run = run.of(&leaf, None);
+        effort.spare_system = None;
     }
-    let end = run.solve(grid);
-    if end.is_ok() || !run.may_be_loaded_instead() {
-        return Ok(finished(run, end, clock));
+    if slowly {
+        return load_slowly(problem, half, effort);
     }
-    let (run, end) = run.of(&leaf, None).load_slowly(None);
-    Ok(finished(run, end, clock))
+    match solve(problem, grid, effort) {
+        Err(_) if problem.may_be_loaded_instead() => {
+            effort.spare_system = None;
+            load_slowly(problem, None, effort)
+        }
+        found => along(found, problem.path()),
+    }
+}
+
+/// Whether Newton's method alone came to rest from the start, so near that this is where
+/// slow loading leads.
+fn is_in_first_valley(history: &History) -> bool {
+    let near =
+        |(distance, steps): (f64, usize)| distance < FIRST_VALLEY.0 && steps <= FIRST_VALLEY.1;
+    history.from_start.is_some_and(near) && history.saddle.is_none()
 }
 
 /// Rest from the start, on this grid and finer ones.
-fn rest_from(run: &mut Run, grid: Grid) -> Result<bool, Stop> {
-    if !run.loads_slowly() {
-        let end = run.solve(grid.clone());
-        if end.is_ok() || !run.may_be_loaded_instead() {
-            return end;
+fn rest_again(problem: &Problem, grid: Grid, effort: &mut Effort) -> Option<NestedEquilibrium> {
+    if !problem.loads_slowly() {
+        let found = solve(problem, grid.clone(), effort);
+        if found.is_ok() || !problem.may_be_loaded_instead() {
+            return found.ok();
         }
-        run.restart();
     }
-    let arrived = run.arrive(grid)?;
-    let guess = run.guess(arrived);
-    run.follow(vec![guess])
+    let arrived = arrive(problem, grid, effort).ok()?;
+    let mut begun = NestedEquilibrium::begun(problem).along(Some(arrived.path));
+    let guess = guess(problem, &mut begun.history, arrived.level, effort);
+    follow(problem, begun, vec![guess], effort).ok()
 }
 
-/// The result of a run, with the modes of a leaf at rest: requested modes are not counted in
-/// the time of the solution, unless stability depends on them.
-fn finished(
-    mut run: Run,
-    mut end: Result<bool, Stop>,
+/// The result, with the stability of a leaf at rest decided and its modes: requested modes are
+/// not counted in the time of the solution, unless stability depends on them.
+fn decided(
+    problem: &Problem,
+    found: Found,
     clock: Instant,
-) -> (Equilibrium, Vec<Level>) {
-    let requested = run.options.modes;
+    effort: &mut Effort,
+) -> (Equilibrium, NestedEquilibrium) {
+    let requested = problem.options.modes;
     let before = clock.elapsed().as_secs_f64();
-    let Decision {
-        verdict,
-        modes,
-        needed,
-    } = decide(&mut run, &mut end, &mut rest_from);
-    let wall = match needed || requested == 0 {
+    let (decision, stopped) = match found {
+        Ok(found) => {
+            let again = |grid, effort: &mut Effort| rest_again(problem, grid, effort);
+            (decide(problem, found, effort, &again), None)
+        }
+        Err(failure) => (Decision::none(failure.at), Some(failure.stop)),
+    };
+    let wall = match decision.needed || requested == 0 {
         true => clock.elapsed().as_secs_f64(),
         false => before,
     };
-    let (outcome, remark) = report::outcome(&run, end);
-    let mut found = report::equilibrium(&run, outcome, remark, wall);
-    found.doubts = plausible::doubts(run.leaf.scenario(), &found);
-    let doubt = found
-        .path
-        .as_ref()
-        .and_then(|path| path.doubt(run.options.route));
-    let unconfirmed = doubt.is_none() && run.unconfirmed && found.outcome.is_at_rest();
-    found.doubts.extend(doubt);
-    found
-        .doubts
+    let found = decision.found.after(effort.work);
+    let outcome = report::outcome(problem, &found, stopped, effort.reached);
+    let mut leaf = report::equilibrium(problem, &found, outcome, wall);
+    leaf.doubts = plausible::doubts(problem.leaf.scenario(), &leaf);
+    let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
+    let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
+    leaf.doubts.extend(doubt);
+    leaf.doubts
         .extend(unconfirmed.then(|| UNCONFIRMED.to_owned()));
-    found.decide(verdict);
-    let modes = modes.or_else(|| {
-        let list = List::requested(&run);
-        end.ok().and_then(|_| eigenvalues::lowest(&run, list))
+    leaf.decide(decision.verdict);
+    let modes = decision.modes.or_else(|| {
+        let list = List::requested(problem);
+        (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
-    found.stability.modes = modes.map(|it| it.modes);
-    (found, run.levels)
+    leaf.stability.modes = modes.map(|it| it.modes);
+    (leaf, found)
 }
 
 impl Equilibrium {

@@ -40,7 +40,7 @@ pub fn relax_with_sensitivities(
             (keys.to_string(), number)
         })
         .collect();
-    let (mut leaf, levels) = relax_on_grids(scenario, options, false, progress)?;
+    let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
     let turnings = scenario.turnings().len();
@@ -49,7 +49,12 @@ pub fn relax_with_sensitivities(
     leaf.doubts
         .extend(none.iter().map(|(key, _)| no_derivative(key)));
     leaf.sensitivities = Some(match at_rest {
-        true => sensitivities(&levels, &known, leaf.accuracy.tolerance, options.modes),
+        true => sensitivities(
+            &found.levels,
+            &known,
+            leaf.accuracy.tolerance,
+            options.modes,
+        ),
         false => Vec::new(),
     });
     Ok(leaf)

@@ -377,11 +377,11 @@ mod tests {
                 tolerance: Some(1e-3),
                 ..Options::default()
             };
-            let (_, levels) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
+            let (_, found) = relax_on_grids(&leaf, &options, false, &mut |_| {}).unwrap();
             let (mut linear, mut work) = (None, Work::default());
             let mut estimated = |enough, most| {
                 let systems = (&mut linear, &mut None);
-                estimate(&levels, 1, (enough, most), systems, &mut work).unwrap()
+                estimate(&found.levels, 1, (enough, most), systems, &mut work).unwrap()
             };
             let first = estimated(0.0, 0).largest();
             // The last round only verifies.

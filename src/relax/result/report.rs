@@ -1,15 +1,16 @@
 //! From the settled grids to the result in the units of the scenario.
 
-use crate::leaf::{Grid, RodFields};
+use crate::leaf::{Grid, Leaf, RodFields};
 use crate::newton::Stop;
 use crate::relax::accuracy::nodal_fields::with_sign_of;
 use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::nested::NestedEquilibrium;
 use crate::relax::path::{Event, Happening, Path, Stage};
 use crate::relax::request::method::Method;
+use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
-use crate::relax::settle::run::{Run, energies};
 use crate::relax::transfer::level::{Level, flat};
 use crate::relax::transfer::strains;
 use crate::scenario::{Scenario, obstacle};
@@ -19,32 +20,35 @@ use glam::DVec3;
 
 /// Assembles the result.
 pub fn equilibrium(
-    run: &Run,
-    outcome: Outcome,
-    remark: Option<String>,
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    (outcome, remark): (Outcome, Option<String>),
     wall_seconds: f64,
 ) -> Equilibrium {
-    let finest = run.levels.last().expect("the grid it failed on, at least");
-    let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
-    let columns = run.table.columns();
-    let error = run.error();
-    let (stations, rods, between) = fields(run, error.unwrap_or(0.0));
-    let joined = run.leaf.joined();
+    let finest = found
+        .levels
+        .last()
+        .expect("the grid it failed on, at least");
+    let (scenario, scale) = (problem.leaf.scenario(), problem.leaf.scale);
+    let columns = found.table.columns();
+    let error = found.error();
+    let (stations, rods, between) = fields(problem, found, error.unwrap_or(0.0));
+    let joined = problem.leaf.joined();
     debug_assert!(!joined || finest.state.tips_meet());
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
     let error_estimate = error.map(|error| (error + between) * scale.length);
-    let (grid, lines) = centerlines(run, finest);
-    let (energy, energy_error) = potential(run, columns);
+    let (grid, lines) = centerlines(found, finest);
+    let (energy, energy_error) = found.energy();
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
-    let segments: Vec<usize> = run
+    let segments: Vec<usize> = found
         .levels
         .iter()
         .map(|level| level.leaf.segments())
         .collect();
     Equilibrium {
         scenario: scenario.name.clone(),
-        method: run.options.method,
+        method: problem.options.method,
         outcome,
         remark,
         doubts: Vec::new(),
@@ -52,36 +56,36 @@ pub fn equilibrium(
         energy: Some(energy * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
-        reaction: reaction(&run.levels, columns),
+        reaction: reaction(&found.levels, columns),
         stability: Stability {
-            negative_eigenvalues: run.index,
+            negative_eigenvalues: found.index,
             neutral_directions: neutral_directions(scenario, &rods),
             modes: None,
-            mode_shapes: run.options.mode_shapes,
-            saddle: run.saddle,
+            mode_shapes: problem.options.mode_shapes,
+            saddle: found.history.saddle,
         },
-        path: path(run),
+        path: path(problem.leaf, found),
         sensitivities: None,
         margin: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
             (
-                run.solved,
-                run.planar && run.index == Some(0) && flat(finest),
+                found.solved,
+                problem.planar && found.index == Some(0) && flat(finest),
             ),
             &segments,
-            (run.effects).map(|effect| effect.map(|effect| effect * scale.length)),
+            (found.history.effects).map(|effect| effect.map(|effect| effect * scale.length)),
         ),
         accuracy: Accuracy {
             segments,
             intervals: None,
-            tolerance: run.tolerance,
+            tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
             energy_error: energy_error.map(|error| error * scale.moment()),
         },
-        work: run.work,
+        work: found.work,
         wall_seconds,
         shape: Shape {
             stations,
@@ -102,12 +106,12 @@ pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
 
 /// How the leaf came to its equilibrium. What finer grids than that of the walk make of its end
 /// belongs to it.
-fn path(run: &Run) -> Option<Path> {
-    let mut path = run.path.clone()?;
+fn path(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
+    let mut path = found.path.clone()?;
     if let Path::Loaded { events, .. } = &mut path
-        && run.saddle.is_some()
+        && found.history.saddle.is_some()
     {
-        let joins = run.leaf.joined() && run.leaf.rods() > 1;
+        let joins = leaf.joined() && leaf.rods() > 1;
         events.push(Event {
             stage: if joins {
                 Stage::Joining
@@ -131,10 +135,17 @@ const STATIONS: usize = 8;
 /// are few, those of the next grid, and all if every node is requested: of a leaf that was
 /// integrated to the tolerance those of the integration, otherwise those of the finest grid that
 /// keeps the tolerance between the nodes of the coarsest.
-fn fields(run: &Run, error: f64) -> (Vec<f64>, Vec<RodShape>, f64) {
-    let (first, finest) = (&run.levels[0].leaf.grid, &run.levels[run.levels.len() - 1]);
-    let (every_node, few) = (run.options.every_node, first.segments() < STATIONS);
-    let (grid, rods, between) = match run.integrated() {
+fn fields(
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    error: f64,
+) -> (Vec<f64>, Vec<RodShape>, f64) {
+    let (first, finest) = (
+        &found.levels[0].leaf.grid,
+        &found.levels[found.levels.len() - 1],
+    );
+    let (every_node, few) = (problem.options.every_node, first.segments() < STATIONS);
+    let (grid, rods, between) = match found.integrated() {
         Some((estimate, integrated)) => {
             let grid = match every_node {
                 true => estimate.grid.clone(),
@@ -159,14 +170,14 @@ fn fields(run: &Run, error: f64) -> (Vec<f64>, Vec<RodShape>, f64) {
         }
         None => {
             let wanted = match every_node {
-                true => run.levels.len(),
-                false => run.levels.len().min(1 + usize::from(few)),
+                true => found.levels.len(),
+                false => found.levels.len().min(1 + usize::from(few)),
             };
-            let (reached, rods, between) = run.finer_nodes(wanted);
-            (run.levels[reached].leaf.grid.clone(), rods, between)
+            let (reached, rods, between) = found.finer_nodes(wanted);
+            (found.levels[reached].leaf.grid.clone(), rods, between)
         }
     };
-    let leaf = run.leaf;
+    let leaf = problem.leaf;
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let nodes = rod.iter().zip(grid.sigma());
         let nodes = nodes.map(|(fields, sigma)| strains::node_of(leaf, (j, *sigma), fields));
@@ -199,27 +210,11 @@ fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
     })
 }
 
-/// The potential energy: integrated along the leaf, with an error of second order in the
-/// defect, or after `columns` extrapolations, or fewer where it does not converge as these assume;
-/// its error, if that is larger than that of positions lets expect.
-fn potential(run: &Run, columns: usize) -> (f64, Option<f64>) {
-    if let Some(estimate) = &run.estimate {
-        return (estimate.energy, None);
-    }
-    let table = energies(&run.levels);
-    let Some(best) = table.best() else {
-        return (table.column(columns)[0], None);
-    };
-    let energy = table.column(columns.min(best.columns))[0];
-    let expected = run.error().unwrap_or(f64::INFINITY) * energy.abs();
-    (energy, (best.error > expected).then_some(best.error))
-}
-
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
 /// the integration, in units of the scenario.
-fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline>) {
-    let length = run.leaf.scale.length;
-    if let Some(estimate) = run.corrected() {
+fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f Level) -> (&'f Grid, Vec<Centerline>) {
+    let length = finest.leaf.leaf.scale.length;
+    if let Some(estimate) = found.corrected() {
         let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
         return (&estimate.grid, estimate.rods.iter().map(line).collect());
     }
@@ -232,42 +227,48 @@ fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline
 
 /// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
 /// of advice where one helps.
-pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
-    let finest = run.levels.last().map_or(0, |level| level.leaf.segments());
-    let explicit = matches!(run.options.method, Method::Explicit { .. });
-    match end {
-        Ok(true) => (
-            match (run.index, run.saddle) {
+pub fn outcome(
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    stopped: Option<Stop>,
+    reached: Option<(Stage, f64)>,
+) -> (Outcome, Option<String>) {
+    let advice = || advice(problem, found, reached);
+    let finest = found.levels.last().map_or(0, |level| level.leaf.segments());
+    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    match stopped {
+        None if found.keeps_tolerance => (
+            match (found.index, found.history.saddle) {
                 (Some(1..), _) => Outcome::Saddle,
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
                 _ => Outcome::Converged,
             },
-            run.index.is_none().then(|| match run.leaf.loads.tip_moment == DVec3::ZERO {
+            found.index.is_none().then(|| match problem.leaf.loads.tip_moment == DVec3::ZERO {
                 true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
                      its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
             }),
         ),
-        Ok(false) => (
+        None => (
             Outcome::ToleranceNotReached,
-            Some(match run.beyond_rounding(2 * finest) {
+            Some(match found.beyond_rounding(2 * finest) {
                 true => "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one".into(),
                 false => format!(
                     "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
                 ),
             }),
         ),
-        Err(Stop::Stuck) => (
+        Some(Stop::Stuck) => (
             Outcome::Diverged,
             Some(format!(
                 "no step lowers the energy on {finest} segments{}",
-                advice(run)
+                advice()
             )),
         ),
-        Err(stop) => (
+        Some(stop) => (
             Outcome::NotAtRest,
             Some(match stop {
-                Stop::StepLimit if run.out_of_time() => format!(
+                Stop::StepLimit if problem.out_of_time() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
                 Stop::StepLimit if explicit => format!(
@@ -278,14 +279,14 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 ),
                 Stop::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments{}",
-                    advice(run)
+                    advice()
                 ),
-                Stop::StepLimit if run.keeps_unstable() => format!(
+                Stop::StepLimit if problem.keeps_unstable() => format!(
                     "Newton's method leads to no equilibrium from this start on {finest} segments: let the leaf relax, which moves it to a stable one"
                 ),
                 _ => format!(
                     "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
-                    advice(run)
+                    advice()
                 ),
             }),
         ),
@@ -297,11 +298,11 @@ const COUNTS: f64 = 0.1;
 
 /// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
 /// of its loads, and the softest stiffness of the vein that bends most.
-fn advice(run: &Run) -> String {
-    if let Some(slip) = obstacle(run.leaf.scenario()) {
+fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, f64)>) -> String {
+    if let Some(slip) = obstacle(problem.leaf.scenario()) {
         return format!(": {slip}");
     }
-    let Some(level) = run.levels.last() else {
+    let Some(level) = found.levels.last() else {
         return String::new();
     };
     let bends = |j: usize| {
@@ -317,7 +318,7 @@ fn advice(run: &Run) -> String {
         .max_by(|&a, &b| bends(a).total_cmp(&bends(b)))
         .unwrap_or(0);
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
-    let loads = run.leaf.loads;
+    let loads = problem.leaf.loads;
     let [weight, tip, moment] =
         [loads.gravity, loads.tip_force, loads.tip_moment].map(|load| load.length());
     // Along the directors at the base a moment shows what it turns; forces turn by their arms.
@@ -328,7 +329,7 @@ fn advice(run: &Run) -> String {
     };
     let softest = ["torsion", "bending_2", "bending_3"][turned.max_position()];
     let named = [
-        (weight * run.leaf.rods() as f64, "load.gravity"),
+        (weight * problem.leaf.rods() as f64, "load.gravity"),
         (tip, "load.tip_force"),
         (moment, "load.tip_moment"),
     ];
@@ -339,13 +340,13 @@ fn advice(run: &Run) -> String {
         true => "the curvatures at rest".to_owned(),
         false => loads.join(" or "),
     };
-    let reached = match run.reached {
+    let reached = match reached {
         Some((stage, part)) if part > 0.0 => {
             format!(" (it came to rest up to {:.2} % of {stage})", 100.0 * part)
         }
         _ => String::new(),
     };
-    let otherwise = match moment > 0.0 && run.leaf.held.is_none() {
+    let otherwise = match moment > 0.0 && problem.leaf.held.is_none() {
         true => ", or try the method shooting",
         false => "",
     };

@@ -179,8 +179,8 @@ mod tests {
         let text = include_str!("../../../scenarios/paper/fig04.toml");
         let scenario = Scenario::from_toml(text).unwrap();
         let options = Options::default();
-        let (_, levels) = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
-        for level in &levels {
+        let (_, found) = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
+        for level in &found.levels {
             let mut linear = Linearized::new(level, 1e-6);
             let units = super::super::unit_forces(&level.leaf, 1);
             let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();

@@ -7,9 +7,10 @@
 
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::newton::{Definite, Stop};
+use crate::relax::request::problem::Problem;
 use crate::relax::saddle;
+use crate::relax::settle::effort::Effort;
 use crate::relax::settle::methods::Relaxation;
-use crate::relax::settle::run::Run;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -24,34 +25,37 @@ const ACCURACY: f64 = 1e-2;
 /// Saddles that are left in a step.
 const PUSHES: i32 = 3;
 
-impl Run<'_, '_> {
-    /// Moves the tips from their positions in `state` to those where they are held. Returns the
-    /// state there, whether the leaf rests in it, and whether its energy was not convex along
-    /// the path.
-    pub fn move_grips(&mut self, leaf: &DiscreteLeaf, state: State) -> (State, bool, bool) {
-        let Some(paths) = paths(leaf, &state) else {
-            return (state, false, false);
-        };
-        let steps = paths.iter().map(Path::steps).fold(1.0, f64::max);
-        let keeps_unstable = self.keeps_unstable();
-        let (limit, begun) = (&self.options.limit, self.work.force_evaluations);
-        let mut system = System::new(leaf);
-        let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
-        let mut held = Relaxation::new(state, ACCURACY, (&mut self.work, ignored), limit);
-        for step in 1..=steps as usize {
-            if limit.reached() {
-                break;
-            }
-            for (j, path) in paths.iter().enumerate() {
-                path.move_tip(leaf, j, step as f64 / steps, &mut held.state);
-            }
-            held.near_rest = settle_held(leaf, &mut system, &mut held, keeps_unstable);
+/// Moves the tips from their positions in `state` to those where they are held. Returns the
+/// state there, whether the leaf rests in it, and whether its energy was not convex along
+/// the path.
+pub fn move_grips(
+    problem: &Problem,
+    leaf: &DiscreteLeaf,
+    state: State,
+    effort: &mut Effort,
+) -> (State, bool, bool) {
+    let Some(paths) = paths(leaf, &state) else {
+        return (state, false, false);
+    };
+    let steps = paths.iter().map(Path::steps).fold(1.0, f64::max);
+    let keeps_unstable = problem.keeps_unstable();
+    let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
+    let mut system = System::new(leaf);
+    let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
+    let mut held = Relaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit);
+    for step in 1..=steps as usize {
+        if limit.reached() {
+            break;
         }
-        let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
-        self.spent += leaf.rods() * leaf.segments() * (self.work.force_evaluations - begun);
-        leaf.leaf.hold_tips(&mut state);
-        (state, near_rest, moved)
+        for (j, path) in paths.iter().enumerate() {
+            path.move_tip(leaf, j, step as f64 / steps, &mut held.state);
+        }
+        held.near_rest = settle_held(leaf, &mut system, &mut held, keeps_unstable);
     }
+    let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
+    effort.spent += leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
+    leaf.leaf.hold_tips(&mut state);
+    (state, near_rest, moved)
 }
 
 /// Brings the leaf roughly to rest with its tips fixed, if possible.

@@ -2,12 +2,16 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::newton::{Definite, Newton, Stop};
+use crate::relax::nested::History;
+use crate::relax::nested::error::is_large;
 use crate::relax::request::method::{Method, SemiImplicit};
 use crate::relax::request::options::Progress;
+use crate::relax::request::problem::Problem;
 use crate::relax::saddle;
 use crate::relax::saddle::saddle_of;
+use crate::relax::settle::effort::{BUDGET, Effort};
+use crate::relax::settle::grip::move_grips;
 use crate::relax::settle::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
-use crate::relax::settle::run::{BUDGET, Run, is_large};
 use crate::relax::settle::start::{disturb, start};
 use crate::relax::transfer::level::Level;
 use glam::DVec3;
@@ -59,182 +63,195 @@ pub struct Settled {
     pub moved: bool,
 }
 
-impl Run<'_, '_> {
-    /// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
-    /// resistance leans down.
-    pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
-        let mut settled = self.settle_from(grid, guess);
-        let Level { leaf, state } = &mut settled.level;
-        leaf.lean_down(state);
-        settled
-    }
+/// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
+/// resistance leans down. The `history` is that on the grids before, and goes on here.
+pub fn settle(
+    problem: &Problem,
+    history: &mut History,
+    (grid, guess): (Grid, InitialGuess),
+    effort: &mut Effort,
+) -> Settled {
+    let mut settled = settle_upright(problem, history, (grid, guess), effort);
+    let Level { leaf, state } = &mut settled.level;
+    leaf.lean_down(state);
+    settled
+}
 
-    fn settle_from(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
-        let mut leaf = DiscreteLeaf::new(self.leaf, grid);
-        let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
-        let from_start = matches!(guess, InitialGuess::Start);
-        let grip = leaf.leaf.held.is_some() && from_start;
-        let cg_tolerance = match guess {
-            InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
-            InitialGuess::Coarser(_) => 1e-4,
-            // The interpolation error is dominated by stiff modes; the error to be removed is
-            // one of soft modes, a small part of the energy.
-            InitialGuess::Predicted(_) => 1e-8,
-        };
-        let mut state = match guess {
-            InitialGuess::Start => self.start(&leaf),
-            InitialGuess::Coarser(state)
-            | InitialGuess::Predicted(state)
-            | InitialGuess::Pushed(state) => state,
-        };
-        let mut moved = false;
-        if grip {
-            (state, near_rest, moved) = self.move_grips(&leaf, state);
-        }
-        let explicit = matches!(self.options.method, Method::Explicit { .. });
-        let dead_moment = leaf.tip_moment() != DVec3::ZERO;
-        if !explicit && !dead_moment && !self.keeps_unstable() {
-            let how = (near_rest, cg_tolerance);
-            self.spare_system = None;
-            let mut system = System::new(&leaf);
-            let begun = from_start.then(|| (state.clone(), self.work.steps));
-            let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
-            if let Some((begun, steps)) = begun {
-                let distance = begun.distance(&settled.level.state);
-                self.from_start = Some((distance, self.work.steps - steps));
-            }
-            self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
-            return Settled {
-                moved: moved || settled.moved,
-                ..settled
-            };
-        }
-        let accuracy = self.accuracy(&leaf);
+/// The same without leaning.
+fn settle_upright(
+    problem: &Problem,
+    history: &mut History,
+    (grid, guess): (Grid, InitialGuess),
+    effort: &mut Effort,
+) -> Settled {
+    let mut leaf = DiscreteLeaf::new(problem.leaf, grid);
+    let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
+    let from_start = matches!(guess, InitialGuess::Start);
+    let grip = leaf.leaf.held.is_some() && from_start;
+    let cg_tolerance = match guess {
+        InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
+        InitialGuess::Coarser(_) => 1e-4,
+        // The interpolation error is dominated by stiff modes; the error to be removed is
+        // one of soft modes, a small part of the energy.
+        InitialGuess::Predicted(_) => 1e-8,
+    };
+    let mut state = match guess {
+        InitialGuess::Start => start_of(problem, &leaf),
+        InitialGuess::Coarser(state)
+        | InitialGuess::Predicted(state)
+        | InitialGuess::Pushed(state) => state,
+    };
+    let mut moved = false;
+    if grip {
+        (state, near_rest, moved) = move_grips(problem, &leaf, state, effort);
+    }
+    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let dead_moment = leaf.tip_moment() != DVec3::ZERO;
+    if !explicit && !dead_moment && !problem.keeps_unstable() {
+        let how = (near_rest, cg_tolerance);
+        effort.spare_system = None;
         let mut system = System::new(&leaf);
-        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
-        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
-        let mut relaxation = Relaxation {
-            near_rest,
-            moved,
-            ..Relaxation::new(state, accuracy, out, &self.options.limit)
+        let begun = from_start.then(|| (state.clone(), effort.work.steps));
+        let settled =
+            settle_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
+        if let Some((begun, steps)) = begun {
+            let distance = begun.distance(&settled.level.state);
+            history.from_start = Some((distance, effort.work.steps - steps));
+        }
+        effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
+        return Settled {
+            moved: moved || settled.moved,
+            ..settled
         };
-        let rest = match (explicit, dead_moment) {
-            (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
-            (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
-            // To the next equilibrium, stable or not.
-            _ => {
-                let newton = Newton {
-                    accuracy,
-                    iterations: MAX_ITERATIONS,
-                    work: relaxation.work,
-                    progress: relaxation.progress,
-                };
-                newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
+    }
+    let accuracy = accuracy(problem, history, &leaf);
+    let mut system = System::new(&leaf);
+    let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
+    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
+    let mut relaxation = Relaxation {
+        near_rest,
+        moved,
+        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+    };
+    let rest = match (explicit, dead_moment) {
+        (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
+        (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
+        // To the next equilibrium, stable or not.
+        _ => {
+            let newton = Newton {
+                accuracy,
+                iterations: MAX_ITERATIONS,
+                work: relaxation.work,
+                progress: relaxation.progress,
+            };
+            newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
+        }
+    };
+    let Relaxation { state, moved, .. } = relaxation;
+    if explicit {
+        history.remaining = history.remaining.max(rest.unwrap_or(0.0));
+    }
+    let level = Level { leaf, state };
+    Settled { level, rest, moved }
+}
+
+/// The start of a leaf without an initial guess.
+pub(in crate::relax) fn start_of(problem: &Problem, leaf: &DiscreteLeaf) -> State {
+    if let Some(whole) = problem.whole {
+        let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
+        return half_of(problem.leaf, &start(&whole));
+    }
+    let mut state = start(leaf);
+    if let Method::SemiImplicit(SemiImplicit {
+        disturbance: Some(number),
+        ..
+    }) = problem.options.method
+    {
+        disturb(leaf, number, &mut state);
+    }
+    state
+}
+
+/// Iteration error allowed on a grid.
+fn accuracy(problem: &Problem, history: &History, leaf: &DiscreteLeaf) -> f64 {
+    let first = history.coarsest.unwrap_or(leaf.segments());
+    match problem.segments() {
+        Some(_) => FIXED_ACCURACY,
+        None if problem.too_coarse(first) => {
+            match history.coarsest.is_none() && problem.may_be_alone() {
+                true => ITERATION_PART_ALONE * problem.tolerance,
+                false => ITERATION_PART_FROM_COARSE * problem.tolerance,
             }
-        };
-        let Relaxation { state, moved, .. } = relaxation;
-        if explicit {
-            self.remaining = self.remaining.max(rest.unwrap_or(0.0));
         }
-        let level = Level { leaf, state };
-        Settled { level, rest, moved }
+        None => ITERATION_PART * problem.tolerance,
     }
+}
 
-    /// The start of a leaf without an initial guess.
-    pub(in crate::relax) fn start(&self, leaf: &DiscreteLeaf) -> State {
-        if let Some(whole) = self.whole {
-            let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
-            return half_of(self.leaf, &start(&whole));
-        }
-        let mut state = start(leaf);
-        if let Method::SemiImplicit(SemiImplicit {
-            disturbance: Some(number),
-            ..
-        }) = self.options.method
-        {
-            disturb(leaf, number, &mut state);
-        }
-        state
-    }
-
-    /// Iteration error allowed on a grid.
-    fn accuracy(&self, leaf: &DiscreteLeaf) -> f64 {
-        let first = (self.levels.first()).map_or(leaf.segments(), |first| first.leaf.segments());
-        match self.segments() {
-            Some(_) => FIXED_ACCURACY,
-            None if self.too_coarse(first) => match self.levels.is_empty() && self.may_be_alone() {
-                true => ITERATION_PART_ALONE * self.tolerance,
-                false => ITERATION_PART_FROM_COARSE * self.tolerance,
-            },
-            None => ITERATION_PART * self.tolerance,
-        }
-    }
-
-    /// Settles by the semi-implicit method.
-    fn settle_semi_implicit(
-        &mut self,
-        leaf: DiscreteLeaf,
-        state: State,
-        system: &mut System,
-        (near_rest, cg_tolerance): (bool, f64),
-    ) -> Settled {
-        let accuracy = self.accuracy(&leaf);
-        let convex_only =
-            self.whole.is_some() || self.stays_in_valley || self.too_coarse(leaf.segments());
-        let nodes = leaf.rods() * leaf.segments();
-        let (most, least) = LEAST_EVALUATIONS;
-        let granted = (most * COARSE / leaf.segments()).clamp(least, most);
-        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
-        let most_evaluations = self.work.force_evaluations + allowed;
-        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
-        let out = (&mut self.work, progress as &mut dyn FnMut(usize, f64));
-        let mut relaxation = Relaxation {
-            near_rest,
-            cg_tolerance,
-            solver: Definite {
-                contraction: self.contraction,
-                direct: None,
-            },
-            most_evaluations,
-            convex_only,
-            ..Relaxation::new(state, accuracy, out, &self.options.limit)
-        };
-        let mut rest = Err(Stop::StepLimit);
-        // After earlier pushes off saddles at rest, the softened leaf returned to one.
-        for pushes in self.pushes..self.pushes + MAX_SADDLES {
-            relaxation.pushes = pushes;
-            let before = relaxation.work.force_evaluations;
-            let settled = relaxation.settle(&leaf, system);
-            self.spent += nodes * (relaxation.work.force_evaluations - before);
-            if let Ok(remaining) = settled {
-                self.remaining = self.remaining.max(remaining);
-                if self.levels.is_empty() && relaxation.solver.direct.is_none() {
-                    self.effects = effects(&leaf, &relaxation.state, system);
-                }
+/// Settles by the semi-implicit method.
+fn settle_semi_implicit(
+    (problem, history): (&Problem, &mut History),
+    (leaf, state): (DiscreteLeaf, State),
+    system: &mut System,
+    (near_rest, cg_tolerance): (bool, f64),
+    effort: &mut Effort,
+) -> Settled {
+    let accuracy = accuracy(problem, history, &leaf);
+    let convex_only =
+        problem.whole.is_some() || problem.stays_in_valley || problem.too_coarse(leaf.segments());
+    let nodes = leaf.rods() * leaf.segments();
+    let (most, least) = LEAST_EVALUATIONS;
+    let granted = (most * COARSE / leaf.segments()).clamp(least, most);
+    let allowed = (BUDGET.saturating_sub(effort.spent) / nodes).max(granted);
+    let most_evaluations = effort.work.force_evaluations + allowed;
+    let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
+    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
+    let mut relaxation = Relaxation {
+        near_rest,
+        cg_tolerance,
+        solver: Definite {
+            contraction: history.contraction,
+            direct: None,
+        },
+        most_evaluations,
+        convex_only,
+        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+    };
+    let mut rest = Err(Stop::StepLimit);
+    // After earlier pushes off saddles at rest, the softened leaf returned to one.
+    for pushes in history.pushes..history.pushes + MAX_SADDLES {
+        relaxation.pushes = pushes;
+        let before = relaxation.work.force_evaluations;
+        let settled = relaxation.settle(&leaf, system);
+        effort.spent += nodes * (relaxation.work.force_evaluations - before);
+        if let Ok(remaining) = settled {
+            history.remaining = history.remaining.max(remaining);
+            if history.coarsest.is_none() && relaxation.solver.direct.is_none() {
+                history.effects = effects(&leaf, &relaxation.state, system);
             }
-            if settled != Err(Stop::Saddle) || convex_only {
-                rest = settled;
+        }
+        if settled != Err(Stop::Saddle) || convex_only {
+            rest = settled;
+            break;
+        }
+        let state = &mut relaxation.state;
+        match saddle::polish(&leaf, state, system, relaxation.work) {
+            Some(0) => {
+                rest = Ok(accuracy);
                 break;
             }
-            let state = &mut relaxation.state;
-            match saddle::polish(&leaf, state, system, relaxation.work) {
-                Some(0) => {
-                    rest = Ok(accuracy);
-                    break;
-                }
-                Some(index) => self.saddle = Some(saddle_of(&leaf, state, index)),
-                None => {}
-            }
-            saddle::push_off(&leaf, state, system, self.options.leaning, relaxation.work);
-            relaxation.near_rest = false;
-            relaxation.cg_tolerance = FAR_FROM_REST;
-            relaxation.solver.direct = None;
+            Some(index) => history.saddle = Some(saddle_of(&leaf, state, index)),
+            None => {}
         }
-        let Relaxation { state, moved, .. } = relaxation;
-        self.contraction = relaxation.solver.contraction;
-        let level = Level { leaf, state };
-        Settled { level, rest, moved }
+        let leaning = problem.options.leaning;
+        saddle::push_off(&leaf, state, system, leaning, relaxation.work);
+        relaxation.near_rest = false;
+        relaxation.cg_tolerance = FAR_FROM_REST;
+        relaxation.solver.direct = None;
     }
+    let Relaxation { state, moved, .. } = relaxation;
+    history.contraction = relaxation.solver.contraction;
+    let level = Level { leaf, state };
+    Settled { level, rest, moved }
 }
 
 /// Reports the steps on a grid of `grid` segments.

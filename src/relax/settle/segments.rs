@@ -3,13 +3,11 @@
 use crate::leaf::Leaf;
 use crate::memory;
 use crate::refusal::RefusedOption;
+use crate::relax::nested::FINEST;
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{MAX_NODES, RelaxError};
+use crate::relax::request::problem::COARSEST;
 use crate::relax::settle::methods::moment;
-use crate::relax::settle::run::COARSEST;
-
-/// Segments of the finest grid.
-pub const FINEST: usize = 16_384;
 
 /// Segments of the coarsest grid for a loose tolerance: if it is at least [`LOOSE`] or only
 /// the shape is requested (forces and eigenvalues have larger errors), and the leaf settles in

@@ -2,10 +2,13 @@
 //! no eigenvalue is so close to zero that other grids may tell another sign.
 
 use crate::leaf::{Grid, System};
-use crate::newton::Stop;
+use crate::newton::Work;
+use crate::relax::grids::continue_on;
+use crate::relax::nested::NestedEquilibrium;
 use crate::relax::request::options::MOST_MODES;
+use crate::relax::request::problem::Problem;
 use crate::relax::saddle::bounds;
-use crate::relax::settle::run::Run;
+use crate::relax::settle::effort::Effort;
 use crate::relax::stability::eigenvalues;
 use crate::relax::stability::eigenvalues::{List, Lowest, deciding_grid, small_grid};
 use crate::relax::transfer::level::Level;
@@ -26,12 +29,29 @@ pub enum Verdict {
 
 /// The decision on a leaf.
 pub struct Decision {
+    /// The leaf, on further grids where these were necessary.
+    pub found: NestedEquilibrium,
     pub verdict: Verdict,
     /// The requested modes, if they were computed for it.
     pub modes: Option<Lowest>,
     /// Whether stability was not clear without eigenvalues, or not on the grids before.
     pub needed: bool,
 }
+
+impl Decision {
+    /// Nothing is decided on a leaf that is not at rest.
+    pub fn none(found: NestedEquilibrium) -> Self {
+        Decision {
+            found,
+            verdict: Verdict::AsCounted,
+            modes: None,
+            needed: false,
+        }
+    }
+}
+
+/// Brings the leaf to rest on this grid, and on finer ones, if it can.
+pub type Again<'a> = dyn Fn(Grid, &mut Effort) -> Option<NestedEquilibrium> + 'a;
 
 /// What to do on the grids so far.
 enum Next {
@@ -48,18 +68,16 @@ enum Next {
 /// Decides, on further grids where necessary; `again` brings the leaf to rest on a grid whose
 /// equilibrium is not near those of the grids before.
 pub fn decide(
-    run: &mut Run,
-    end: &mut Result<bool, Stop>,
-    again: &mut dyn FnMut(&mut Run, Grid) -> Result<bool, Stop>,
+    problem: &Problem,
+    found: NestedEquilibrium,
+    effort: &mut Effort,
+    again: &Again,
 ) -> Decision {
-    let mut decision = Decision {
-        verdict: Verdict::AsCounted,
-        modes: None,
-        needed: false,
-    };
+    let mut decision = Decision::none(found);
     let mut may_refine = true;
-    while end.is_ok() {
-        let next = next(run, may_refine);
+    loop {
+        let found = &mut decision.found;
+        let next = next(problem, found, may_refine, &mut effort.work);
         let list = match &next {
             Next::Nothing => break,
             Next::Finer(_) => None,
@@ -74,28 +92,26 @@ pub fn decide(
             decides: list.decides || decision.needed,
             ..list
         });
-        let lowest = list.and_then(|list| eigenvalues::lowest(run, list));
+        let lowest = list.and_then(|list| eigenvalues::lowest(problem, found, list));
         decision.needed |= list.is_none_or(|list| list.decides);
-        run.softening = lowest.as_ref().map_or(1.0, |found| found.softening);
-        let inaccurate = end.is_ok_and(|reached| reached)
-            && run.segments().is_none()
-            && run.error().is_some_and(|error| error > run.tolerance);
+        found.softening = lowest.as_ref().map_or(1.0, |lowest| lowest.softening);
+        let inaccurate = found.keeps_tolerance && !found.is_accurate();
         let finer = match (next, &lowest) {
             (Next::Finer(grid), _) => Some(grid),
-            (_, Some(_)) if inaccurate && may_refine => run.finer(),
-            (_, Some(found)) => found.undecided.and_then(|size| deciding_grid(run, size)),
-            _ => decision.needed.then(|| small_grid(run)).flatten(),
+            (_, Some(_)) if inaccurate && may_refine => found.finer(),
+            (_, Some(lowest)) => {
+                (lowest.undecided).and_then(|size| deciding_grid(problem, found, size))
+            }
+            _ => (decision.needed)
+                .then(|| small_grid(problem, found))
+                .flatten(),
         };
-        let softening = std::mem::replace(&mut run.softening, 1.0);
-        let moved = finer.is_some_and(|finer| go_on(run, end, finer, again));
-        if moved {
+        if let Some(further) = finer.and_then(|finer| go_on(problem, found, finer, effort, again)) {
+            decision.found = further;
             decision.needed = true;
             continue;
         }
-        run.softening = softening;
-        if inaccurate {
-            *end = Ok(false);
-        }
+        found.keeps_tolerance &= !inaccurate;
         let Some(list) = list else {
             // The grids so far have to do.
             may_refine = false;
@@ -104,9 +120,9 @@ pub fn decide(
         decision.verdict = match &lowest {
             None if decision.needed => Verdict::Unknown,
             None => Verdict::AsCounted,
-            Some(found) => verdict(run, list, found),
+            Some(lowest) => verdict(problem, found, list, lowest),
         };
-        let requested = list.above.is_none() && list.count == run.options.modes;
+        let requested = list.above.is_none() && list.count == problem.options.modes;
         decision.modes = lowest.filter(|_| requested);
         break;
     }
@@ -116,40 +132,38 @@ pub fn decide(
 /// Comes to rest on a finer grid. The grids before found rest; without this one the sign remains
 /// undecided.
 fn go_on(
-    run: &mut Run,
-    end: &mut Result<bool, Stop>,
+    problem: &Problem,
+    found: &NestedEquilibrium,
     finer: Grid,
-    again: &mut dyn FnMut(&mut Run, Grid) -> Result<bool, Stop>,
-) -> bool {
-    let before = run.found();
+    effort: &mut Effort,
+    again: &Again,
+) -> Option<NestedEquilibrium> {
     // A saddle of the finer grid may be none of the coarser, and what it leads to not near them.
-    let further = run.continue_on(finer.clone()).or_else(|_| {
-        run.restart();
-        again(run, finer)
-    });
-    if further.is_err() {
-        run.return_to(before);
-        return false;
+    match continue_on(problem, found.grids(), finer.clone(), effort) {
+        Ok(further) => Some(further),
+        Err(_) => {
+            let further = again(finer, effort)?;
+            let path = further.path.clone().or_else(|| found.path.clone());
+            Some(further.along(path))
+        }
     }
-    *end = further;
-    true
 }
 
 /// What decides on the grids so far.
-fn next(run: &mut Run, may_refine: bool) -> Next {
-    let requested = List::requested(run);
-    let Some(level) = run.levels.last() else {
+fn next(problem: &Problem, found: &NestedEquilibrium, may_refine: bool, work: &mut Work) -> Next {
+    let requested = List::requested(problem);
+    let Some(level) = found.levels.last() else {
         return Next::Nothing;
     };
     // A single grid allows no comparison; a dead moment has no potential.
-    let comparable = run.segments().is_none() && level.leaf.tip_moment() == DVec3::ZERO;
-    match run.index {
-        Some(0) if comparable && !run.clearly_stable => Next::Compute(List {
+    let comparable = problem.segments().is_none() && level.leaf.tip_moment() == DVec3::ZERO;
+    match found.index {
+        Some(0) if comparable && !found.clearly_stable => Next::Compute(List {
             count: requested.count.max(1),
             decides: true,
             ..requested
         }),
-        Some(1..) if comparable => beside_zero(run, may_refine),
+        Some(1..) if comparable => beside_zero(problem, found, may_refine, work),
         _ if requested.count == 0 => Next::Nothing,
         _ => Next::Compute(requested),
     }
@@ -157,20 +171,25 @@ fn next(run: &mut Run, may_refine: bool) -> Next {
 
 /// What decides on a saddle: the counts of negative eigenvalues, or the few that are close to
 /// zero.
-fn beside_zero(run: &mut Run, may_refine: bool) -> Next {
-    let Some(Level { leaf, state }) = run.levels.last() else {
+fn beside_zero(
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    may_refine: bool,
+    work: &mut Work,
+) -> Next {
+    let Some(Level { leaf, state }) = found.levels.last() else {
         return Next::Nothing;
     };
     let mut system = System::new(leaf);
-    let Some(bounds) = bounds(leaf, state, &mut system, &mut run.work) else {
+    let Some(bounds) = bounds(leaf, state, &mut system, work) else {
         return Next::Impossible;
     };
-    if bounds.least == bounds.finer && run.index == Some(bounds.least) {
+    if bounds.least == bounds.finer && found.index == Some(bounds.least) {
         return Next::Nothing;
     }
     if may_refine
         && bounds.here < bounds.finer
-        && let Some(finer) = small_grid(run)
+        && let Some(finer) = small_grid(problem, found)
     {
         return Next::Finer(finer);
     }
@@ -187,24 +206,29 @@ fn beside_zero(run: &mut Run, may_refine: bool) -> Next {
 }
 
 /// What the signs of extrapolated eigenvalues tell.
-fn verdict(run: &Run, list: List, found: &Lowest) -> Verdict {
+fn verdict(problem: &Problem, found: &NestedEquilibrium, list: List, lowest: &Lowest) -> Verdict {
     // On a fine grid rounding may have excused a negative eigenvalue as neutral, or hide what
     // coarser ones tell.
-    let as_counted = found.undecided.is_none() && found.negative <= run.index;
-    if as_counted && found.certainly_negative() <= run.index.unwrap_or(0) {
+    let as_counted = lowest.undecided.is_none() && lowest.negative <= found.index;
+    if as_counted && lowest.certainly_negative() <= found.index.unwrap_or(0) {
         return Verdict::AsCounted;
     }
     let (certain, negative) = match list.above {
-        Some(_) => (found.certainly_negative(), found.negative),
-        None => by_more_eigenvalues(run, list, found),
+        Some(_) => (lowest.certainly_negative(), lowest.negative),
+        None => by_more_eigenvalues(problem, found, list, lowest),
     };
     negative.map_or(Verdict::Undecided(certain), Verdict::Index)
 }
 
 /// How many eigenvalues are negative for certain, and how many are, if that is known: of the list
 /// or, where its signs are not certain or all of them are negative, of a longer and exact one.
-fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<usize>) {
-    let (mut certain, mut negative) = (found.certainly_negative(), found.negative);
+fn by_more_eigenvalues(
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    list: List,
+    lowest: &Lowest,
+) -> (usize, Option<usize>) {
+    let (mut certain, mut negative) = (lowest.certainly_negative(), lowest.negative);
     let mut list = List {
         decides: true,
         ..list
@@ -214,7 +238,7 @@ fn by_more_eigenvalues(run: &Run, list: List, found: &Lowest) -> (usize, Option<
     {
         list.exact = true;
         list.count = (2 * list.count).min(MOST_MODES);
-        let more = eigenvalues::lowest(run, list);
+        let more = eigenvalues::lowest(problem, found, list);
         negative = (more.as_ref()).and_then(|more| more.negative_beyond(certain));
         certain = certain.max(more.map_or(0, |more| more.certainly_negative()));
     }

@@ -8,9 +8,11 @@ use crate::modes;
 use crate::modes::{Eigenpair, Wanted};
 use crate::motion::Physics;
 use crate::newton::{Newton, Work};
+use crate::relax::nested::NestedEquilibrium;
+use crate::relax::request::options::Options;
+use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::Mode;
 use crate::relax::saddle::ANY_SIGN;
-use crate::relax::settle::run::Run;
 use crate::relax::stability::eigenvalue_bars::{Extrapolated, GRIDS, Series};
 use crate::relax::transfer::level::Level;
 use crate::relax::transfer::predict::predict;
@@ -105,9 +107,9 @@ pub struct List {
 
 impl List {
     /// The modes that are requested.
-    pub fn requested(run: &Run) -> Self {
+    pub fn requested(problem: &Problem) -> Self {
         List {
-            count: run.options.modes,
+            count: problem.options.modes,
             above: None,
             decides: false,
             exact: false,
@@ -118,18 +120,18 @@ impl List {
 /// The lowest modes, or some next to zero. `None` if they cannot be computed: the leaf is too
 /// large, or there are several equal ones that cannot be told apart.
 /// Of those that are neither requested nor exact only the signs of the eigenvalues are needed.
-pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
+pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Option<Lowest> {
     let List { count, above, .. } = list;
-    let options = run.options;
-    let finest = run.levels.last()?;
+    let options = problem.options;
+    let finest = found.levels.last()?;
     let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides;
     if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
         return None;
     }
-    let physics = Physics::new(run.leaf);
+    let physics = Physics::new(problem.leaf);
     let requested = count <= options.modes && above.is_none();
     let tolerance = if requested || list.exact {
-        run.tolerance
+        problem.tolerance
     } else {
         SIGN_TOLERANCE
     };
@@ -146,8 +148,8 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     let left_out = above.map_or(0, |(others, _)| others);
     let mut nested = Nested {
         series: Series {
-            index: run.index.unwrap_or(0).saturating_sub(left_out),
-            single: run.clearly_stable || run.segments().is_some(),
+            index: found.index.unwrap_or(0).saturating_sub(left_out),
+            single: found.clearly_stable || problem.segments().is_some(),
             grids: Vec::new(),
             tolerance,
             rounding: 0.0,
@@ -159,13 +161,13 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     let sharp = requested && options.mode_shapes || list.exact;
     let few = requested && !list.decides && count < FEW;
     let compares =
-        (few || run.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+        (few || problem.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
     let enough = |series: &Series| {
         (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
     };
-    let sufficient_grids = sufficient_grids(run);
+    let sufficient_grids = sufficient_grids(options, found);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
-    for (k, level) in run.levels.iter().enumerate().skip(skipped) {
+    for (k, level) in found.levels.iter().enumerate().skip(skipped) {
         let series = &nested.series;
         let decided = !series.grids.is_empty() && series.undecided().is_none();
         if k >= sufficient_grids && decided && enough(series) {
@@ -181,9 +183,9 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     }
     nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        refine(run, &mut nested, (on, enough));
+        refine(problem, &mut nested, (on, enough));
     }
-    let on = run.segments_of_estimate();
+    let on = found.segments_of_estimate();
     let softening = (nested
         .segments
         .iter()
@@ -191,7 +193,7 @@ pub fn lowest(run: &Run, list: List) -> Option<Lowest> {
     .map_or(1.0, |grid| nested.series.softening(grid));
     let Nested { series, finest, .. } = nested;
     let shapes = match options.mode_shapes {
-        true => finest?.shapes(&run.levels.last()?.leaf),
+        true => finest?.shapes(&found.levels.last()?.leaf),
         false => Vec::new(),
     };
     let unit = physics.time.powi(-2);
@@ -258,13 +260,13 @@ impl<'a> Nested<'a> {
 }
 
 /// Number of grids that suffice if they determine the signs of the eigenvalues.
-fn sufficient_grids(run: &Run) -> usize {
-    if run.options.mode_shapes || run.index != Some(0) {
-        return run.levels.len();
+fn sufficient_grids(options: &Options, found: &NestedEquilibrium) -> usize {
+    if options.mode_shapes || found.index != Some(0) {
+        return found.levels.len();
     }
     let few = |level: &&Level| unknowns(&level.leaf) < QUICK_UNKNOWNS;
-    let few = run.levels.iter().take_while(few).count();
-    few.max(2).min(run.levels.len())
+    let few = found.levels.iter().take_while(few).count();
+    few.max(2).min(found.levels.len())
 }
 
 /// Whether the cost of modes on this grid is acceptable.
@@ -274,16 +276,16 @@ fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
 
 /// The next grid, if it may decide the signs of eigenvalues, that is if its rounding error is
 /// small enough for an undecided one of this `size`.
-pub fn deciding_grid(run: &Run, size: f64) -> Option<Grid> {
-    let noise = run.levels.last()?.leaf.neutral_shift();
-    let finer = run.finer().filter(|grid| is_affordable(run.leaf, grid))?;
-    (size > FINER_NOISE * noise && !run.out_of_time()).then_some(finer)
+pub fn deciding_grid(problem: &Problem, found: &NestedEquilibrium, size: f64) -> Option<Grid> {
+    let noise = found.levels.last()?.leaf.neutral_shift();
+    let finer = (found.finer()).filter(|grid| is_affordable(problem.leaf, grid))?;
+    (size > FINER_NOISE * noise && !problem.out_of_time()).then_some(finer)
 }
 
 /// The next grid, if it has few unknowns.
-pub fn small_grid(run: &Run) -> Option<Grid> {
-    let few = |grid: &Grid| 6 * run.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
-    run.finer().filter(|grid| few(grid) && !run.out_of_time())
+pub fn small_grid(problem: &Problem, found: &NestedEquilibrium) -> Option<Grid> {
+    let few = |grid: &Grid| 6 * problem.leaf.rods() * grid.segments() <= FEW_UNKNOWNS;
+    (found.finer()).filter(|grid| few(grid) && !problem.out_of_time())
 }
 
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
@@ -293,7 +295,7 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
 /// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, or
 /// the limits are reached.
 fn refine(
-    run: &Run,
+    problem: &Problem,
     nested: &mut Nested,
     (on, enough): (
         impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
@@ -301,14 +303,14 @@ fn refine(
     ),
 ) -> Option<()> {
     for _ in 0..MORE_GRIDS {
-        if enough(&nested.series) || run.out_of_time() {
+        if enough(&nested.series) || problem.out_of_time() {
             break;
         }
         let finest = &*nested.finest.as_ref()?.level;
-        if !is_affordable(run.leaf, &finest.leaf.grid.refined()) {
+        if !is_affordable(problem.leaf, &finest.leaf.grid.refined()) {
             break;
         }
-        let next = settle(nested.coarser.as_deref(), finest, run.tolerance)?;
+        let next = settle(nested.coarser.as_deref(), finest, problem.tolerance)?;
         if !nested.add(Cow::Owned(next), &on) {
             break;
         }

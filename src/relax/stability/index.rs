@@ -1,13 +1,15 @@
 //! The Morse index of an equilibrium that was not found by relaxation.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
-use crate::newton::Stop;
 use crate::relax::accuracy::richardson::distance;
+use crate::relax::grids::refine;
+use crate::relax::nested::NestedEquilibrium;
 use crate::relax::request::method::{Method, SemiImplicit};
 use crate::relax::request::options::{Options, Progress};
+use crate::relax::request::problem::Problem;
 use crate::relax::saddle;
-use crate::relax::settle::run::Run;
-use crate::relax::stability::decide::{Verdict, decide};
+use crate::relax::settle::effort::Effort;
+use crate::relax::stability::decide::{Decision, Verdict, decide};
 use crate::relax::transfer::level::{Level, positions};
 use crate::relax::transfer::prolong::prolong;
 use crate::scenario::Scenario;
@@ -48,7 +50,8 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
     let mut ignored = |_: &Progress| {};
     let error = error / leaf.scale.length;
     let tolerance = error.clamp(LEAST_TOLERANCE, TOLERANCE);
-    let mut run = Run::new(&leaf, &options, tolerance, &mut ignored);
+    let problem = Problem::new(&leaf, &options, tolerance);
+    let mut effort = Effort::new(&mut ignored);
     let discrete = DiscreteLeaf::new(&leaf, grid);
     let state = project(&leaf, &discrete, rods);
     let given = Level {
@@ -61,8 +64,7 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
             leaf: DiscreteLeaf::new(&leaf, guess.leaf.grid.refined()),
             state: prolong(&guess.leaf, &guess.state),
         };
-        run.restart();
-        if let Some(counted) = index_from(&mut run, guess, (&given, error)) {
+        if let Some(counted) = index_from(&problem, guess, (&given, error), &mut effort) {
             return counted;
         }
         guess = finer;
@@ -73,37 +75,35 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64
 /// The index at the `given` equilibrium, known within `error`, counted on grids from that of the
 /// `guess` on; `None` if these lead to another one.
 fn index_from(
-    run: &mut Run,
+    problem: &Problem,
     mut guess: Level,
     (given, error): (&Level, f64),
+    effort: &mut Effort,
 ) -> Option<Option<usize>> {
     let Level { leaf, state } = &mut guess;
     let mut system = System::new(leaf);
     let begun = state.clone();
-    run.index = Some(saddle::polish(leaf, state, &mut system, &mut run.work)?);
-    if saddle::clearly_stable(leaf, state, &mut system, &mut run.work) {
+    let index = saddle::polish(leaf, state, &mut system, &mut effort.work)?;
+    if saddle::clearly_stable(leaf, state, &mut system, &mut effort.work) {
         return (state.shift_to(&begun) < SAME_PLACE).then_some(Some(0));
     }
-    run.push(guess);
-    let mut end = run.refine();
-    end.ok()?;
+    let counted = NestedEquilibrium::begun(problem).counted(false, Some(index));
+    let refined = refine(problem, counted.with(guess), effort).ok()?;
     // No other equilibrium is of interest.
-    let lost = &mut |_: &mut Run, _| Err(Stop::StepLimit);
-    let verdict = decide(run, &mut end, lost).verdict;
-    let found = run.error().unwrap_or(f64::INFINITY);
-    let allowed = SAME_PLACE.min(SAFETY * (error + found));
-    (distance_from(run, given) <= allowed).then_some(match verdict {
-        Verdict::AsCounted => run.index,
+    let Decision { found, verdict, .. } = decide(problem, refined, effort, &|_, _| None);
+    let allowed = SAME_PLACE.min(SAFETY * (error + found.error().unwrap_or(f64::INFINITY)));
+    (distance_from(&found, given) <= allowed).then_some(match verdict {
+        Verdict::AsCounted => found.index,
         Verdict::Index(index) => Some(index),
         Verdict::Undecided(_) | Verdict::Unknown => None,
     })
 }
 
 /// The largest distance of the extrapolated positions from those `given` on a grid whose repeated
-/// halving leads to the first of the run.
-fn distance_from(run: &Run, given: &Level) -> f64 {
-    let (first, own) = (run.levels[0].leaf.segments(), given.leaf.segments());
-    let rods = run.table.extrapolated().chunks(3 * (first + 1));
+/// halving leads to the first of those where it was found.
+fn distance_from(found: &NestedEquilibrium, given: &Level) -> f64 {
+    let (first, own) = (found.levels[0].leaf.segments(), given.leaf.segments());
+    let rods = found.table.extrapolated().chunks(3 * (first + 1));
     let shared = rods.flat_map(|rod| rod.chunks(3).step_by(first / own).flatten());
     let shared: Vec<f64> = shared.copied().collect();
     distance(&shared, &positions(given, 1))

@@ -4,4 +4,3 @@ pub mod decide;
 pub mod eigenvalue_bars;
 pub mod eigenvalues;
 pub mod index;
-pub mod push;

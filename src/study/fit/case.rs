@@ -12,7 +12,7 @@ use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::transfer::predict::weights;
-use crate::relax::{AtRest, Level, Lost, Nearby, Parameter, unit_forces};
+use crate::relax::{Level, Lost, Nearby, NestedEquilibrium, Parameter, unit_forces};
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
@@ -71,7 +71,7 @@ impl Compared {
 
 /// A leaf at rest at some values of the free numbers.
 pub(super) struct CaseAt {
-    pub at: AtRest,
+    pub at: NestedEquilibrium,
     /// Modes on the first grids.
     pub modes: Vec<Vec<modes::Eigenpair>>,
     pub components: Vec<Component>,
@@ -83,7 +83,7 @@ pub(super) struct CaseAt {
 
 impl CaseAt {
     /// Predictions of a leaf at rest for the data under these conditions.
-    pub fn new(of: &Case, at: AtRest) -> Result<CaseAt, Lost> {
+    pub fn new(of: &Case, at: NestedEquilibrium) -> Result<CaseAt, Lost> {
         let frequencies = of
             .measured()
             .filter_map(|measured| match measured.quantity {

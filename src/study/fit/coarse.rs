@@ -46,7 +46,7 @@ impl<'a> Model<'a> {
                     return Ok(found);
                 }
             }
-            CaseAt::new(&self.cases[case], known.at.clone()).map_err(lost)
+            CaseAt::new(&self.cases[case], known.at.grids()).map_err(lost)
         };
         let point = self.point(&accurate.theta, coarse)?;
         Ok((model, point))

@@ -14,7 +14,7 @@ use super::free::Coordinate;
 use super::quantity::Kind;
 use super::words::digits;
 use crate::newton::Work;
-use crate::relax::{AtRest, Grids, Lost, Options};
+use crate::relax::{Grids, Lost, NestedEquilibrium, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
 
@@ -150,8 +150,8 @@ impl<'a> Model<'a> {
     pub fn find(&self, theta: &[f64]) -> Result<Point, FitError> {
         let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
-            let found = AtRest::find(&scenario, &self.options)?;
-            let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], at));
+            let found = NestedEquilibrium::find(&scenario, &self.options)?;
+            let found = found.and_then(|at| CaseAt::new(&self.cases[case], at));
             found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
         };
         self.point(theta, find)
@@ -161,7 +161,7 @@ impl<'a> Model<'a> {
     pub fn find_within(&self, theta: &[f64], most_steps: usize) -> Result<Point, FitError> {
         let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
-            let found = AtRest::find_within(&scenario, &self.options, most_steps)?;
+            let found = NestedEquilibrium::find_within(&scenario, &self.options, most_steps)?;
             let found = found.and_then(|at| CaseAt::new(&self.cases[case], at));
             found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
         };

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::leaf::{Forces, LeafRate, Response};
-use crate::relax::{AtRest, Level, Linearized, Lost};
+use crate::relax::{Level, Linearized, Lost, NestedEquilibrium};
 
 /// Relative accuracy of the predicted state from which a leaf is relaxed.
 const PREDICTED: f64 = 1e-3;
@@ -25,7 +25,7 @@ fn singular() -> Lost {
 
 impl Responses {
     /// The linearised equations at a leaf at rest.
-    pub fn new(at: &AtRest, rates: &[LeafRate], tolerance: f64) -> Responses {
+    pub fn new(at: &NestedEquilibrium, rates: &[LeafRate], tolerance: f64) -> Responses {
         let linear = at.levels.iter();
         let linear: Vec<_> = linear
             .map(|level| Linearized::new(level, tolerance))

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::relax::{AtRest, Stencil};
+use crate::relax::{NestedEquilibrium, Stencil};
 
 /// Iterations for the nearest point between two nodes, and its accuracy.
 const ITERATIONS: usize = 60;
@@ -10,14 +10,14 @@ const EXACT: f64 = 1e-10;
 
 /// A vein at the nodes of its finest grid.
 pub(super) struct Vein<'a> {
-    at: &'a AtRest,
+    at: &'a NestedEquilibrium,
     rod: usize,
     /// Fractions of the length, and positions in the scenario's units.
     nodes: Vec<(f64, DVec3)>,
 }
 
 impl<'a> Vein<'a> {
-    pub fn of(at: &'a AtRest, rod: usize) -> Self {
+    pub fn of(at: &'a NestedEquilibrium, rod: usize) -> Self {
         let nodes = at.levels.last().map_or(Vec::new(), |level| {
             let (base, length) = (level.state.base(rod), level.leaf.leaf.scale.length);
             let sigma = level.leaf.grid.sigma().iter().enumerate();

@@ -87,11 +87,11 @@ pub fn relax_with_margin(
     if scenario.tip_moment != [0.0; 3] {
         return Err(MarginError::Moment);
     }
-    let (mut leaf, levels) = relax_on_grids(scenario, options, false, &mut |step| {
+    let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
-        (true, Some(true)) => margin(scenario, &leaf, &levels, options, progress)?,
+        (true, Some(true)) => margin(scenario, &leaf, &found.levels, options, progress)?,
         (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
         _ => Margin::none("only a leaf at rest whose stability is known has a margin"),
     });

@@ -1,15 +1,49 @@
-//! The error of what a run has found, from its grids and the defect on them.
+//! The error of an equilibrium on nested grids, from these and from the defect on them.
 
-use super::{
-    COARSEST, CORRECTED, CORRECTIONS, EXTRAPOLATED, LARGEST, LAYERS, LEAST_ALONE, OUT_OF_REACH,
-    ROUNDING, Run, SAFETY, is_large,
-};
+use super::NestedEquilibrium;
 use crate::largest::larger;
+use crate::leaf::{DiscreteLeaf, System};
+use crate::newton::Work;
 use crate::relax::accuracy::defect;
 use crate::relax::accuracy::defect::Estimate;
-use crate::relax::request::method::Method;
+use crate::relax::request::problem::{COARSEST, Problem};
 
-impl Run<'_, '_> {
+/// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
+/// absolute values.
+const EXTRAPOLATED: f64 = 2.0;
+
+/// Safety factor on the error estimated from the defect of the extrapolated leaf.
+const SAFETY: f64 = 2.0;
+
+/// The least part of the largest error between the nodes of the coarsest grid that is taken
+/// for the error at these nodes: where layers are thinner than its segments the linear
+/// equations of a coarse grid are wrong by so much.
+const LAYERS: f64 = 0.1;
+
+/// Upper bound of that estimate in units of the error estimated from the last extrapolation:
+/// the response of a neutral mode to rounding is not an error.
+const LARGEST: f64 = 10.0;
+
+/// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
+/// not computed: it would hardly be small enough.
+const OUT_OF_REACH: f64 = 3e3;
+
+/// The part of the error that each correction leaves at best.
+const CORRECTED: f64 = 1e-2;
+
+/// For leaves with more nodes than this no equations are kept while others are solved, which
+/// saves memory at the cost of another factorisation on a coarse grid.
+const MANY_NODES: usize = 50_000;
+
+/// Rounding error per segment.
+const ROUNDING: f64 = 4e-15;
+
+/// Whether the equations of a leaf need much memory.
+pub fn is_large(leaf: &DiscreteLeaf) -> bool {
+    leaf.rods() * leaf.segments() > MANY_NODES
+}
+
+impl NestedEquilibrium {
     /// Segments of the grid whose linear equations tell the error; of the finest if none do.
     pub fn segments_of_estimate(&self) -> Option<usize> {
         let level = match (&self.estimate, &self.linear) {
@@ -30,13 +64,14 @@ impl Run<'_, '_> {
         let best = self.table.best();
         let best = best.map(|best| larger(best.error, self.unresolved));
         let most = best.map_or(f64::INFINITY, |best| LARGEST * best);
+        let too_coarse = !self.fixed && segments[0] < COARSEST;
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
                 return Some(SAFETY * estimate.largest() + ROUNDING * segments[0] as f64);
             }
             // If nodes are few the midpoints are stations, too.
-            Some(estimate) if self.too_coarse(segments[0]) || best.is_none() => {
+            Some(estimate) if too_coarse || best.is_none() => {
                 (SAFETY * estimate.largest()).min(most)
             }
             Some(estimate) => {
@@ -50,7 +85,12 @@ impl Run<'_, '_> {
 
     /// Error by unfinished iterations and rounding on a grid of `segments` segments.
     fn unfinished(&self, segments: usize) -> f64 {
-        EXTRAPOLATED * self.remaining + ROUNDING * segments as f64
+        EXTRAPOLATED * self.history.remaining + ROUNDING * segments as f64
+    }
+
+    /// Whether the error is within the tolerance; always true on a fixed grid.
+    pub fn is_accurate(&self) -> bool {
+        self.fixed || self.error().is_some_and(|error| error <= self.tolerance)
     }
 
     /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
@@ -71,39 +111,30 @@ impl Run<'_, '_> {
             .filter(|estimate| estimate.corrections > 0)
     }
 
-    /// The largest number of corrections.
-    fn corrections(&self) -> usize {
-        let grids = matches!(self.options.method, Method::SemiImplicit(_));
-        let free = self.leaf.held.is_none() && self.segments().is_none();
-        match grids && free && self.shape_alone {
-            true => CORRECTIONS,
-            false => 0,
-        }
-    }
-
-    /// Whether the first grid may be enough.
-    pub fn may_be_alone(&self) -> bool {
-        self.corrections() > 0 && self.tolerance >= LEAST_ALONE
-    }
-
-    /// Estimates the error of the values on the only grid or of the extrapolated values from
-    /// their defect, and corrects it if that makes them accurate enough.
-    pub fn estimate_accuracy(&mut self) {
-        let most = self.corrections();
+    /// The same with the error of the values on its only grid or of the extrapolated values
+    /// estimated from their defect, and corrected if that makes them accurate enough. The
+    /// equations take the place of the `spare` ones.
+    pub fn estimated(
+        mut self,
+        problem: &Problem,
+        spare: &mut Option<System>,
+        work: &mut Work,
+    ) -> Self {
+        let most = problem.corrections();
         let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
         let columns = match self.table.best() {
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
-            None => (self.may_be_alone() && self.pushes == 0).then_some(0),
+            None => (problem.may_be_alone() && self.history.pushes == 0).then_some(0),
         };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
-        let systems = (&mut self.linear, &mut self.spare_system);
-        let (levels, work) = (&self.levels, &mut self.work);
+        let (levels, systems) = (&self.levels, (&mut self.linear, spare));
         self.estimate =
             columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.linear = None;
         }
+        self
     }
 
     /// Whether errors by unfinished iterations and rounding alone exceed the tolerance on a
