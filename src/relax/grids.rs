@@ -1,11 +1,12 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
 use crate::largest::largest;
-use crate::leaf::{Grid, State};
-use crate::newton::Stop;
+use crate::leaf::{DiscreteLeaf, Grid, State, System};
+use crate::newton::{Newton, Stop, Work};
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::nested::{Found, NestedEquilibrium};
 use crate::relax::request::problem::Problem;
+use crate::relax::saddle::ANY_SIGN;
 use crate::relax::settle::effort::{BUDGET, Effort};
 use crate::relax::settle::iteration::{InitialGuess, Settled, settle};
 use crate::relax::settle::push::check_stability;
@@ -23,6 +24,13 @@ const FINEST_COMPARED: usize = 256;
 
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 pub(super) const FINEST_RESOLVING: usize = 2048;
+
+/// Newton iterations to the same equilibrium, of any index, on the next grid, their accuracy as a
+/// part of the tolerance, and the largest displacement of a node, in lengths: farther away is
+/// another equilibrium.
+const NEARBY_ITERATIONS: usize = 12;
+const NEARBY_ACCURACY: f64 = 1e-3;
+const NEARBY: f64 = 0.02;
 
 /// From the start to rest, on as many grids as the tolerance needs.
 pub fn solve(problem: &Problem, grid: Grid, effort: &mut Effort) -> Found {
@@ -79,8 +87,7 @@ pub fn refine(problem: &Problem, mut found: NestedEquilibrium, effort: &mut Effo
             let another = needs_another_grid(problem, &found);
             found.added_for_nodes |= another;
             if !another {
-                found.keeps_tolerance = true;
-                return Ok(found);
+                return Ok(found.ended(true));
             }
         }
         if problem.out_of_time() {
@@ -88,8 +95,7 @@ pub fn refine(problem: &Problem, mut found: NestedEquilibrium, effort: &mut Effo
         }
         let Some(finer) = found.finer() else {
             (found, _) = check_stability(problem, found, true, effort)?;
-            found.keeps_tolerance = false;
-            return Ok(found);
+            return Ok(found.ended(false));
         };
         found = settle_on(problem, found, finer, effort)?;
     }
@@ -137,6 +143,26 @@ fn settle_next(
         Ok(_) => Ok(found),
         Err(stop) => found.failed(stop),
     }
+}
+
+/// The same equilibrium, of any index, on the grid next to the `finest`, predicted from a
+/// `coarser` one, too; `None` if Newton's method leads elsewhere.
+pub fn on_next_grid(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> Option<Level> {
+    let mut state = prolong(&finest.leaf, &finest.state);
+    if let Some(coarser) = coarser {
+        predict(&[coarser, finest], &mut state);
+    }
+    let leaf = DiscreteLeaf::new(&finest.leaf.leaf, finest.leaf.grid.refined());
+    let mut system = System::new(&leaf);
+    let guess = state.clone();
+    let newton = Newton {
+        accuracy: NEARBY_ACCURACY * tolerance,
+        iterations: NEARBY_ITERATIONS,
+        work: &mut Work::default(),
+        progress: &mut |_, _| {},
+    };
+    (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
+    (guess.shift_to(&state) < NEARBY).then_some(Level { leaf, state })
 }
 
 /// From the start to rest on the first grid that resolves it. A leaf that had to move far

@@ -4,10 +4,13 @@ use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Work;
 use crate::refusal::RefusedOption;
+use crate::relax::request::method::Method;
 use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError};
+use crate::relax::rest::relax_on_grids;
 use crate::relax::result::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
+use crate::relax::result::plausible;
 use crate::relax::result::report::neutral_directions;
 use crate::relax::result::stations::SAME;
 use crate::relax::settle::segments::coarsest;
@@ -76,31 +79,65 @@ pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), Rela
     Ok(memory::shooting(rods, intervals)?)
 }
 
-/// Solves the boundary-value problem starting from a relaxed leaf, `rest`; if that is not at
-/// rest it is returned.
-pub fn from_rest(
+/// Brings a leaf to rest by shooting: from arcs, or from a relaxed leaf.
+pub fn relax(
     scenario: &Scenario,
     options: &Options,
-    intervals: Option<usize>,
     tolerance: f64,
-    rest: Equilibrium,
     progress: &mut dyn FnMut(&Progress),
-) -> Equilibrium {
+) -> Result<Equilibrium, RelaxError> {
+    let (intervals, from_rest) = match options.method {
+        Method::Shooting { intervals } => (intervals, false),
+        Method::ShootingFromRest { intervals } => (intervals, true),
+        _ => (Some(1), false),
+    };
+    check_intervals(scenario.rods.len(), intervals)?;
+    if !from_rest && scenario.held_tip.is_some() {
+        // Shooting from arcs has no continuation to a held tip.
+        let why =
+            "a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest";
+        return Err(RefusedOption::new("method", options.method.word(), why).into());
+    }
+    let how = (intervals, tolerance);
+    let mut found = match from_rest {
+        true => relax_from_rest(scenario, options, how, progress)?,
+        false => shoot(scenario, options, how, Start::Arcs, progress),
+    };
+    found.doubts = plausible::doubts(scenario, &found);
+    Ok(found)
+}
+
+/// Solves the boundary-value problem starting from a relaxed leaf; if that is not at rest it is
+/// returned.
+fn relax_from_rest(
+    scenario: &Scenario,
+    options: &Options,
+    how: (Option<usize>, f64),
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let relaxation = Options {
+        method: Method::default(),
+        tolerance: Some(START),
+        modes: 0,
+        stations: None,
+        ..options.clone()
+    };
+    let (rest, _) = relax_on_grids(scenario, &relaxation, true, progress)?;
     if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
-        return Equilibrium {
+        return Ok(Equilibrium {
             method: options.method,
             ..rest
-        };
+        });
     }
     let start = Start::Leaf {
         stations: &rest.shape.stations,
         rods: &rest.shape.rods,
     };
-    let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
+    let mut found = shoot(scenario, options, how, start, progress);
     found.stability.saddle = rest.stability.saddle;
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
-    found
+    Ok(found)
 }
 
 /// The work of shooting in terms of a relaxation: Newton corrections count as steps,
@@ -117,11 +154,10 @@ impl From<shooting::Work> for Work {
 }
 
 /// Solves the boundary-value problem from a start.
-pub fn shoot(
+fn shoot(
     scenario: &Scenario,
     options: &Options,
-    intervals: Option<usize>,
-    tolerance: f64,
+    (intervals, tolerance): (Option<usize>, f64),
     start: Start,
     progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {

@@ -240,6 +240,19 @@ impl NestedEquilibrium {
         }
     }
 
+    /// With a bar that is larger by this factor.
+    pub fn softened(self, softening: f64) -> Self {
+        NestedEquilibrium { softening, ..self }
+    }
+
+    /// At the end of refinement, within the tolerance or not.
+    pub fn ended(self, keeps_tolerance: bool) -> Self {
+        NestedEquilibrium {
+            keeps_tolerance,
+            ..self
+        }
+    }
+
     /// On this path.
     pub fn along(self, path: Option<Path>) -> Self {
         NestedEquilibrium { path, ..self }

@@ -69,64 +69,71 @@ enum Next {
 /// equilibrium is not near those of the grids before.
 pub fn decide(
     problem: &Problem,
-    found: NestedEquilibrium,
+    mut found: NestedEquilibrium,
     effort: &mut Effort,
     again: &Again,
 ) -> Decision {
-    let mut decision = Decision::none(found);
-    let mut may_refine = true;
+    let (mut needed, mut may_refine) = (false, true);
     loop {
-        let found = &mut decision.found;
-        let next = next(problem, found, may_refine, &mut effort.work);
+        let next = next(problem, &found, may_refine, &mut effort.work);
         let list = match &next {
-            Next::Nothing => break,
+            Next::Nothing => {
+                return Decision {
+                    needed,
+                    ..Decision::none(found)
+                };
+            }
             Next::Finer(_) => None,
-            Next::Compute(list) => Some(*list),
+            // More than one attempt: the leaf may be large.
+            Next::Compute(list) => Some(List {
+                decides: list.decides || needed,
+                ..*list
+            }),
             Next::Impossible => {
-                (decision.verdict, decision.needed) = (Verdict::Unknown, true);
-                break;
+                return Decision {
+                    verdict: Verdict::Unknown,
+                    needed: true,
+                    ..Decision::none(found)
+                };
             }
         };
-        // More than one attempt: the leaf may be large.
-        let list = list.map(|list| List {
-            decides: list.decides || decision.needed,
-            ..list
-        });
-        let lowest = list.and_then(|list| eigenvalues::lowest(problem, found, list));
-        decision.needed |= list.is_none_or(|list| list.decides);
-        found.softening = lowest.as_ref().map_or(1.0, |lowest| lowest.softening);
+        let lowest = list.and_then(|list| eigenvalues::lowest(problem, &found, list));
+        needed |= list.is_none_or(|list| list.decides);
+        found = found.softened(lowest.as_ref().map_or(1.0, |lowest| lowest.softening));
         let inaccurate = found.keeps_tolerance && !found.is_accurate();
         let finer = match (next, &lowest) {
             (Next::Finer(grid), _) => Some(grid),
             (_, Some(_)) if inaccurate && may_refine => found.finer(),
             (_, Some(lowest)) => {
-                (lowest.undecided).and_then(|size| deciding_grid(problem, found, size))
+                (lowest.undecided).and_then(|size| deciding_grid(problem, &found, size))
             }
-            _ => (decision.needed)
-                .then(|| small_grid(problem, found))
-                .flatten(),
+            _ => needed.then(|| small_grid(problem, &found)).flatten(),
         };
-        if let Some(further) = finer.and_then(|finer| go_on(problem, found, finer, effort, again)) {
-            decision.found = further;
-            decision.needed = true;
+        if let Some(further) = finer.and_then(|finer| go_on(problem, &found, finer, effort, again))
+        {
+            (found, needed) = (further, true);
             continue;
         }
-        found.keeps_tolerance &= !inaccurate;
+        let keeps_tolerance = found.keeps_tolerance && !inaccurate;
+        found = found.ended(keeps_tolerance);
         let Some(list) = list else {
             // The grids so far have to do.
             may_refine = false;
             continue;
         };
-        decision.verdict = match &lowest {
-            None if decision.needed => Verdict::Unknown,
+        let verdict = match &lowest {
+            None if needed => Verdict::Unknown,
             None => Verdict::AsCounted,
-            Some(lowest) => verdict(problem, found, list, lowest),
+            Some(lowest) => verdict(problem, &found, list, lowest),
         };
         let requested = list.above.is_none() && list.count == problem.options.modes;
-        decision.modes = lowest.filter(|_| requested);
-        break;
+        return Decision {
+            found,
+            verdict,
+            modes: lowest.filter(|_| requested),
+            needed,
+        };
     }
-    decision
 }
 
 /// Comes to rest on a finer grid. The grids before found rest; without this one the sign remains

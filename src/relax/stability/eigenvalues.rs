@@ -3,20 +3,17 @@
 
 mod shapes;
 
-use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, System, shift, turn};
+use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, shift, turn};
 use crate::modes;
 use crate::modes::{Eigenpair, Wanted};
 use crate::motion::Physics;
-use crate::newton::{Newton, Work};
+use crate::relax::grids::on_next_grid;
 use crate::relax::nested::NestedEquilibrium;
 use crate::relax::request::options::Options;
 use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::Mode;
-use crate::relax::saddle::ANY_SIGN;
 use crate::relax::stability::eigenvalue_bars::{Extrapolated, GRIDS, Series};
 use crate::relax::transfer::level::Level;
-use crate::relax::transfer::predict::predict;
-use crate::relax::transfer::prolong::prolong;
 use crate::relax::transfer::stencil::Stencil;
 use glam::DVec3;
 use shapes::{Shape, normalized};
@@ -53,11 +50,6 @@ const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
 const LOW_TOLERANCE: f64 = 1e-3;
 const FEW: usize = 3;
 const COMPARED: usize = 3;
-
-/// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
-/// farther away is another equilibrium.
-const ITERATIONS: usize = 12;
-const SAME_PLACE: f64 = 0.02;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
@@ -310,31 +302,12 @@ fn refine(
         if !is_affordable(problem.leaf, &finest.leaf.grid.refined()) {
             break;
         }
-        let next = settle(nested.coarser.as_deref(), finest, problem.tolerance)?;
+        let next = on_next_grid(nested.coarser.as_deref(), finest, problem.tolerance)?;
         if !nested.add(Cow::Owned(next), &on) {
             break;
         }
     }
     Some(())
-}
-
-/// The same equilibrium on the grid next to the `finest`, predicted from a `coarser` one, too.
-fn settle(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> Option<Level> {
-    let mut state = prolong(&finest.leaf, &finest.state);
-    if let Some(coarser) = coarser {
-        predict(&[coarser, finest], &mut state);
-    }
-    let leaf = DiscreteLeaf::new(&finest.leaf.leaf, finest.leaf.grid.refined());
-    let mut system = System::new(&leaf);
-    let guess = state.clone();
-    let newton = Newton {
-        accuracy: 1e-3 * tolerance,
-        iterations: ITERATIONS,
-        work: &mut Work::default(),
-        progress: &mut |_, _| {},
-    };
-    (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
-    (guess.shift_to(&state) < SAME_PLACE).then_some(Level { leaf, state })
 }
 
 impl OnGrid<'_> {

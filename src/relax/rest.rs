@@ -1,0 +1,217 @@
+//! From a scenario to rest on nested grids: the problem, the start, rest on one grid, finer ones,
+//! the decision on stability, and the result.
+
+use crate::leaf::{Grid, Leaf};
+use crate::relax::grids::{follow, solve};
+use crate::relax::loading::arrival::{arrive, guess, load_slowly};
+use crate::relax::nested::{Found, History, NestedEquilibrium, along};
+use crate::relax::request::method::Method;
+use crate::relax::request::options::{Options, Progress, RelaxError, check_tolerance};
+use crate::relax::request::problem::Problem;
+use crate::relax::result::equilibrium::{Equilibrium, Outcome};
+use crate::relax::result::plausible;
+use crate::relax::result::report;
+use crate::relax::settle::effort::Effort;
+use crate::relax::settle::methods::{explicit, softens};
+use crate::relax::settle::segments::{check_segments, least, reducible};
+use crate::relax::stability::decide::{Decision, Verdict, decide};
+use crate::relax::stability::eigenvalues;
+use crate::relax::stability::eigenvalues::List;
+use crate::scenario::Scenario;
+use std::time::Instant;
+
+/// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
+/// steps of Newton's method without softened rods, rests where slow loading leads: so did all of
+/// 5000 random leaves. Those of up to 3 lengths that ended elsewhere had taken 20 steps and more;
+/// of stiff leaves, which are softened on their way from arcs, 3 in 1000 end elsewhere.
+const FIRST_VALLEY: (f64, usize) = (2.0, 8);
+
+/// Relaxes on nested grids, fine enough for forces and eigenvalues too or for the `shape_alone`;
+/// also returns the leaf on these grids.
+pub(crate) fn relax_on_grids(
+    scenario: &Scenario,
+    options: &Options,
+    shape_alone: bool,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
+    let clock = Instant::now();
+    let leaf = Leaf::new(scenario);
+    if let Method::Explicit { .. } = options.method {
+        explicit::check(&leaf)?;
+    }
+    let method = options.method;
+    // Four segments are too few to be divided among panels.
+    let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
+    let first = check_segments(&leaf, method.segments(), least)?;
+    let half = reducible(method).then(|| leaf.half()).flatten();
+    let problem = Problem {
+        planar: reducible(method) && leaf.is_planar(),
+        shape_alone,
+        ..Problem::new(&leaf, options, tolerance)
+    };
+    let mut effort = Effort::new(progress);
+    let grid = Grid::new(first, leaf.kinks());
+    let found = rest(&problem, half.as_ref(), grid, &mut effort);
+    Ok(decided(&problem, found, clock, &mut effort))
+}
+
+/// Brings the leaf to rest, its `half` where that is enough.
+fn rest<'a>(
+    problem: &Problem<'a>,
+    half: Option<&'a Leaf>,
+    grid: Grid,
+    effort: &mut Effort,
+) -> Found {
+    let slowly = problem.loads_slowly();
+    // Where Newton's method alone leads from arcs to rest nearby, through convex states only,
+    // the path need not be walked.
+    let in_valley = slowly
+        && matches!(problem.options.method, Method::SemiImplicit(_))
+        && !softens(problem.leaf);
+    if in_valley || !slowly && half.is_some() {
+        let reduced = Problem {
+            stays_in_valley: in_valley,
+            ..problem.reduced(half)
+        };
+        let found = solve(&reduced, grid.clone(), effort);
+        if half.is_some() {
+            effort.spare_system = None;
+        }
+        if let Ok(found) = found
+            && found.is_stable()
+            && (!slowly || is_in_first_valley(&found.history))
+        {
+            let path = problem.path();
+            return Ok(found.completed(&reduced).along(path));
+        }
+        // The reduced model fails, as the leaf leaves its valley or breaks the mirror symmetry:
+        // solve the full leaf.
+        effort.spare_system = None;
+    }
+    if slowly {
+        return load_slowly(problem, half, effort);
+    }
+    match solve(problem, grid, effort) {
+        Err(_) if problem.may_be_loaded_instead() => {
+            effort.spare_system = None;
+            load_slowly(problem, None, effort)
+        }
+        found => along(found, problem.path()),
+    }
+}
+
+/// Whether Newton's method alone came to rest from the start, so near that this is where
+/// slow loading leads.
+fn is_in_first_valley(history: &History) -> bool {
+    let near =
+        |(distance, steps): (f64, usize)| distance < FIRST_VALLEY.0 && steps <= FIRST_VALLEY.1;
+    history.from_start.is_some_and(near) && history.saddle.is_none()
+}
+
+/// Rest from the start, on this grid and finer ones.
+fn rest_again(problem: &Problem, grid: Grid, effort: &mut Effort) -> Option<NestedEquilibrium> {
+    if !problem.loads_slowly() {
+        let found = solve(problem, grid.clone(), effort);
+        if found.is_ok() || !problem.may_be_loaded_instead() {
+            return found.ok();
+        }
+    }
+    let arrived = arrive(problem, grid, effort).ok()?;
+    let mut begun = NestedEquilibrium::begun(problem).along(Some(arrived.path));
+    let guess = guess(problem, &mut begun.history, arrived.level, effort);
+    follow(problem, begun, vec![guess], effort).ok()
+}
+
+/// The result, with the stability of a leaf at rest decided and its modes: requested modes are
+/// not counted in the time of the solution, unless stability depends on them.
+fn decided(
+    problem: &Problem,
+    found: Found,
+    clock: Instant,
+    effort: &mut Effort,
+) -> (Equilibrium, NestedEquilibrium) {
+    let requested = problem.options.modes;
+    let before = clock.elapsed().as_secs_f64();
+    let (decision, stopped) = match found {
+        Ok(found) => {
+            let again = |grid, effort: &mut Effort| rest_again(problem, grid, effort);
+            (decide(problem, found, effort, &again), None)
+        }
+        Err(failure) => (Decision::none(failure.at), Some(failure.stop)),
+    };
+    let wall = match decision.needed || requested == 0 {
+        true => clock.elapsed().as_secs_f64(),
+        false => before,
+    };
+    let found = decision.found.after(effort.work);
+    let outcome = report::outcome(problem, &found, stopped, effort.reached);
+    let mut leaf = report::equilibrium(problem, &found, outcome, wall);
+    leaf.doubts = plausible::doubts(problem.leaf.scenario(), &leaf);
+    let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
+    let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();
+    leaf.doubts.extend(doubt);
+    leaf.doubts
+        .extend(unconfirmed.then(|| UNCONFIRMED.to_owned()));
+    leaf.decide(decision.verdict);
+    let modes = decision.modes.or_else(|| {
+        let list = List::requested(problem);
+        (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
+    });
+    leaf.stability.modes = modes.map(|it| it.modes);
+    (leaf, found)
+}
+
+impl Equilibrium {
+    /// Takes the Morse index by extrapolated eigenvalues, if it is known, where those of single
+    /// grids may have other signs.
+    fn decide(&mut self, verdict: Verdict) {
+        let index = match verdict {
+            Verdict::AsCounted => return,
+            Verdict::Undecided(certain)
+                if certain > self.stability.negative_eigenvalues.unwrap_or(0) =>
+            {
+                self.doubts.push(AT_LEAST.to_owned());
+                certain
+            }
+            Verdict::Undecided(_) => {
+                self.doubts.push(UNDECIDED.to_owned());
+                return;
+            }
+            Verdict::Unknown => {
+                self.doubts.push(UNDECIDED.to_owned());
+                self.stability.negative_eigenvalues = None;
+                return;
+            }
+            Verdict::Index(index) => index,
+        };
+        let unknown = (self.stability.negative_eigenvalues.replace(index)).is_none();
+        if !self.outcome.is_success() {
+            return;
+        }
+        if index > 0 {
+            self.outcome = Outcome::Saddle;
+            self.remark = Some(BESIDE_BIFURCATION.to_owned());
+        } else if unknown {
+            // It said so.
+            self.remark = None;
+        }
+    }
+}
+
+/// Remark on a leaf that two grids never bring to the same equilibrium.
+const UNCONFIRMED: &str = "from its start the leaf moves to different equilibria on different grids: \
+     this is one in which it can rest; relax with --all looks for the others";
+
+/// Remark on a leaf with an eigenvalue that may have either sign.
+const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+     whether the leaf is stable is not certain";
+
+/// Remark on a leaf with an eigenvalue that may have either sign beside others that are negative.
+const AT_LEAST: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+     the index is the number of those that are certainly negative, or larger";
+
+/// Remark on a leaf at rest on all grids that is at a saddle.
+const BESIDE_BIFURCATION: &str = "just beyond a bifurcation: unstable, by eigenvalues extrapolated over grids on which it is \
+     still stable; a load that is a little larger, or a small disturbance, shows where it goes";
