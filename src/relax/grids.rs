@@ -270,3 +270,44 @@ fn largest_turn(level: &Level) -> f64 {
     let ends = rods.flat_map(|rod| rod.windows(2));
     largest(ends.map(|ends| ends[0].angle_between(ends[1])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::Leaf;
+    use crate::relax::request::options::{Options, Progress};
+    use crate::scenario::Scenario;
+
+    const LEAF: &str = r#"
+        name = "leaf"
+        leaf = { rods = 3, length = 1.0, fan = "symmetric", joined = true }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 2.0, axial = 100.0, shear_2 = 50.0, shear_3 = 50.0 }
+        load = { gravity = [0.0, 0.0, -1.0] }
+    "#;
+
+    /// Extrapolated positions on one more grid are within the bar of those before, their own bar is
+    /// smaller, and what is asked for it leaves the equilibrium before as it was.
+    #[test]
+    fn a_finer_equilibrium_is_within_the_bar_of_the_one_before() {
+        let scenario = Scenario::from_toml(LEAF).unwrap();
+        let (leaf, options) = (Leaf::new(&scenario), Options::default());
+        let problem = Problem::new(&leaf, &options, 1e-5);
+        let mut ignored = |_: &Progress| {};
+        let mut effort = Effort::new(&mut ignored);
+        let solved = solve(&problem, Grid::new(8, &[]), &mut effort);
+        let found = solved.ok().expect("the leaf comes to rest");
+        let bar = found.error().unwrap();
+        let (finer, own) = (found.finer().unwrap(), found.segments_of_estimate());
+        let continued = continue_on(&problem, found.grids(), finer, &mut effort);
+        let further = continued.ok().expect("so it does on the next grid");
+        assert!(found.keeps_tolerance && found.is_stable() && bar <= 1e-5);
+        assert_eq!(further.levels.len(), found.levels.len() + 1);
+        let moved = distance(found.table.extrapolated(), further.table.extrapolated());
+        assert!(0.0 < moved && moved <= bar, "{moved} beyond {bar}");
+        assert!(further.error().unwrap() < bar);
+        assert_eq!(
+            (found.error(), found.segments_of_estimate()),
+            (Some(bar), own)
+        );
+    }
+}

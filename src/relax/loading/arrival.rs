@@ -139,7 +139,11 @@ pub struct Arrived {
 /// Walks on this grid, and on finer ones where it does not resolve the leaf or where
 /// stability was lost; the leaf on the coarser of two grids that agree. If no grid leads to
 /// rest, the last state is kept.
-pub fn arrive(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> Result<Arrived, Failure> {
+pub fn arrive(
+    problem: &Problem,
+    mut grid: Grid,
+    effort: &mut Effort,
+) -> Result<Arrived, Box<Failure>> {
     let mut before: Option<Level> = None;
     loop {
         let (level, events, end) = walk(problem, grid.clone(), effort);
@@ -172,8 +176,7 @@ pub fn arrive(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> Result<
             Err(stop) => {
                 let resolved = stop != Stop::Unresolved || finer.segments() > FINEST_RESOLVING;
                 if (resolved && last) || spent {
-                    let at = NestedEquilibrium::begun(problem).with(level);
-                    return Err(Failure { at, stop });
+                    return NestedEquilibrium::begun(problem).with(level).failed(stop);
                 }
                 before = None;
             }
