@@ -9,7 +9,7 @@
 use super::dimensionless::Leaf;
 use super::flow::RodFields;
 use super::state::State;
-use crate::scenario::{Profile, Rod, Scenario};
+use crate::scenario::{Hold, Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -27,13 +27,32 @@ impl Leaf {
 pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
+        base_held,
         coupling,
-        gravity,
+        tissue,
         tip_force,
+        distributed,
+        points,
+        grips,
+        wind,
+        dynamics,
         ..
     } = scenario;
+    // Their images are not looked for yet.
+    let other = tissue.is_some()
+        || distributed.is_some()
+        || !(points.is_empty() && grips.is_empty())
+        || wind.is_some()
+        || *base_held != Hold::Clamped;
+    let weights = |(a, b): (usize, usize)| {
+        let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);
+        own == [image[0], -image[1], image[2]]
+    };
+    let masses = |(a, b): (usize, usize)| dynamics.density[a] == dynamics.density[b];
     let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
-    gravity[1] == 0.0
+    !other
+        && pairs(rods.len()).all(weights)
+        && (scenario.g == [0.0; 3] || scenario.g[1] == 0.0 && pairs(rods.len()).all(masses))
         && tip_force[1] == 0.0
         && pairs(rods.len()).all(|(a, b)| are_images(&rods[a], &rods[b]))
         && pairs(coupling.len()).all(|(a, b)| coupling[a] == coupling[b])
@@ -42,9 +61,12 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
 /// Whether two rods are each other's image: twist and sideways bend at rest
 /// change sign in the mirror.
 fn are_images(a: &Rod, b: &Rod) -> bool {
+    let mirrored = |[x, y, z]: [f64; 3]| [x, -y, z];
     let opposite = |a: &Profile, b: &Profile| *a == b.scaled(-1.0);
     a.length == b.length
+        && a.base == mirrored(b.base)
         && a.angle == -b.angle
+        && a.elevation == b.elevation
         && a.couple_stiffness == b.couple_stiffness
         && a.force_stiffness == b.force_stiffness
         && a.rest_stretch == b.rest_stretch
