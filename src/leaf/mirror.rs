@@ -180,6 +180,7 @@ fn reflect(v: DVec3, image: bool) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Entries;
 
     const LEAF: &str = r#"
         name = "leaf"
@@ -193,7 +194,8 @@ mod tests {
     /// Whether this leaf has a half, and lies in a plane.
     fn symmetries(entries: &[&str]) -> (bool, bool) {
         let entries: Vec<_> = entries.iter().map(|&entry| entry.into()).collect();
-        let scenario = Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap();
+        let entries = Entries::of_text(LEAF, "leaf").unwrap().replaced(&entries);
+        let scenario = entries.unwrap().checked().unwrap();
         let leaf = Leaf::new(&scenario);
         (leaf.half().is_some(), leaf.is_planar())
     }
@@ -204,10 +206,23 @@ mod tests {
             "name='same'",
             "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.2]",
             "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]",
+            "leaf.base=[[0, -2, 0], [0, -1, 1], [1, 0, 0], [0, 1, 1], [0, 2, 0]]",
+            "leaf.elevation=[0.1, 0.2, 0.3, 0.2, 0.1]",
+            "load.gravity=[[0, 1, -1], [0, 0, -1], [1, 0, -2], [0, 0, -1], [0, -1, -1]]",
         ] {
             assert_eq!(symmetries(&[entry]), (true, false), "{entry}");
         }
-        let others = "leaf.fan='paper'; leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]; rest.twist=0.1; \
+        let heavy = ["load.g=[1, 0, -1]", "dynamics.density=[1, 2, 3, 2, 1]"];
+        assert_eq!(symmetries(&heavy), (true, false));
+        assert_eq!(
+            symmetries(&[heavy[0], "dynamics.density=[1, 2, 3, 2, 2]"]),
+            (false, false)
+        );
+        assert_eq!(symmetries(&["load.g=[0, 1, -1]", heavy[1]]), (false, false));
+        let others = "leaf.base=[0.0, 1e-9, 0.0]; leaf.elevation=[0.1, 0.2, 0.3, 0.2, 0.2]; \
+            load.gravity=[[0, 0, 1], [0, 0, 2], [0, 0, 3], [0, 0, 2], [0, 0, 2]]; \
+            leaf.base_held=pinned; tissue.across=1; load.distributed=[0, 0, 1]; \
+            leaf.fan='paper'; leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]; rest.twist=0.1; \
             stiffness.axial=[1, 2, 3, 2, 2]; rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.0]; \
             rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]; rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]; \
             coupling.z=[1.0, 2.0, 2.0, 3.0]; load.gravity=[0.0, 1e-9, -1.0]; \

@@ -49,7 +49,7 @@ impl Entries {
     }
 
     /// The checked scenario, whether methods take all of it into account or not.
-    pub(super) fn checked(&self) -> Result<Scenario> {
+    pub(crate) fn checked(&self) -> Result<Scenario> {
         let name = name(self.item(Key::Name)?)?;
         let units = Units {
             length: self.given(Key::UnitLength).map(unit).transpose()?,

@@ -11,6 +11,7 @@ mod entries;
 mod error;
 mod excerpt;
 mod form;
+mod gauss;
 mod grip;
 mod hold;
 mod item;
@@ -231,3 +232,6 @@ pub fn longest(rods: &[Rod]) -> f64 {
     rods.iter()
         .fold(0.0, |longest, rod| longest.max(rod.length))
 }
+
+#[cfg(test)]
+mod tests;

@@ -143,7 +143,7 @@ impl Part {
     /// Of a vector for each rod, how many of its indices are in vain where one value holds for all.
     pub(super) fn shared(&self, value: &Value) -> usize {
         let is_vector = matches!(self.key.form(), Form::VectorPerRod | Form::VectorQuantity);
-        if !is_vector || self.list == Some("at") {
+        if !is_vector || value.is_table() || self.list == Some("at") {
             return 0;
         }
         let wanted = self.indices.iter().flatten().count();
