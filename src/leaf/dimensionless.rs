@@ -166,7 +166,7 @@ impl Leaf {
     pub fn is_planar(&self) -> bool {
         let s = self.scenario();
         let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
-        (s.gravity[2], s.tip_force[2], s.tip_moment) == (0.0, 0.0, [0.0; 3])
+        s.is_loaded_in_plane()
             && self.held.is_none()
             && curvatures.into_iter().all(|of| of.max_abs() == 0.0)
     }

@@ -238,10 +238,28 @@ mod tests {
             "load.tip_force=[1.0, -2.0, 0.0]",
             "rest.bend_3=[1.0, 2.0, -3.0, 0.0, 1.0]",
             "rest.stretch=[1.0, 1.1, 1.0, 1.0, 1.2]",
+            "load.distributed=[[0, 0, 0], [1, 2, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]",
+            "leaf.base=[[0, 3, 0], [1, 2, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]",
         ] {
             let load = "load.gravity=[1.0, -2.0, 0.0]";
             let flat = symmetries(&["rest.twist=0", "rest.bend_2=0", load, entry]);
             assert_eq!(flat, (false, true), "{entry}");
+        }
+        for entry in [
+            "leaf.elevation=0.1",
+            "leaf.base=[0, 0, 1]",
+            "load.gravity[1][2]=1",
+            "load.distributed=[0, 0, 1]",
+            "dynamics.density=1",
+        ] {
+            let g = if entry.starts_with("dynamics") {
+                "load.g=[0, 1, 1]"
+            } else {
+                "load.g=[0, 0, 0]"
+            };
+            let load = "load.gravity=[1.0, -2.0, 0.0]";
+            let found = symmetries(&["rest.twist=0", "rest.bend_2=0", load, entry, g]);
+            assert_eq!(found, (false, false), "{entry}");
         }
     }
 }

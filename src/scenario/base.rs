@@ -4,6 +4,9 @@ use glam::{DQuat, DVec3};
 
 use super::{Profile, Rod, Scenario, ascending};
 
+/// Places that differ by less are the same: no segment may be so short.
+const ROUNDING: f64 = 1e-12;
+
 impl Rod {
     /// The rotation of the directors at the base: by the fan's angle about e3, after the elevation
     /// about -e2, so that d1 = (cos e cos phi, cos e sin phi, sin e).
@@ -24,7 +27,8 @@ impl Rod {
 impl Scenario {
     /// Fractions inside (0, 1) where a grid must have a node: kinks of stiffnesses, rest shapes,
     /// loads and the wind's width, points that are loaded, and the ends of what is gripped;
-    /// ascending, each once.
+    /// ascending, each once, and none within rounding of another or of an end: what is there is at
+    /// the nearest node.
     pub fn kinks(&self) -> Vec<f64> {
         let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
         let profiles = self.rods.iter().flat_map(Rod::profiles);
@@ -34,8 +38,11 @@ impl Scenario {
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
-        let inside = points.chain(ends).filter(|&at| at < 1.0);
-        ascending(profiles.flat_map(Profile::kinks).copied().chain(inside))
+        let inside = points.chain(ends);
+        let all = profiles.flat_map(Profile::kinks).copied().chain(inside);
+        let mut kinks = ascending(all.filter(|&at| at > ROUNDING && at < 1.0 - ROUNDING));
+        kinks.dedup_by(|next, kept| *next - *kept <= ROUNDING);
+        kinks
     }
 }
 

@@ -52,6 +52,23 @@ impl Scenario {
         }
     }
 
+    /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
+    pub fn is_loaded_in_plane(&self) -> bool {
+        let flat = |load: [f64; 3]| load[2] == 0.0;
+        let even = |vein: usize| flat(self.weight(vein).even);
+        let point = |load: &PointLoad| flat(load.force) && load.moment == [0.0; 3];
+        self.rods
+            .iter()
+            .all(|rod| flat(rod.base) && rod.elevation == 0.0)
+            && (0..self.rods.len()).all(even)
+            && flat(self.g)
+            && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
+            && self.points.iter().all(point)
+            && self.grips.iter().all(|grip| flat(grip.displacement))
+            && flat(self.tip_force)
+            && self.tip_moment == [0.0; 3]
+    }
+
     /// The force on a point: what is given, and the weight of its mass.
     pub fn force_on(&self, point: &PointLoad) -> [f64; 3] {
         [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])

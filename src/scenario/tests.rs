@@ -110,6 +110,8 @@ fn all_that_is_given_arrives() {
     assert_eq!(stretch.displacement, [0.0, -0.2, 0.0]);
     // Of the bore, the load, the point that is not the tip, the grips, and the wind's width.
     assert_eq!(leaf.kinks(), [0.15, 0.3, 0.35, 0.5, 0.6, 0.7, 0.9]);
+    let beside = "load.point[0].at=0.35000000000000003; grip[1].at=0.9999999999999999";
+    assert_eq!(with(beside).unwrap().kinks(), [0.15, 0.3, 0.35, 0.6, 0.7]);
     let wind = leaf.wind.as_ref().unwrap();
     assert_eq!(wind.velocity.at(7.0), [0.01, 0.0, 0.0]);
 }
