@@ -2,7 +2,7 @@
 //! refused and written.
 
 use super::entries::Entries;
-use super::{Hold, Key, Part, Profile, Scenario, Tissue, schema};
+use super::{Hold, Key, Part, Scenario, Tissue, schema};
 use leafdyn_testing::pairs;
 use serde_json::{Value, json};
 
@@ -374,50 +374,7 @@ fn limits_do_not_depend_on_units() {
     }
 }
 
-#[test]
-fn hollow_sections() {
-    let text = |section: &str| {
-        format!(
-            "name = 'tube'\nleaf = {{ rods = 2, length = 1, fan = 'symmetric' }}\nsection = {{ {section}, young = 1 }}"
-        )
-    };
-    let table = r#"
-        shape = 'circle', diameter = [0.1, 0.2], wall = 0.06 => section.wall = 0.06: must be at most half of the section's smaller side
-        shape = 'rectangle', width = 0.4, thickness = { at = [0, 0.5, 1], value = [0.1, 0.05, 0.1] }, wall = 0.03 => at most half of
-        shape = 'ellipse', width = 0.4, thickness = 0.1, inner_diameter = 0.05 => belongs to a circle: give section.wall
-        shape = 'circle', diameter = 0.1, inner_diameter = [0.05, 0.1] => section.inner_diameter, entry 2 = 0.1: must be less
-        shape = 'circle', diameter = 0.1, wall = 0 => must be greater than 0
-    "#;
-    for (section, said) in pairs(table) {
-        let refused = Scenario::from_toml(&text(section)).unwrap_err().to_string();
-        assert!(refused.contains(said), "{section}: {refused}");
-    }
-    // A bore and its wall are the same tube, and a bore of nothing none.
-    let of = |section: &str| Scenario::from_toml(&text(section)).unwrap();
-    let bore = of("shape = 'circle', diameter = 0.5, inner_diameter = 0.25, mass_density = 1");
-    let wall = of("shape = 'circle', diameter = 0.5, wall = 0.125, mass_density = 1");
-    assert_eq!(bore, wall);
-    for leaf in [&bore, &wall] {
-        let again = Scenario::from_toml(&serde_json::to_string(leaf).unwrap());
-        assert_eq!(again.unwrap(), *leaf);
-    }
-    let full = of("shape = 'circle', diameter = 0.5, mass_density = 1");
-    let none = of("shape = 'circle', diameter = 0.5, inner_diameter = 0, mass_density = 1");
-    let stiffness = |leaf: &Scenario| {
-        let rod = &leaf.rods[0];
-        let all = rod.couple_stiffness.iter().chain(&rod.force_stiffness);
-        all.map(|it| it.at(0.0)).collect::<Vec<f64>>()
-    };
-    for (one, other) in stiffness(&full).into_iter().zip(stiffness(&none)) {
-        assert!((one / other - 1.0).abs() < 1e-13, "{one} {other}");
-    }
-    assert_eq!(
-        full.dynamics.density[0],
-        Profile::Constant(std::f64::consts::PI / 16.0)
-    );
-}
-
-/// What stands in the file of the test, and in a scenario as it is written, is what the schema has.
+/// Also those that may be there several times.
 #[test]
 fn the_schema_has_tables_within_tables() {
     let schema = schema();
