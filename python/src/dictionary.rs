@@ -48,7 +48,9 @@ impl Document {
                     table.push((inner, value));
                 }
                 tables.push((key, table));
-            } else if Key::from_path(&key).is_none() && !schema()["properties"][&key].is_null() {
+            } else if Key::from_path(&key).is_none()
+                && schema()["properties"][&key]["type"] == "object"
+            {
                 return Err(path.refuse(&entry, "must be a dict"));
             } else {
                 let value = value(&entry, path, 0)?;

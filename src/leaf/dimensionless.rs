@@ -2,7 +2,6 @@
 
 use super::state::State;
 use crate::rod::Section;
-use crate::rotation;
 use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, Turning, ascending};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -94,15 +93,15 @@ impl Leaf {
     /// A scenario in given units, so that leaves that differ in length or stiffness are
     /// comparable.
     pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
-        let profiles = scenario.rods.iter().flat_map(Rod::profiles);
-        // The profiles of the masses only matter for motions.
+        // The profiles of the masses matter for motions.
         let Dynamics {
             density,
             rotary_inertia,
             ..
         } = &scenario.dynamics;
-        let profiles = profiles.chain(density).chain(rotary_inertia);
-        let kinks = ascending(profiles.flat_map(Profile::kinks).copied());
+        let masses = density.iter().chain(rotary_inertia);
+        let masses = masses.flat_map(Profile::kinks).copied();
+        let kinks = ascending(scenario.kinks().into_iter().chain(masses));
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
@@ -167,7 +166,7 @@ impl Leaf {
     pub fn is_planar(&self) -> bool {
         let s = self.scenario();
         let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
-        (s.gravity[2], s.tip_force[2], s.tip_moment) == (0.0, 0.0, [0.0; 3])
+        s.is_loaded_in_plane()
             && self.held.is_none()
             && curvatures.into_iter().all(|of| of.max_abs() == 0.0)
     }
@@ -208,7 +207,7 @@ impl Leaf {
 
     /// Base rotation of rod `j` (paper, section 2.4 (c)).
     pub fn base(&self, j: usize) -> DQuat {
-        rotation::exp(self.rod(j).angle * DVec3::Z)
+        self.rod(j).base_rotation()
     }
 
     /// Whether sections are the same all along each rod.

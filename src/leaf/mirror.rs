@@ -9,7 +9,7 @@
 use super::dimensionless::Leaf;
 use super::flow::RodFields;
 use super::state::State;
-use crate::scenario::{Profile, Rod, Scenario};
+use crate::scenario::{Hold, Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -27,13 +27,32 @@ impl Leaf {
 pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
+        base_held,
         coupling,
-        gravity,
+        tissue,
         tip_force,
+        distributed,
+        points,
+        grips,
+        wind,
+        dynamics,
         ..
     } = scenario;
+    // Their images are not looked for yet.
+    let other = tissue.is_some()
+        || distributed.is_some()
+        || !(points.is_empty() && grips.is_empty())
+        || wind.is_some()
+        || *base_held != Hold::Clamped;
+    let weights = |(a, b): (usize, usize)| {
+        let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);
+        own == [image[0], -image[1], image[2]]
+    };
+    let masses = |(a, b): (usize, usize)| dynamics.density[a] == dynamics.density[b];
     let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
-    gravity[1] == 0.0
+    !other
+        && pairs(rods.len()).all(weights)
+        && (scenario.g == [0.0; 3] || scenario.g[1] == 0.0 && pairs(rods.len()).all(masses))
         && tip_force[1] == 0.0
         && pairs(rods.len()).all(|(a, b)| are_images(&rods[a], &rods[b]))
         && pairs(coupling.len()).all(|(a, b)| coupling[a] == coupling[b])
@@ -42,9 +61,12 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
 /// Whether two rods are each other's image: twist and sideways bend at rest
 /// change sign in the mirror.
 fn are_images(a: &Rod, b: &Rod) -> bool {
+    let mirrored = |[x, y, z]: [f64; 3]| [x, -y, z];
     let opposite = |a: &Profile, b: &Profile| *a == b.scaled(-1.0);
     a.length == b.length
+        && a.base == mirrored(b.base)
         && a.angle == -b.angle
+        && a.elevation == b.elevation
         && a.couple_stiffness == b.couple_stiffness
         && a.force_stiffness == b.force_stiffness
         && a.rest_stretch == b.rest_stretch
@@ -158,6 +180,7 @@ fn reflect(v: DVec3, image: bool) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Entries;
 
     const LEAF: &str = r#"
         name = "leaf"
@@ -171,7 +194,8 @@ mod tests {
     /// Whether this leaf has a half, and lies in a plane.
     fn symmetries(entries: &[&str]) -> (bool, bool) {
         let entries: Vec<_> = entries.iter().map(|&entry| entry.into()).collect();
-        let scenario = Scenario::from_toml_with(LEAF, "leaf", &entries).unwrap();
+        let entries = Entries::of_text(LEAF, "leaf").unwrap().replaced(&entries);
+        let scenario = entries.unwrap().checked().unwrap();
         let leaf = Leaf::new(&scenario);
         (leaf.half().is_some(), leaf.is_planar())
     }
@@ -182,10 +206,23 @@ mod tests {
             "name='same'",
             "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.2]",
             "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]",
+            "leaf.base=[[0, -2, 0], [0, -1, 1], [1, 0, 0], [0, 1, 1], [0, 2, 0]]",
+            "leaf.elevation=[0.1, 0.2, 0.3, 0.2, 0.1]",
+            "load.gravity=[[0, 1, -1], [0, 0, -1], [1, 0, -2], [0, 0, -1], [0, -1, -1]]",
         ] {
             assert_eq!(symmetries(&[entry]), (true, false), "{entry}");
         }
-        let others = "leaf.fan='paper'; leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]; rest.twist=0.1; \
+        let heavy = ["load.g=[1, 0, -1]", "dynamics.density=[1, 2, 3, 2, 1]"];
+        assert_eq!(symmetries(&heavy), (true, false));
+        assert_eq!(
+            symmetries(&[heavy[0], "dynamics.density=[1, 2, 3, 2, 2]"]),
+            (false, false)
+        );
+        assert_eq!(symmetries(&["load.g=[0, 1, -1]", heavy[1]]), (false, false));
+        let others = "leaf.base=[0.0, 1e-9, 0.0]; leaf.elevation=[0.1, 0.2, 0.3, 0.2, 0.2]; \
+            load.gravity=[[0, 0, 1], [0, 0, 2], [0, 0, 3], [0, 0, 2], [0, 0, 2]]; \
+            leaf.base_held=pinned; tissue.across=1; load.distributed=[0, 0, 1]; \
+            leaf.fan='paper'; leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]; rest.twist=0.1; \
             stiffness.axial=[1, 2, 3, 2, 2]; rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.0]; \
             rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]; rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]; \
             coupling.z=[1.0, 2.0, 2.0, 3.0]; load.gravity=[0.0, 1e-9, -1.0]; \
@@ -201,10 +238,28 @@ mod tests {
             "load.tip_force=[1.0, -2.0, 0.0]",
             "rest.bend_3=[1.0, 2.0, -3.0, 0.0, 1.0]",
             "rest.stretch=[1.0, 1.1, 1.0, 1.0, 1.2]",
+            "load.distributed=[[0, 0, 0], [1, 2, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]",
+            "leaf.base=[[0, 3, 0], [1, 2, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]",
         ] {
             let load = "load.gravity=[1.0, -2.0, 0.0]";
             let flat = symmetries(&["rest.twist=0", "rest.bend_2=0", load, entry]);
             assert_eq!(flat, (false, true), "{entry}");
+        }
+        for entry in [
+            "leaf.elevation=0.1",
+            "leaf.base=[0, 0, 1]",
+            "load.gravity[1][2]=1",
+            "load.distributed=[0, 0, 1]",
+            "dynamics.density=1",
+        ] {
+            let g = if entry.starts_with("dynamics") {
+                "load.g=[0, 1, 1]"
+            } else {
+                "load.g=[0, 0, 0]"
+            };
+            let load = "load.gravity=[1.0, -2.0, 0.0]";
+            let found = symmetries(&["rest.twist=0", "rest.bend_2=0", load, entry, g]);
+            assert_eq!(found, (false, false), "{entry}");
         }
     }
 }

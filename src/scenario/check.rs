@@ -9,9 +9,13 @@ use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
 use super::item::Item;
 use super::key::Key;
-use super::material;
+use super::loads::on_one_rod;
+use super::not_yet::not_yet;
 use super::section::{Property, Section};
-use super::{Dynamics, Profile, Radii, Rod, Scenario, Start, Units, limits, tip};
+use super::tissue::tissue;
+use super::wind::wind;
+use super::{Dynamics, Profile, Radii, Rod, Scenario, Start, Units};
+use super::{grip, limits, loads, material, tip};
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
@@ -28,6 +32,24 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> Result<Scenario> {
+        let scenario = self.checked()?;
+        match not_yet(&scenario) {
+            None => Ok(scenario),
+            Some(key) => {
+                let (table, _) = key.parts();
+                let name = match table {
+                    "leaf" | "load" => key.path(),
+                    _ => table,
+                };
+                Err(self.refuse(key, format!(
+                    "{name} is read and checked, but no method takes it into account yet: leave it out"
+                )))
+            }
+        }
+    }
+
+    /// The checked scenario, whether methods take all of it into account or not.
+    pub(crate) fn checked(&self) -> Result<Scenario> {
         let name = name(self.item(Key::Name)?)?;
         let units = Units {
             length: self.given(Key::UnitLength).map(unit).transpose()?,
@@ -38,12 +60,20 @@ impl Entries {
         let rods = veins(self, rods, sections.as_deref())?;
         let joined = self.item(Key::Joined)?.switch()?;
         let coupling = coupling(self, rods.len() - 1)?;
-        let gravity = self.item(Key::Gravity)?.vector()?;
+        let base_held = grip::of_bases(self)?;
+        let tissue = tissue(self, rods.len() - 1)?;
+        let (gravity, own_gravity) = loads::gravity(self, rods.len())?;
+        let g = loads::g(self)?;
+        let distributed = loads::distributed(self, rods.len())?;
+        let points = loads::points(self, rods.len())?;
         let tip_force = self.item(Key::TipForce)?.vector()?;
         let item = self.item(Key::TipMoment)?;
         let tip_moment = item.vector()?;
         on_one_rod(item, rods.len(), &[tip_moment])?;
         let held_tip = tip::held(self, &rods, joined)?;
+        let shared = held_tip.is_some() || joined && rods.len() > 1;
+        let grips = grip::grips(self, &rods, shared)?;
+        let wind = wind(self, rods.len())?;
         let tolerance = tolerance(self.item(Key::Tolerance)?)?;
         let loads = [gravity, tip_force, tip_moment];
         let dynamics = dynamics(self, &rods, sections.as_deref(), loads)?;
@@ -52,12 +82,20 @@ impl Entries {
             units,
             rods,
             radii: sections.map(Radii::of).unwrap_or_default(),
+            base_held,
             joined,
             coupling,
+            tissue,
             gravity,
+            own_gravity,
+            g,
+            distributed,
+            points,
             tip_force,
             tip_moment,
             held_tip,
+            grips,
+            wind,
             tolerance,
             dynamics,
         };
@@ -93,6 +131,8 @@ fn unit(item: Item) -> Result<String> {
 fn veins(entries: &Entries, rods: usize, sections: Option<&[Arc<Section>]>) -> Result<Vec<Rod>> {
     let length = entries.item(Key::Length)?.one_each(rods)?;
     let angle = angles(entries.item(Key::Fan)?, rods)?;
+    let base = entries.item(Key::Base)?.vectors(rods)?;
+    let elevation = entries.item(Key::Elevation)?.one_each(rods)?;
     let quantity = |key| entries.item(key)?.quantity(rods);
     let triple = |[first, second, third]: [Key; 3]| -> Result<[Vec<Profile>; 3]> {
         Ok([quantity(first)?, quantity(second)?, quantity(third)?])
@@ -112,7 +152,9 @@ fn veins(entries: &Entries, rods: usize, sections: Option<&[Arc<Section>]>) -> R
     Ok((0..rods)
         .map(|rod| Rod {
             length: length[rod],
+            base: base[rod],
             angle: angle[rod],
+            elevation: elevation[rod],
             couple_stiffness: pick(&couple, rod),
             force_stiffness: pick(&force, rod),
             rest_curvature: pick(&rest, rod),
@@ -149,16 +191,6 @@ fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {
         }
     }
     Ok(coupling)
-}
-
-/// Refuses moments at the tip of more than one rod.
-fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> Result<()> {
-    item.ensure(
-        rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]),
-        format_args!(
-            "a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment"
-        ),
-    )
 }
 
 fn tolerance(item: Item) -> Result<f64> {

@@ -72,7 +72,9 @@ impl Dynamics {
     ///
     /// let rod = Rod {
     ///     length: 2.0,
+    ///     base: [0.0; 3],
     ///     angle: 0.0,
+    ///     elevation: 0.0,
     ///     couple_stiffness: [8.0; 3].map(Profile::Constant),
     ///     force_stiffness: [f64::INFINITY; 3].map(Profile::Constant),
     ///     rest_curvature: [0.0; 3].map(Profile::Constant),
@@ -170,7 +172,9 @@ mod tests {
         for (length, bending) in [(1.0, 1.0), (0.03, 7.1), (1e50, 1e-50), (1e-50, 1e50)] {
             let rods = [1.0, 0.5, 0.1].map(|part| Rod {
                 length: part * length,
+                base: [0.0; 3],
                 angle: 0.0,
+                elevation: 0.0,
                 couple_stiffness: [0.1, bending, bending].map(Profile::Constant),
                 force_stiffness: [f64::INFINITY; 3].map(Profile::Constant),
                 rest_curvature: [0.0; 3].map(Profile::Constant),

@@ -4,14 +4,16 @@
 
 use std::sync::{Arc, LazyLock};
 
-use toml::de::DeValue;
-use toml::{Spanned, Table, Value};
+use toml::{Table, Value};
 
 use super::error::{Place, Result, ScenarioError};
 use super::excerpt::shorten;
-use super::key::{Form, Key, LeftOut, nearest};
+use super::form::{Form, LeftOut};
+use super::key::{Key, split};
 use super::part::Part;
 use super::source::{Source, not_toml, span_of, value_of};
+use super::spelling::nearest;
+use super::values::{multiply, number, parse};
 
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.
@@ -30,7 +32,10 @@ pub const MOST_RODS: usize = 100_000;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Entries {
-    entries: [Option<Arc<Entry>>; Key::COUNT],
+    /// The entries of each key: one, or one for each of its tables if there may be several.
+    entries: [Vec<Option<Arc<Entry>>>; Key::COUNT],
+    /// How many there are of each table of [`Key::REPEATED`].
+    rows: [usize; Key::REPEATED.len()],
     pub(super) source: Arc<Source>,
 }
 
@@ -61,36 +66,53 @@ impl Entries {
 
     fn of(source: Source, table: Table) -> Result<Self> {
         let mut entries = Entries {
-            entries: [const { None }; Key::COUNT],
+            entries: [const { Vec::new() }; Key::COUNT],
+            rows: [0; Key::REPEATED.len()],
             source: source.into(),
         };
-        entries.add("", table)?;
+        entries.add("", 0, table)?;
         Ok(entries)
     }
 
-    /// Adds the entries of a table, whose name is empty at the top.
-    fn add(&mut self, name: &str, table: Table) -> Result<()> {
+    /// Adds the entries of a table, whose name is empty at the top, or of one of several.
+    fn add(&mut self, name: &'static str, row: usize, table: Table) -> Result<()> {
         for (key, value) in table {
             if let Some(known) = Key::from_parts(name, &key) {
-                self.put(known, value, None);
+                self.put(Part::of_row(known, row), value, None);
                 continue;
             }
-            let inner = Key::table(&key).filter(|_| name.is_empty());
-            match (inner, value) {
-                (Some(inner), Value::Table(table)) => self.add(inner, table)?,
-                (Some(inner), value) => return Err(self.source.refuse_value(inner, &value)),
-                (None, _) => {
-                    let path = [name, &key].join(".");
-                    let path = path.trim_start_matches('.');
+            let path = [name, &key].join(".");
+            let path = path.trim_start_matches('.');
+            match Key::table(path) {
+                Some(inner) => self.add_inner(inner, value)?,
+                None => {
                     let meant = nearest(path).map(|key| format!(" (did you mean {key}?)"));
                     let (path, meant) = (shorten(path), meant.unwrap_or_default());
                     let allowed = Key::allowed_in(name).join(", ");
                     let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
-                    return Err(self.source.refuse_key((name, &key), problem));
+                    return Err(self.source.refuse_key((name, &key), row, problem));
                 }
             }
         }
         Ok(())
+    }
+
+    /// Adds a table, or all those of a name.
+    fn add_inner(&mut self, name: &'static str, value: Value) -> Result<()> {
+        let repeated = Key::REPEATED.iter().position(|table| *table == name);
+        match (repeated, value) {
+            (None, Value::Table(table)) => self.add(name, 0, table),
+            (Some(which), Value::Array(list)) if list.iter().all(Value::is_table) => {
+                self.rows[which] = list.len();
+                for (row, value) in list.into_iter().enumerate() {
+                    if let Value::Table(table) = value {
+                        self.add(name, row, table)?;
+                    }
+                }
+                Ok(())
+            }
+            (_, value) => Err(self.source.refuse_value(name, &value)),
+        }
     }
 
     /// These entries with some of them, or parts of them, replaced, as in
@@ -113,6 +135,7 @@ impl Entries {
                 return Err(refuse(problem.into()));
             };
             let part = Part::parse(path).map_err(refuse)?;
+            entries.check_row(part).map_err(refuse)?;
             let text = text.trim();
             let value = parse(text).map(|value| value_of(&value));
             let value = match part.is_whole() {
@@ -132,7 +155,7 @@ impl Entries {
                     })?
                 }
             };
-            entries.put(part.key, value, Some(given.clone()));
+            entries.put(part, value, Some(given.clone()));
         }
         Ok(entries)
     }
@@ -146,27 +169,41 @@ impl Entries {
     pub(crate) fn to_toml(&self) -> String {
         let mut document = Table::new();
         for key in Key::all() {
-            let Some(entry) = &self.entries[key as usize] else {
-                continue;
-            };
-            let value = entry.value.clone();
-            match key.parts() {
-                ("", name) => document.insert(name.into(), value),
-                (table, name) => {
-                    let table = document.entry(table).or_insert_with(|| Table::new().into());
-                    let table = table.as_table_mut();
-                    table.and_then(|table| table.insert(name.into(), value))
+            let (table, name) = key.parts();
+            for (row, entry) in self.entries[key as usize].iter().enumerate() {
+                let Some(entry) = entry else { continue };
+                let rows = self.rows(table);
+                let inner = inner_table(&mut document, table, rows.map(|rows| (row, rows)));
+                if let Some(inner) = inner {
+                    inner.insert(name.into(), entry.value.clone());
                 }
-            };
+            }
         }
         document.to_string()
     }
 
+    /// How many there are of a table, if there may be several.
+    pub(super) fn rows(&self, table: &str) -> Option<usize> {
+        let which = Key::REPEATED.iter().position(|known| *known == table)?;
+        Some(self.rows[which])
+    }
+
+    /// Refuses a part of a table that is not there.
+    fn check_row(&self, part: Part) -> std::result::Result<(), String> {
+        let (table, _) = part.key.parts();
+        match self.rows(table) {
+            Some(rows) if part.row >= rows => Err(format!(
+                "{part}: there are {rows} of [[{table}]], counted from 0: write it first"
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Where a part of an entry is written, and how.
     pub(super) fn place(&self, part: Part, value: &Value) -> (Place, String) {
-        let entry = self.entries[part.key as usize].as_ref();
+        let entry = self.entry(part.key, part.row);
         let Some(given) = entry.and_then(|entry| entry.given.as_ref()) else {
-            let spans = self.source.find(part.key.parts(), Some(part));
+            let spans = self.source.find(part.key.parts(), part.row, Some(part));
             let found = self.source.shown(spans.as_ref(), value);
             return (
                 self.source.place(spans.map(|spans| spans.value.start)),
@@ -186,25 +223,34 @@ impl Entries {
     }
 
     pub(super) fn is_given(&self, key: Key) -> bool {
-        self.entries[key as usize].is_some()
+        self.entry(key, 0).is_some()
     }
 
-    /// The value of a key, or its default.
-    pub(super) fn get(&self, key: Key) -> Option<&Value> {
-        let entry = self.entries[key as usize].as_deref();
+    fn entry(&self, key: Key, row: usize) -> Option<&Entry> {
+        self.entries[key as usize].get(row)?.as_deref()
+    }
+
+    /// The value of a key, or its default; in one of its tables if there may be several.
+    pub(super) fn get(&self, key: Key, row: usize) -> Option<&Value> {
+        let entry = self.entry(key, row);
         entry.map(|entry| &entry.value).or_else(|| left_out(key))
     }
 
-    fn put(&mut self, key: Key, value: Value, given: Option<String>) {
-        self.entries[key as usize] = Some(Arc::new(Entry { value, given }));
+    fn put(&mut self, part: Part, value: Value, given: Option<String>) {
+        let rows = &mut self.entries[part.key as usize];
+        if rows.len() <= part.row {
+            rows.resize(part.row + 1, None);
+        }
+        rows[part.row] = Some(Arc::new(Entry { value, given }));
     }
 
     pub(crate) fn value_at(&self, part: Part) -> Option<&Value> {
-        let mut place = self.get(part.key)?;
+        self.check_row(part).ok()?;
+        let mut place = self.get(part.key, part.row)?;
         if let Some(list) = part.list {
             place = place.get(list)?;
         }
-        for index in part.indices.into_iter().flatten() {
+        for index in part.indices.into_iter().flatten().skip(part.shared(place)) {
             // A single number holds for all rods.
             if number(place).is_none() {
                 place = place.get(index)?;
@@ -229,7 +275,7 @@ impl Entries {
 
     /// The whole value of a key after a part of it is replaced.
     fn changed(&self, part: Part, new: Value) -> std::result::Result<Value, String> {
-        let whole = self.get(part.key);
+        let whole = self.get(part.key, part.row);
         let mut whole = whole
             .cloned()
             .ok_or("is not in the scenario: write it first")?;
@@ -244,8 +290,11 @@ impl Entries {
             let entries = place.as_array_mut().ok_or("is no list in the scenario")?;
             let count = entries.len();
             let entry = entries.get_mut(index);
-            place = entry
-                .ok_or_else(|| format!("there are {count} entries, and indices count from 0"))?;
+            place = entry.ok_or_else(|| {
+                let component = part.is_number().err().filter(|_| number(&new).is_some());
+                let there = || format!("there are {count} entries, and indices count from 0");
+                component.unwrap_or_else(there)
+            })?;
         }
         match part.scale {
             true => {
@@ -257,10 +306,10 @@ impl Entries {
         Ok(whole)
     }
 
-    /// Turns a single number for all rods, or gaps, into a list.
+    /// Turns a single number or vector for all rods, or gaps, into a list.
     fn spread(&self, part: Part, place: &mut Value) -> std::result::Result<(), String> {
-        if number(place).is_some() {
-            let rods = self.get(Key::Rods).and_then(Value::as_integer);
+        if number(place).is_some() || part.shared(place) > 0 {
+            let rods = self.get(Key::Rods, 0).and_then(Value::as_integer);
             let rods = rods.and_then(|rods| usize::try_from(rods).ok());
             let rods = rods.filter(|rods| *rods <= MOST_RODS);
             let rods = rods.ok_or("leaf.rods must say of how many")?;
@@ -286,45 +335,25 @@ fn left_out(key: Key) -> Option<&'static Value> {
     VALUES[key as usize].as_ref()
 }
 
-/// Parses a value. What is no TOML is a text.
-fn parse(text: &str) -> std::result::Result<Spanned<DeValue<'_>>, toml::de::Error> {
-    match DeValue::parse(text) {
-        Err(_) if !text.is_empty() && !text.starts_with(['[', '{', '"', '\'']) => {
-            Ok(Spanned::new(0..text.len(), DeValue::String(text.into())))
+/// A table of a document, or one of several (which, and how many there are); made where it is not
+/// there yet.
+fn inner_table<'d>(
+    document: &'d mut Table,
+    path: &str,
+    row: Option<(usize, usize)>,
+) -> Option<&'d mut Table> {
+    let (outer, name) = split(path);
+    if name.is_empty() {
+        return Some(document);
+    }
+    let outer = inner_table(document, outer, None)?;
+    let inner = outer.entry(name);
+    match row {
+        None => inner.or_insert_with(|| Table::new().into()).as_table_mut(),
+        Some((row, rows)) => {
+            let rows = || Value::Array(vec![Table::new().into(); rows]);
+            inner.or_insert_with(rows).get_mut(row)?.as_table_mut()
         }
-        parsed => parsed,
-    }
-}
-
-/// The number that a value is.
-pub(super) fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Float(float) => Some(*float),
-        Value::Integer(integer) => Some(*integer as f64),
-        _ => None,
-    }
-}
-
-/// Multiplies every number; knots and times stay where they are.
-fn multiply(value: &mut Value, factor: f64) -> std::result::Result<(), String> {
-    if let Some(number) = number(value) {
-        *value = Value::Float(number * factor);
-        return Ok(());
-    }
-    match value {
-        Value::Array(list) => list
-            .iter_mut()
-            .try_for_each(|entry| multiply(entry, factor)),
-        Value::Table(table) => {
-            let lists = table.iter_mut().filter(|(name, _)| *name != "at");
-            lists
-                .map(|(_, list)| list)
-                .try_for_each(|list| multiply(list, factor))
-        }
-        other => Err(format!(
-            "{} is no number to be scaled: write numbers first",
-            shorten(&other.to_string())
-        )),
     }
 }
 

@@ -6,11 +6,13 @@ use std::str::FromStr;
 
 use toml::Value;
 
-use super::entries::{Entries, number};
+use super::entries::Entries;
 use super::error::{Result, ScenarioError};
 use super::excerpt::shorten;
-use super::key::{Form, Key, LeftOut, Range};
+use super::form::{Form, LeftOut, Range};
+use super::key::Key;
 use super::part::Part;
+use super::values::number;
 use super::{Profile, Schedule};
 
 /// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
@@ -20,12 +22,10 @@ pub(super) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
      shear_2 and shear_3 only, not in a profile";
 const LIST_OF_NUMBERS: &str = "a list of numbers";
-const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
-const ONE_PER_KNOT: &str = "one per entry of at";
+pub(super) const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+pub(super) const ONE_PER_KNOT: &str = "one per entry of at";
 const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
 const PROFILE_IS: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
-const LOAD_IN_TIME: &str =
-    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
 
 /// The value of a key, or a part of it.
@@ -48,18 +48,31 @@ impl Entries {
 
     /// The value of a key as given, or its default.
     pub(super) fn item(&self, key: Key) -> Result<Item<'_>> {
-        match self.get(key) {
+        self.item_of(key, 0)
+    }
+
+    /// The same in one of its tables, if there may be several.
+    pub(super) fn item_of(&self, key: Key, row: usize) -> Result<Item<'_>> {
+        match self.get(key, row) {
             Some(value) => Ok(Item {
                 entries: self,
-                part: Part::whole(key),
+                part: Part::of_row(key, row),
                 value,
             }),
-            None => Err(self.missing(key)),
+            None => Err(self.missing(key, row)),
+        }
+    }
+
+    /// An error about a key that has no place.
+    pub(super) fn refuse(&self, key: Key, problem: String) -> ScenarioError {
+        ScenarioError {
+            key: Some(key),
+            ..ScenarioError::in_file(&self.source.file, None, problem)
         }
     }
 
     /// The error about a key that is required and left out.
-    fn missing(&self, key: Key) -> ScenarioError {
+    fn missing(&self, key: Key, row: usize) -> ScenarioError {
         let has = |table: &str| self.source.tables.contains(&table);
         let (table, name) = key.parts();
         let example = match key.left_out() {
@@ -69,6 +82,7 @@ impl Entries {
         let entry = format!("a line such as `{name} = {example}`");
         let how = match table {
             "" => format!("add {entry} at the top of the file"),
+            _ if key.is_repeated() => format!("add {entry} below its [[{table}]]"),
             _ if has(table) => format!("add {entry} below [{table}]"),
             _ => format!("add the table [{table}], and below it {entry}"),
         };
@@ -85,11 +99,8 @@ impl Entries {
             true => String::new(),
             false => format!("; also missing: {}", others.join(", ")),
         };
-        let problem = format!("{} is missing: {how}{also}", key.path());
-        ScenarioError {
-            key: Some(key),
-            ..ScenarioError::in_file(&self.source.file, None, problem)
-        }
+        let problem = format!("{} is missing: {how}{also}", Part::of_row(key, row));
+        self.refuse(key, problem)
     }
 }
 
@@ -115,14 +126,10 @@ impl<'e> Item<'e> {
         let Some(value) = self.value.get(index) else {
             return *self;
         };
-        let indices = match self.part.indices {
-            [None, _] => [Some(index), None],
-            [first, _] => [first, Some(index)],
-        };
-        let part = Part {
-            indices,
-            ..self.part
-        };
+        let mut part = self.part;
+        if let Some(free) = part.indices.iter_mut().find(|known| known.is_none()) {
+            *free = Some(index);
+        }
         Item {
             part,
             value,
@@ -162,15 +169,19 @@ impl<'e> Item<'e> {
 
     pub(super) fn refuse(&self, problem: impl Display) -> ScenarioError {
         let list = self.part.list.map(|list| format!(", {list}"));
+        let components = matches!(
+            self.key().form(),
+            Form::VectorInTime | Form::VectorOrInTime | Form::VectorPerRod | Form::VectorQuantity
+        );
         let entry = match self.part.indices.map(|index| index.map(|index| index + 1)) {
-            [Some(i), Some(j)] if self.key().form() == Form::VectorInTime => {
-                format!(", entry {i}, component {j}")
-            }
-            [Some(i), Some(j)] => format!(", list {i}, entry {j}"),
-            [Some(i), None] => format!(", entry {i}"),
-            [None, _] => String::new(),
+            [Some(i), Some(j), Some(k)] => format!(", list {i}, entry {j}, component {k}"),
+            [Some(i), Some(j), None] if components => format!(", entry {i}, component {j}"),
+            [Some(i), Some(j), None] => format!(", list {i}, entry {j}"),
+            [Some(i), None, _] => format!(", entry {i}"),
+            [None, ..] => String::new(),
         };
-        let (path, part) = (self.key().path(), list.unwrap_or_default() + &entry);
+        let path = Part::of_row(self.key(), self.part.row);
+        let part = list.unwrap_or_default() + &entry;
         let (place, found) = self.entries.place(self.part, self.value);
         ScenarioError {
             place,
@@ -210,7 +221,7 @@ impl<'e> Item<'e> {
         self.number_in(self.key().form().range())
     }
 
-    fn number_in(&self, range: Range) -> Result<f64> {
+    pub(super) fn number_in(&self, range: Range) -> Result<f64> {
         let value = number(self.value);
         let value = value.ok_or_else(|| self.refuse("must be a number"))?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
@@ -230,17 +241,6 @@ impl<'e> Item<'e> {
             _ => return Ok(value),
         };
         Err(self.refuse(problem))
-    }
-
-    /// Three numbers.
-    pub(super) fn vector(&self) -> Result<[f64; 3]> {
-        let needed = "a list of three numbers [x, y, z]";
-        let mut vector = [0.0; 3];
-        let components = self.list_of(3, "one per axis x, y, z", needed)?;
-        for (component, item) in vector.iter_mut().zip(components) {
-            *component = item.number_in(Range::Finite)?;
-        }
-        Ok(vector)
     }
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
@@ -293,16 +293,6 @@ impl<'e> Item<'e> {
         Ok(Profile::Linear { at, value })
     }
 
-    /// A load in time.
-    pub(super) fn vectors_in_time(&self) -> Result<Schedule<[f64; 3]>> {
-        let [at, value] = self.pair("value", LOAD_IN_TIME)?;
-        let at = at.increasing(false)?;
-        let needed = "a list of lists of three numbers [x, y, z]";
-        let value = value.list_of(at.len(), ONE_PER_KNOT, needed)?;
-        let value = value.map(|item| item.vector()).collect::<Result<_>>()?;
-        Ok(Schedule { at, value })
-    }
-
     /// A factor in time.
     pub(super) fn factors_in_time(&self) -> Result<Schedule<f64>> {
         let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
@@ -313,7 +303,7 @@ impl<'e> Item<'e> {
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    fn increasing(&self, fractions: bool) -> Result<Vec<f64>> {
+    pub(super) fn increasing(&self, fractions: bool) -> Result<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -347,7 +337,10 @@ impl<'e> Item<'e> {
     }
 
     /// The entries of a list; `needed` describes it in the error if it is not one.
-    fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+    pub(super) fn array(
+        &self,
+        needed: &str,
+    ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
         let Some(list) = self.value.as_array() else {
             return Err(self.refuse(format_args!("must be {needed}")));
         };
@@ -357,7 +350,7 @@ impl<'e> Item<'e> {
 
     /// The entries of a list that must have `count` of them, `because` of what; `needed`
     /// describes the list in the error if it is not one.
-    fn list_of(
+    pub(super) fn list_of(
         &self,
         count: usize,
         because: &str,

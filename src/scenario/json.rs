@@ -6,8 +6,10 @@ use std::sync::Arc;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 
-use super::section::{Outline, Property, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, ascending};
+use super::key::split;
+use super::outline::Outline;
+use super::section::{Hollow, Property, Section};
+use super::{Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, ascending};
 
 /// The sections of a scenario, and what else is theirs.
 struct Sections<'a> {
@@ -22,7 +24,15 @@ struct Sections<'a> {
 impl Serialize for Scenario {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let sections = self.sections();
-        let entry = |key: Key| Some((key.parts(), self.written(key, sections.as_ref())?));
+        let entry = |key: Key| match key {
+            // All tables of a name stand where the first of its keys does.
+            Key::PointVein | Key::GripVein => {
+                let (table, _) = key.parts();
+                Some((split(table), self.rows(key)?))
+            }
+            _ if key.is_repeated() => None,
+            _ => Some((key.parts(), self.written(key, sections.as_ref())?)),
+        };
         let entries: Vec<_> = Key::all().filter_map(entry).collect();
         let mut top = serializer.serialize_map(None)?;
         for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
@@ -45,12 +55,36 @@ impl Serialize for Table<'_> {
 }
 
 impl Scenario {
+    /// All points that are loaded, or all grips, by the first of their keys.
+    fn rows(&self, first: Key) -> Option<Value> {
+        let point = |point: &PointLoad| {
+            json!({
+                "vein": point.vein + 1, "at": point.at, "mass": point.mass,
+                "force": list(point.force), "moment": list(point.moment),
+            })
+        };
+        let grip = |grip: &Grip| {
+            let [from, to] = grip.at;
+            json!({
+                "vein": grip.vein + 1, "held": grip.held, "move": list(grip.displacement),
+                "at": if from == to { json!(from) } else { list(grip.at) },
+            })
+        };
+        let rows: Vec<Value> = match first {
+            Key::PointVein => self.points.iter().map(point).collect(),
+            _ => self.grips.iter().map(grip).collect(),
+        };
+        (!rows.is_empty()).then(|| rows.into())
+    }
+
     /// The value of a key; `None` if other keys determine it.
     fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
         match key.parts().0 {
             "section" => return sections?.written(key),
             "stiffness" if sections.is_some() => return None,
             "tip" => return self.of_tip(key),
+            "tissue" => return self.of_tissue(key),
+            "wind" => return self.of_wind(key),
             "dynamics" => return self.of_dynamics(key, sections),
             _ => {}
         }
@@ -71,6 +105,9 @@ impl Scenario {
             Key::UnitForce => json!(self.units.force.as_deref()?),
             Key::Rods => json!(self.rods.len()),
             Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
+            Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
+            Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
+            Key::BaseHeld => json!(self.base_held),
             Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => json!(self.joined),
             Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
@@ -79,11 +116,33 @@ impl Scenario {
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
                 number_or_list(self.coupling.iter().map(|gap| gap[axis]))
             }
-            Key::Gravity => list(self.gravity),
+            Key::Gravity => {
+                let veins = 0..self.rods.len();
+                vector_or_list(veins.map(|vein| self.weight(vein).even))
+            }
+            Key::G => list(self.g),
+            Key::Distributed => vector_quantity(self.distributed.as_deref()?),
             Key::TipForce => list(self.tip_force),
             Key::TipMoment => list(self.tip_moment),
             Key::Tolerance => number(self.tolerance),
             _ => return None,
+        })
+    }
+
+    fn of_tissue(&self, key: Key) -> Option<Value> {
+        let which = Key::TISSUE.iter().position(|one| *one == key)?;
+        let of = |gap: &Tissue| *gap.stiffness.get(which).unwrap_or(&gap.fold);
+        Some(number_or_list(self.tissue.as_ref()?.iter().map(of)))
+    }
+
+    fn of_wind(&self, key: Key) -> Option<Value> {
+        let wind = self.wind.as_ref()?;
+        Some(match key {
+            Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
+            Key::WindVelocity => schedule(&wind.velocity, "value", list),
+            Key::WindDensity => number(wind.density),
+            Key::WindDrag => number(wind.drag),
+            _ => quantity(wind.width.iter()),
         })
     }
 
@@ -160,6 +219,16 @@ impl Sections<'_> {
             Key::Width | Key::Thickness if outline == Outline::Circle => return None,
             Key::Width => of(|section| &section.width),
             Key::Thickness => of(|section| &section.thickness),
+            Key::InnerDiameter | Key::Wall => {
+                let hollow = |section: &'_ Arc<Section>| section.hollow.clone();
+                let hollow: Vec<Hollow> =
+                    self.sections.iter().map(hollow).collect::<Option<_>>()?;
+                let is_bore = matches!(hollow.first()?, Hollow::Bore(_));
+                if is_bore != (key == Key::InnerDiameter) {
+                    return None;
+                }
+                quantity(hollow.iter().map(Hollow::profile))
+            }
             Key::Young => of(|section| &section.young),
             Key::Poisson => of(|section| &section.poisson),
             Key::MassDensity if self.density => of(|section| &section.mass_density),
@@ -190,6 +259,35 @@ fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
     }
 }
 
+/// A single vector if all are the same.
+fn vector_or_list(vectors: impl Iterator<Item = [f64; 3]>) -> Value {
+    let vectors: Vec<[f64; 3]> = vectors.collect();
+    match vectors.first() {
+        Some(first) if vectors.iter().all(|vector| vector == first) => list(*first),
+        _ => vectors.into_iter().map(list).collect(),
+    }
+}
+
+/// Vectors along all rods, in the shortest form.
+fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
+    let mut profiles = rods.iter().flatten();
+    if profiles.all(|it| matches!(it, Profile::Constant(_))) {
+        let constant = |rod: &[Profile; 3]| rod.each_ref().map(|profile| profile.at(0.0));
+        return vector_or_list(rods.iter().map(constant));
+    }
+    let kinks = rods.iter().flatten().flat_map(Profile::kinks);
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let values = |rod: &[Profile; 3]| -> Value {
+        let knot = |&sigma: &f64| list(rod.each_ref().map(|profile| profile.at(sigma)));
+        at.iter().map(knot).collect()
+    };
+    let value = match rods.iter().all(|rod| *rod == rods[0]) {
+        true => values(&rods[0]),
+        false => rods.iter().map(values).collect(),
+    };
+    json!({ "at": at, "value": value })
+}
+
 /// A quantity of all rods, in the shortest form.
 fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
     let profiles: Vec<&Profile> = profiles.collect();
@@ -213,115 +311,14 @@ fn in_time<T: Copy + PartialEq>(
     name: &str,
     written: impl Fn(T) -> Value,
 ) -> Option<Value> {
-    let values = || schedule.value.iter().map(|&value| written(value));
-    let table = || json!({ "at": schedule.at, name: values().collect::<Value>() });
-    (*schedule != Schedule::constant(at_rest)).then(table)
+    let constant = *schedule == Schedule::constant(at_rest);
+    (!constant).then(|| self::schedule(schedule, name, written))
+}
+
+fn schedule<T: Copy>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
+    let values: Value = of.value.iter().map(|&value| written(value)).collect();
+    json!({ "at": of.at, name: values })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use leafdyn_testing::pairs;
-
-    /// Uses every feature of the format.
-    const FULL: &str = r#"
-        name = "full"
-        units = { length = "cm", force = "N" }
-        leaf = { rods = 3, length = [1.0, 0.7, 0.1], fan = "paper", joined = false }
-        stiffness = { torsion = [1.0, 0.3333333333333333, 3.0], bending_2 = { at = [0.0, 0.3, 1.0], value = [1.0, 0.1, 0.2] }, bending_3 = { at = [0, 1], value = [[1, 2], [1, 3], [1, 4]] }, axial = inf, shear_2 = [inf, 100, inf], shear_3 = 1e2 }
-        rest = { twist = -0.1, stretch = 1.1 }
-        coupling = { y = [0.1, 0.2], z = 1 }
-        load = { gravity = [0, 1e-3, -1.0], tip_force = [0.1, 0, 0] }
-        solve = { tolerance = 1e-7 }
-        [dynamics]
-        density = { at = [0.0, 0.5, 1.0], value = [1.0, 0.7, 0.3] }
-        section_radius = { at = [0.0, 0.25, 1.0], value = [0.2, 0.1, 0.05] }
-        internal_damping = 0.01
-        duration = 3.3
-        start = "at-rest"
-        gravity = { at = [0.0, 1.0], value = [[0, 0, 0], [0, 0, -1]] }
-        rest = { at = [0.0, 0.1], factor = [1.0, 2.0] }
-    "#;
-
-    #[test]
-    fn a_scenario_read_from_its_json_is_the_same() {
-        let paper = include_str!("../../scenarios/paper/fig04.toml");
-        let swing = include_str!("../../scenarios/motion/swing.toml");
-        let buckled = include_str!("../../scenarios/classic/elastica_buckled.toml");
-        let held = include_str!("../../scenarios/classic/twisted_strip.toml");
-        let (head, tail) = FULL.split_at(FULL.find("stiffness").unwrap());
-        let tail = &tail[tail.find("rest").unwrap()..];
-        let taper =
-            "{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }";
-        let section = format!(
-            "section = {{ shape = 'circle', diameter = {taper}, young = [1e3, 2e3, 3e3], mass_density = 2 }}"
-        );
-        let mass = tail.find("density").unwrap()..tail.find("internal").unwrap();
-        let tail = [&tail[..mass.start], &tail[mass.end..]].concat();
-        let tapering = format!("{head}{section}\n{tail}");
-        let even = tapering.replace(taper, "0.3");
-        for text in [FULL, paper, swing, buckled, held, &tapering, &even] {
-            let scenario = Scenario::from_toml(text).unwrap();
-            let json = serde_json::to_string(&scenario).unwrap();
-            let again = Scenario::from_toml(&json);
-            assert_eq!(again.unwrap(), scenario, "{json}");
-            let section = json.contains("section");
-            assert_eq!(section, text.contains("section ="), "{json}");
-            assert!(!(section && json.contains("torsion")), "{json}");
-            let summary = format!("{{\"outcome\": \"converged\", \"input\": {json}}}");
-            assert_eq!(Scenario::from_toml(&summary).unwrap(), scenario);
-        }
-    }
-
-    /// What a section gives is not written beside it, but what is given in its place is.
-    #[test]
-    fn a_section_is_written_as_it_was_given() {
-        let head = "name = 'strip'\nleaf = { rods = 1, length = 0.3, fan = [0.0] }\n";
-        let inertia_given = "[dynamics]\nrotary_inertia = 1e-8";
-        let table = "
-            shape = 'rectangle', width = 0.04, thickness = 4e-4, mass_density = 800 => rotary_inertia
-            shape = 'ellipse', width = 0.04, thickness = 0.04, mass_density = 800 =>
-            shape = 'circle', diameter = { at = [0, 1], value = [0.02, 0.01] }, mass_density = 800 => rotary_inertia
-            shape = 'circle', diameter = 0.02, poisson = 0.4 => density
-        ";
-        for (sides, beside) in pairs(table) {
-            let [density, inertia] = ["density", "rotary_inertia"].map(|key| key == beside);
-            let dynamics = if inertia { inertia_given } else { "" };
-            let text = format!("{head}section = {{ {sides}, young = 2e9 }}\n{dynamics}");
-            let scenario = Scenario::from_toml(&text).unwrap();
-            let written = serde_json::to_value(&scenario).unwrap();
-            let again = Scenario::from_toml(&written.to_string()).unwrap();
-            assert_eq!(again, scenario);
-            assert_eq!(serde_json::to_value(&again).unwrap(), written);
-            assert!(sides.contains(written["section"]["shape"].as_str().unwrap()));
-            for key in ["diameter", "width", "thickness"] {
-                assert_eq!(written["section"].get(key).is_some(), sides.contains(key));
-            }
-            assert!(written.get("stiffness").is_none());
-            assert_eq!(written["dynamics"].get("density").is_some(), density);
-            assert_eq!(written["dynamics"].get("rotary_inertia").is_some(), inertia);
-        }
-    }
-
-    #[test]
-    fn what_all_rods_share_is_one_number() {
-        let json = serde_json::to_value(Scenario::from_toml(FULL).unwrap()).unwrap();
-        assert_eq!(json["stiffness"]["axial"], "inf");
-        assert_eq!(json["stiffness"]["shear_3"], 100.0);
-        assert_eq!(json["coupling"]["y"], serde_json::json!([0.1, 0.2]));
-        assert!(json["dynamics"].get("tip_force").is_none());
-    }
-
-    #[test]
-    fn errors_in_json_are_refused() {
-        let table = r#"
-            { => not valid JSON
-            {"name": null} => is no scenario
-            {"name": "a", "leaf": {"rod": 1}} => did you mean leaf.rods?
-        "#;
-        for (text, part) in pairs(table) {
-            let error = Scenario::from_toml(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
-        }
-    }
-}
+mod tests;

@@ -3,65 +3,9 @@
 //! A new key needs a row here, a field of the checked scenario, a line in `check` that reads
 //! it, and one in `json` that writes it.
 
-use super::excerpt::shorten;
-use Form::*;
-use LeftOut::*;
-use Range::*;
-
-/// The form of a key's value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
-    Text,
-    /// `true` or `false`.
-    Switch,
-    /// A whole number from 1.
-    Whole,
-    Number(Range),
-    /// A number for all rods, or a list with one for each.
-    PerRod(Range),
-    /// A number for all rods, a list with one for each, or a profile along the rods.
-    Quantity(Range),
-    /// A number for all gaps between neighbouring rods, or a list.
-    PerGap(Range),
-    /// x, y, z.
-    Vector,
-    /// Base angles: a list, or a word.
-    Fan,
-    /// Vectors at given times.
-    VectorInTime,
-    /// Factors at given times.
-    FactorInTime,
-}
-
-/// Which numbers a key allows; never NaN.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Range {
-    Finite,
-    NotNegative,
-    Positive,
-    PositiveOrInfinite,
-}
-
-/// What applies if a key is left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LeftOut {
-    /// It is required; the message gives this example of a value.
-    Required(&'static str),
-    /// This default value.
-    Default(&'static str),
-    /// A value that follows from others, or none.
-    Derived,
-}
-
-impl Form {
-    /// The range of its numbers.
-    pub(super) fn range(self) -> Range {
-        match self {
-            Number(range) | PerRod(range) | Quantity(range) | PerGap(range) => range,
-            _ => Finite,
-        }
-    }
-}
+use super::form::Form::{self, *};
+use super::form::LeftOut::{self, *};
+use super::form::Range::*;
 
 struct Row {
     key: Key,
@@ -108,6 +52,12 @@ keys! {
     Fan "leaf.fan": Fan, [0, 0, 0], Required("\"symmetric\"");
     /// whether the tips share one point.
     Joined "leaf.joined": Switch, [0, 0, 0], Default("true");
+    /// where the rods begin, one place for all or one each.
+    Base "leaf.base": VectorPerRod, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
+    /// angles of the rods at the base above the x-y plane, in radians.
+    Elevation "leaf.elevation": PerRod(Finite), [0, 0, 0], Default("0.0");
+    /// how the bases are held.
+    BaseHeld "leaf.base_held": Text, [0, 0, 0], Default("\"clamped\"");
     /// A1, against torsion.
     Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// A2, against bending about d2: up and down, out of the leaf's surface.
@@ -128,6 +78,10 @@ keys! {
     Width "section.width": Quantity(Positive), [1, 0, 0], Required("0.4");
     /// thickness of an ellipse or a rectangle, along d3.
     Thickness "section.thickness": Quantity(Positive), [1, 0, 0], Required("0.1");
+    /// diameter of the bore of a tube.
+    InnerDiameter "section.inner_diameter": Quantity(NotNegative), [1, 0, 0], Derived;
+    /// thickness of the wall of a hollow section.
+    Wall "section.wall": Quantity(Positive), [1, 0, 0], Derived;
     /// E, Young's modulus.
     Young "section.young": Quantity(Positive), [-2, 1, 0], Required("0.3");
     /// nu, Poisson's ratio.
@@ -148,12 +102,34 @@ keys! {
     CouplingY "coupling.y": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// coupling along e3.
     CouplingZ "coupling.z": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
-    /// force per length of rod.
-    Gravity "load.gravity": Vector, [-1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// tissue between neighbours that slide along each other: force per displacement and length of leaf.
+    TissueAlong "tissue.along": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
+    /// tissue whose width changes, likewise.
+    TissueAcross "tissue.across": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
+    /// tissue of which one side rises above the other, likewise.
+    TissueNormal "tissue.normal": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
+    /// tissue that folds along the rods: moment per angle and length of leaf.
+    TissueFold "tissue.fold": PerGap(NotNegative), [0, 1, 0], Default("0.0");
+    /// force per length of rod, one for all or one each.
+    Gravity "load.gravity": VectorPerRod, [-1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// acceleration of gravity, which pulls the mass of the rods and of points.
+    G "load.g": Vector, [1, 0, -2], Default("[0.0, 0.0, 0.0]");
+    /// dead force per length of rod, which may vary along it.
+    Distributed "load.distributed": VectorQuantity, [-1, 1, 0], Derived;
     /// dead force on the joint tip, or on every tip.
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
     TipMoment "load.tip_moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// the rod that is loaded at a point, counted from 1.
+    PointVein "load.point.vein": Whole, [0, 0, 0], Required("1");
+    /// where the point is, a fraction of the length.
+    PointAt "load.point.at": Number(Finite), [0, 0, 0], Required("0.5");
+    /// dead force on the point.
+    PointForce "load.point.force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// dead moment on the point, one rod only.
+    PointMoment "load.point.moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
+    /// mass of the point, which `load.g` pulls.
+    PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
     /// how the tips are held.
     TipHeld "tip.held": Text, [0, 0, 0], Default("\"free\"");
     /// where the joint tip, or the only rod's, is held.
@@ -162,6 +138,14 @@ keys! {
     TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Default("0.0");
     /// of a clamped tip, the turn of the sections about d1, in radians.
     TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Default("0.0");
+    /// the rod that is gripped, counted from 1.
+    GripVein "grip.vein": Whole, [0, 0, 0], Required("1");
+    /// where, a fraction of the length, or the two ends of a stretch.
+    GripAt "grip.at": Stretch, [0, 0, 0], Required("[0.3, 0.7]");
+    /// whether the directions are held, too.
+    GripHeld "grip.held": Text, [0, 0, 0], Default("\"pinned\"");
+    /// by how much the grip has moved from its place in the natural leaf.
+    GripMove "grip.move": Vector, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// wanted accuracy, relative to the longest rod.
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
     /// rho, mass per length of rod.
@@ -190,6 +174,14 @@ keys! {
     TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Derived;
     /// factor of the rest curvatures in time.
     RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Derived;
+    /// velocity of the air, steady or in time.
+    WindVelocity "wind.velocity": VectorOrInTime, [1, 0, -1], Required("[2.0, 0.0, 0.0]");
+    /// mass per volume of the air.
+    WindDensity "wind.density": Number(Positive), [-4, 1, 2], Required("1.2");
+    /// C_D, the drag coefficient of the rods.
+    WindDrag "wind.drag": Number(NotNegative), [0, 0, 0], Required("2.0");
+    /// width that a rod turns to the wind.
+    WindWidth "wind.width": Quantity(Positive), [1, 0, 0], Required("0.01");
 }
 
 impl Key {
@@ -200,6 +192,15 @@ impl Key {
     pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
     pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
     pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
+    /// k1, k2 and k3 of the tissue, and its c1.
+    pub(super) const TISSUE: [Key; 4] = [
+        Key::TissueAlong,
+        Key::TissueAcross,
+        Key::TissueNormal,
+        Key::TissueFold,
+    ];
+    /// Tables that a scenario may have several times.
+    pub(super) const REPEATED: [&str; 2] = ["load.point", "grip"];
 
     fn row(self) -> &'static Row {
         &FORMAT[self as usize]
@@ -242,7 +243,12 @@ impl Key {
 
     /// Its table, empty at the top, and its name within that.
     pub(super) fn parts(self) -> (&'static str, &'static str) {
-        self.path().rsplit_once('.').unwrap_or(("", self.path()))
+        split(self.path())
+    }
+
+    /// Whether its table may be there several times.
+    pub(crate) fn is_repeated(self) -> bool {
+        Key::REPEATED.contains(&self.parts().0)
     }
 
     pub(crate) fn all() -> impl Iterator<Item = Key> {
@@ -279,54 +285,18 @@ impl Key {
         tables
     }
 
-    /// The names allowed in `table`; at the top ("") also those of the tables.
+    /// The names allowed in `table`, which is empty at the top, also those of tables in it.
     pub(super) fn allowed_in(table: &str) -> Vec<&'static str> {
         let keys = Key::all().map(Key::parts).filter(|parts| parts.0 == table);
-        let mut allowed: Vec<_> = keys.map(|parts| parts.1).collect();
-        if table.is_empty() {
-            allowed.extend(Key::tables());
-        }
-        allowed
+        let tables = Key::tables().into_iter().map(split);
+        let tables = tables.filter(|parts| parts.0 == table);
+        keys.chain(tables).map(|parts| parts.1).collect()
     }
 }
 
-/// The key or table that was probably meant by `path`: the same name in
-/// another table, or the nearest spelling.
-pub(crate) fn nearest(path: &str) -> Option<&'static str> {
-    let name = path.rsplit('.').next().unwrap_or(path);
-    if let Some(key) = Key::all().find(|key| key.parts().1 == name) {
-        return Some(key.path());
-    }
-    // No key is longer than this.
-    let path: String = path.chars().take(80).collect();
-    let most = 1 + path.chars().count().min(40) / 5;
-    let candidates = Key::all().map(Key::path).chain(Key::tables());
-    let near = candidates.map(|candidate| (strsim::levenshtein(&path, candidate), candidate));
-    let (edits, candidate) = near.min()?;
-    (edits <= most).then_some(candidate)
-}
-
-/// The message for an unknown key, with what was probably meant.
-pub(super) fn unknown(path: &str) -> String {
-    let found = shorten(path);
-    match nearest(path) {
-        Some(meant) if meant != path => {
-            return format!("unknown key {found} (did you mean {meant}?)");
-        }
-        _ => (),
-    }
-    let table = path.split('.').next().unwrap_or("");
-    let tables = Key::tables();
-    match tables.iter().find(|known| **known == table) {
-        Some(table) => {
-            let allowed = Key::allowed_in(table).join(", ");
-            format!("unknown key {found}: [{table}] has {allowed}")
-        }
-        None => {
-            let tables = tables.join(", ");
-            format!("unknown key {found}: keys are name and those of {tables}, as in leaf.rods")
-        }
-    }
+/// The table that a path is in, empty at the top, and its name within that.
+pub(super) fn split(path: &str) -> (&str, &str) {
+    path.rsplit_once('.').unwrap_or(("", path))
 }
 
 #[cfg(test)]
@@ -342,19 +312,9 @@ mod tests {
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 10);
-    }
-
-    #[test]
-    fn misspelt_keys_are_recognized() {
-        for (misspelt, key) in [
-            ("stiffness.bending2", Some("stiffness.bending_2")),
-            ("gravity", Some("load.gravity")),
-            ("dynamics.gravty", Some("dynamics.gravity")),
-            ("leaf.rod", Some("leaf.rods")),
-            ("monsoon", None),
-        ] {
-            assert_eq!(nearest(misspelt), key);
-        }
+        assert_eq!(Key::tables().len(), 14);
+        assert_eq!(Key::allowed_in("load")[..2], ["gravity", "g"]);
+        assert!(Key::allowed_in("load").contains(&"point"));
+        assert!(!Key::allowed_in("").contains(&"load.point"));
     }
 }

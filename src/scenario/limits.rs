@@ -2,65 +2,17 @@
 //! are a mistake, or no grid could resolve its shape. Only given values are checked;
 //! defaults are always within the limits.
 
+use super::bounds::{
+    GRAVITY, Limit, TIME, TIP_FORCE, TIP_MOMENT, UNIT, most, near_one, norm, smallest_unit, softest,
+};
 use super::entries::Entries;
 use super::error::Result;
+use super::form::Form;
 use super::item::Item;
-use super::key::{Form, Key};
+use super::key::Key;
+use super::load_limits;
 use super::material;
 use super::{Profile, Rod, Scale, Scenario, longest};
-
-/// The range of a dimensionless number.
-struct Limit {
-    /// The number.
-    formula: &'static str,
-    least: f64,
-    most: f64,
-    /// What the symbols mean, why there is a limit, and what to change.
-    because: &'static str,
-}
-
-impl Limit {
-    fn check(&self, item: Item, value: f64) -> Result<()> {
-        let limit = match value {
-            _ if value > self.most => self.most,
-            _ if value < self.least => self.least,
-            _ => return Ok(()),
-        };
-        let (formula, because) = (self.formula, self.because);
-        Err(item.refuse(format_args!(
-            "gives {formula} = {value:.3e}, the limit is {limit:e}: {because}"
-        )))
-    }
-
-    /// Checks the extremes of a profile of each rod, in this unit.
-    fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result<()> {
-        for (index, profile) in profiles.iter().enumerate() {
-            for value in [profile.min(), profile.max_abs()] {
-                self.check(item.entry(index), value / unit)?;
-            }
-        }
-        Ok(())
-    }
-}
-
-const fn most(formula: &'static str, most: f64, because: &'static str) -> Limit {
-    Limit {
-        formula,
-        least: 0.0,
-        most,
-        because,
-    }
-}
-
-/// Within a factor of `most` of 1.
-const fn near_one(formula: &'static str, most: f64, because: &'static str) -> Limit {
-    Limit {
-        formula,
-        least: 1.0 / most,
-        most,
-        because,
-    }
-}
 
 /// Longest to shortest rod.
 const LENGTHS: Limit = most("L_max/L", 1e3, SHORT);
@@ -81,11 +33,6 @@ const FORCE_STIFFNESS: Limit = Limit {
 };
 /// Two coupled rods join within (A/kappa)^(1/4), at the limit 1e-3 of the length.
 const KAPPA: Limit = most("kappa L^4/A", 1e12, COUPLED);
-/// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
-/// its ends: at the limit, within 1e-4 of its length.
-const GRAVITY: Limit = most("|g| L^3/A", 1e8, CONFINED);
-const TIP_FORCE: Limit = most("|F| L^2/A", 1e8, CONFINED);
-const TIP_MOMENT: Limit = most("|M| L/A", 1e8, WOUND);
 /// Masses, damping and times in their natural units: values that differ by twelve orders
 /// of magnitude hardly affect each other in double precision, which has 16 digits. A
 /// radius is limited by itself, as it enters by its square and, with a small density,
@@ -103,8 +50,6 @@ const DYNAMICS: [(Key, Limit); 6] = [
 ];
 /// Outputs after the first.
 const OUTPUTS: Limit = most("duration/output_interval", 1e6, TOO_MANY);
-/// Times of loads and factors.
-const TIME: Limit = most("|t|/T", 1e12, UNIT);
 /// Factor of the rest curvatures, and the same with the largest of them.
 const FACTOR: Limit = most("|factor|", 1e6, MULTIPLIED);
 const FACTOR_ANGLE: Limit = most("|factor u0| L", 1e3, CURLED);
@@ -120,19 +65,12 @@ const SOFT: &str = "A is the smallest bending stiffness of the rod and L its len
      below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
 const COUPLED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
      beyond the limit neighbours act as glued together: lower the coupling";
-const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
-     beyond the limit bending is confined to less than 1e-4 of the length: lower the load or stiffen the rods";
-const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
-     the rod would roll up by this many radians: lower the moment or stiffen the rod";
 const UNEVEN_DENSITY: &str = "rho_mean is the mean of the densities mid-rod; \
      beyond the limit one part weighs nothing beside another: choose densities closer to each other";
 const STOUT: &str = "rho_mean is the mean of the densities mid-rod and L the longest rod; \
      it is r^2/(4 L^2) for a round section of radius r: choose one closer to that of a rod";
 const WIDE: &str =
     "r is the radius of the section and L the longest rod: choose one closer to that of a rod";
-const UNIT: &str = "T = sqrt(rho_mean L^4/A) is the natural unit of time, with the longest rod L and \
-     the means rho_mean and A of the densities and bending stiffnesses mid-rod: \
-     choose a value, or a density, that brings this closer to 1";
 const TOO_MANY: &str =
     "the number of outputs: choose a longer output_interval or a shorter duration";
 const MULTIPLIED: &str =
@@ -141,7 +79,6 @@ const MULTIPLIED: &str =
 pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
-        (Key::Gravity, scenario.gravity, GRAVITY),
         (Key::TipForce, scenario.tip_force, TIP_FORCE),
         (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
     ] {
@@ -152,27 +89,8 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     coupling(entries, scenario)?;
     dynamics(entries, scenario)?;
     masses(entries, scenario)?;
-    in_time(entries, scenario)
-}
-
-/// The length of a rod and its smallest bending stiffness anywhere along it.
-fn softest(rod: &Rod) -> Scale {
-    let [_, second, third] = &rod.couple_stiffness;
-    Scale {
-        length: rod.length,
-        stiffness: second.min().min(third.min()),
-    }
-}
-
-/// The smallest unit of a quantity of this key, which has no times, of all rods.
-fn smallest_unit(key: Key, rods: &[Rod]) -> f64 {
-    let units = rods.iter().map(|rod| softest(rod).unit(key, 1.0));
-    units.fold(f64::INFINITY, f64::min)
-}
-
-fn norm([x, y, z]: [f64; 3]) -> f64 {
-    // hypot avoids overflow of the squares of large components.
-    x.hypot(y).hypot(z)
+    in_time(entries, scenario)?;
+    load_limits::check(entries, scenario)
 }
 
 fn rods(entries: &Entries, rods: &[Rod]) -> Result<()> {

@@ -7,7 +7,8 @@ use super::entries::Entries;
 use super::error::Result;
 use super::item::{Item, MAGNITUDES};
 use super::key::Key;
-use super::section::{Outline, Property, Section};
+use super::outline::Outline;
+use super::section::{Hollow, Property, Section};
 
 /// The entry with the size of the sections.
 pub(super) fn size(entries: &Entries) -> Option<Item<'_>> {
@@ -36,6 +37,7 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
     let quantity = |key| entries.item(key)?.quantity(rods);
     let (outline, sides) = outline(entries)?;
     let [width, thickness] = [quantity(sides[0])?, quantity(sides[1])?];
+    let hollow = hollow(entries, outline, [&width, &thickness])?;
     let young = quantity(Key::Young)?;
     let poisson = poisson(entries.item(Key::Poisson)?, rods)?;
     let mass_density = match entries.given(Key::MassDensity) {
@@ -45,12 +47,16 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
     let all = [&width, &thickness, &young, &poisson, &mass_density];
     let mut sections: Vec<Arc<Section>> = Vec::with_capacity(rods);
     for rod in 0..rods {
-        let same = rod > 0 && all.iter().all(|values| values[rod] == values[rod - 1]);
+        let own = |rod: usize| hollow.as_ref().map(|hollow| &hollow[rod]);
+        let same = rod > 0
+            && all.iter().all(|values| values[rod] == values[rod - 1])
+            && own(rod) == own(rod - 1);
         sections.push(match sections.last() {
             Some(last) if same => last.clone(),
             _ => Arc::new(Section::new(
                 outline,
                 [&width, &thickness].map(|side| side[rod].clone()),
+                own(rod).cloned(),
                 [&young, &poisson, &mass_density].map(|value| value[rod].clone()),
             )),
         });
@@ -108,6 +114,50 @@ fn outline(entries: &Entries) -> Result<(Outline, [Key; 2])> {
              thickness (along d3): leave this out, or change section.shape",
         )),
     }
+}
+
+/// The walls or bores of the rods; `None` if their sections are full.
+fn hollow(
+    entries: &Entries,
+    outline: Outline,
+    [width, thickness]: [&[Profile]; 2],
+) -> Result<Option<Vec<Hollow>>> {
+    let (bore, wall) = (entries.given(Key::InnerDiameter), entries.given(Key::Wall));
+    let Some(item) = bore.or(wall) else {
+        return Ok(None);
+    };
+    if let Some(bore) = bore {
+        let round = "belongs to a circle: give section.wall, the thickness of the wall";
+        bore.ensure(outline == Outline::Circle, round)?;
+        let twice = "section.wall is given, too: leave one of them out";
+        bore.ensure(wall.is_none(), twice)?;
+    }
+    let profiles = item.quantity(width.len())?;
+    for (rod, profile) in profiles.iter().enumerate() {
+        let sides = [&width[rod], &thickness[rod]];
+        let knots = [0.0, 1.0].into_iter();
+        let inner = sides.into_iter().chain([profile]).flat_map(Profile::kinks);
+        // Between knots all are linear.
+        for sigma in knots.chain(inner.copied()) {
+            let side = sides.map(|side| side.at(sigma));
+            let (value, least) = (profile.at(sigma), side[0].min(side[1]));
+            match bore {
+                Some(_) => item.entry(rod).ensure(
+                    value < least,
+                    "must be less than section.diameter, all along the rod",
+                )?,
+                None => item.entry(rod).ensure(
+                    2.0 * value <= least,
+                    "must be at most half of the section's smaller side, all along the rod",
+                )?,
+            }
+        }
+    }
+    let of = |profile| match bore {
+        Some(_) => Hollow::Bore(profile),
+        None => Hollow::Wall(profile),
+    };
+    Ok(Some(profiles.into_iter().map(of).collect()))
 }
 
 fn poisson(item: Item, rods: usize) -> Result<Vec<Profile>> {

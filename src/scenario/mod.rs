@@ -3,16 +3,26 @@
 //! All other modules rely on a [`Scenario`] being valid: lengths of lists agree,
 //! stiffnesses are positive, angles finite.
 
+mod base;
+mod bounds;
 mod check;
 mod dynamics;
 mod entries;
 mod error;
 mod excerpt;
+mod form;
+mod gauss;
+mod grip;
+mod hold;
 mod item;
 mod json;
 mod key;
 mod limits;
+mod load_limits;
+mod loads;
 mod material;
+mod not_yet;
+mod outline;
 mod part;
 mod profile;
 mod read;
@@ -21,15 +31,23 @@ mod schema;
 mod section;
 mod slips;
 mod source;
+mod spelling;
 mod tip;
+mod tissue;
 mod turning;
+mod values;
+mod vectors;
+mod wind;
 
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
 pub use error::{Place, ScenarioError};
 pub use excerpt::printable;
-pub(crate) use key::Form;
+pub(crate) use form::Form;
+pub use grip::Grip;
+pub use hold::Hold;
 pub use key::Key;
+pub use loads::{PointLoad, Weight};
 pub use part::Part;
 pub use profile::Profile;
 pub(crate) use profile::ascending;
@@ -39,9 +57,11 @@ pub use schema::schema;
 pub use section::{Property, Radii, Section};
 pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
 pub use tip::{Clamp, HeldTip};
+pub use tissue::Tissue;
 /// Values as they can be written.
 pub use toml::{Table, Value};
 pub use turning::Turning;
+pub use wind::Wind;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
@@ -55,23 +75,40 @@ pub struct Scenario {
     pub rods: Vec<Rod>,
     /// Radii of the veins where sections are given: for pictures.
     pub radii: Radii,
+    /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
+    pub base_held: Hold,
     /// Whether all tips share one point.
     pub joined: bool,
     /// Coupling stiffness of each gap between neighbouring rods along the lab
     /// axes x, y, z: force per unit displacement and unit length of leaf, the
     /// length of a gap being the mean of its two rods'. N - 1 entries.
     pub coupling: Vec<[f64; 3]>,
-    /// Gravity, force per unit reference length.
+    /// Tissue in each gap, N - 1 entries; `None` if there is none.
+    pub tissue: Option<Vec<Tissue>>,
+    /// Gravity, force per unit reference length, on every vein; [`Scenario::weight`] has all of it.
     pub gravity: [f64; 3],
+    /// What the veins have besides, N entries; empty if they do not differ.
+    pub own_gravity: Vec<[f64; 3]>,
+    /// The acceleration of gravity, which pulls [`Dynamics::density`] and the masses of points.
+    pub g: [f64; 3],
+    /// Dead force per unit reference length along each vein, by components; `None` if there is none.
+    pub distributed: Option<Vec<[Profile; 3]>>,
+    /// Dead loads on points.
+    pub points: Vec<PointLoad>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
     pub tip_force: [f64; 3],
     /// Dead moment about the lab axes on the tip of a single rod.
     pub tip_moment: [f64; 3],
     /// The tip, if it is held.
     pub held_tip: Option<HeldTip>,
+    /// Holders along the veins; no point has two.
+    pub grips: Vec<Grip>,
+    /// Wind; equilibria do not depend on it.
+    pub wind: Option<Wind>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
-    /// How the leaf moves; equilibria do not depend on it.
+    /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
+    /// pulls it.
     pub dynamics: Dynamics,
 }
 
@@ -116,8 +153,12 @@ impl Units {
 pub struct Rod {
     /// Reference length L.
     pub length: f64,
+    /// Where it begins; the paper's rods all begin in the origin.
+    pub base: [f64; 3],
     /// Base angle phi of d1(0) in the e1-e2 plane, in radians (paper, section 2.4 (c)).
     pub angle: f64,
+    /// Angle of d1(0) above this plane, in radians.
+    pub elevation: f64,
     /// A1, A2, A3 of eq. (5): moment times length.
     pub couple_stiffness: [Profile; 3],
     /// H1, H2, H3 of eq. (6): a force; infinite means rigid.
@@ -191,3 +232,6 @@ pub fn longest(rods: &[Rod]) -> f64 {
     rods.iter()
         .fold(0.0, |longest, rod| longest.max(rod.length))
 }
+
+#[cfg(test)]
+mod tests;

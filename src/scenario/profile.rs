@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::gauss::GAUSS;
 use super::section::{Property, Section};
 
 /// A quantity along a rod: constant, linear between knots given at fractions
@@ -27,15 +28,6 @@ pub enum Profile {
         factor: f64,
     },
 }
-
-/// Abscissae and weights of the Gauss-Legendre rule of five points on (0, 1).
-const GAUSS: [(f64, f64); 5] = [
-    (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
-    (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
-    (0.5, 0.284_444_444_444_444_44),
-    (0.769_234_655_052_841_6, 0.239_314_335_249_683_23),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-];
 
 impl Profile {
     /// The value at the fraction `sigma` in [0, 1].

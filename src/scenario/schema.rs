@@ -2,47 +2,49 @@
 
 use serde_json::{Map, Value, json};
 
-use super::key::{Form, Key, LeftOut, Range};
+use super::form::{Form, LeftOut, Range};
+use super::key::{Key, split};
 
 /// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
 /// them. Rules between entries are checked only by the program.
 pub fn schema() -> Value {
-    let mut tables: Vec<(&str, Map<String, Value>, Vec<&str>)> = vec![("", Map::new(), Vec::new())];
-    for key in Key::all() {
-        let (table, name) = key.parts();
-        if !tables.iter().any(|(known, ..)| *known == table) {
-            tables.push((table, Map::new(), Vec::new()));
-        }
-        for (known, properties, required) in &mut tables {
-            if *known == table {
-                properties.insert(name.into(), entry(key));
-                // Alternatives, such as stiffnesses and sections, are not required here.
-                if matches!(key.left_out(), LeftOut::Required(_)) && matches!(table, "" | "leaf") {
-                    required.push(name);
-                }
-            }
-        }
-    }
-    let object = |properties: Map<String, Value>, required: Vec<&str>| {
-        let mut object = json!({
-            "type": "object", "properties": properties, "additionalProperties": false,
-        });
-        if !required.is_empty() {
-            object["required"] = json!(required);
-        }
-        object
-    };
-    let (_, mut properties, mut required) = tables.remove(0);
-    for (table, entries, needed) in tables {
-        if !needed.is_empty() {
-            required.push(table);
-        }
-        properties.insert(table.into(), object(entries, needed));
-    }
-    let mut schema = object(properties, required);
+    let mut schema = table("");
     schema["$schema"] = json!("http://json-schema.org/draft-07/schema#");
     schema["title"] = json!("a leaf, as leafdyn reads it");
     schema
+}
+
+/// The schema of a table, which has no name at the top, with those in it.
+fn table(name: &str) -> Value {
+    let (mut properties, mut required) = (Map::new(), Vec::new());
+    for key in Key::all().filter(|key| key.parts().0 == name) {
+        let (_, within) = key.parts();
+        properties.insert(within.into(), entry(key));
+        // Alternatives, such as stiffnesses and sections, are not required here.
+        let alone = matches!(name, "" | "leaf") || key.is_repeated();
+        if alone && matches!(key.left_out(), LeftOut::Required(_)) {
+            required.push(within);
+        }
+    }
+    for inner in Key::tables() {
+        let (outer, within) = split(inner);
+        if outer != name {
+            continue;
+        }
+        let one = table(inner);
+        let repeated = Key::REPEATED.contains(&inner);
+        if !repeated && !one["required"].is_null() {
+            required.push(within);
+        }
+        properties.insert(within.into(), if repeated { list(one) } else { one });
+    }
+    let mut object = json!({
+        "type": "object", "properties": properties, "additionalProperties": false,
+    });
+    if !required.is_empty() {
+        object["required"] = json!(required);
+    }
+    object
 }
 
 /// The schema of a key's value, with its description.
@@ -64,10 +66,22 @@ fn entry(key: Key) -> Value {
             json!({ "anyOf": [number(range), list(number(range)), profile] })
         }
         Form::Vector => vector(),
+        Form::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
+        Form::VectorQuantity => {
+            let vectors = list(vector());
+            let profile = knots("value", json!({ "anyOf": [vectors, list(list(vector()))] }));
+            json!({ "anyOf": [vector(), list(vector()), profile] })
+        }
+        Form::Stretch => {
+            let ends =
+                json!({ "type": "array", "items": fraction(), "minItems": 2, "maxItems": 2 });
+            json!({ "anyOf": [fraction(), ends] })
+        }
         Form::Fan => json!({ "anyOf": [
             { "enum": ["paper", "symmetric"] }, list(number(Range::Finite)),
         ] }),
         Form::VectorInTime => knots("value", list(vector())),
+        Form::VectorOrInTime => json!({ "anyOf": [vector(), knots("value", list(vector()))] }),
         Form::FactorInTime => knots("factor", list(number(Range::Finite))),
     };
     entry["description"] = json!(key.description());
@@ -89,6 +103,10 @@ fn number(range: Range) -> Value {
             json!({ "type": "number", "exclusiveMinimum": 0 })
         }
     }
+}
+
+fn fraction() -> Value {
+    json!({ "type": "number", "minimum": 0, "maximum": 1 })
 }
 
 fn list(of: Value) -> Value {

@@ -13,28 +13,16 @@
 //!
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
-//! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335.
+//! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335; of hollow sections see `outline`.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use super::outline::{Outline, Sides};
 use super::{Profile, ascending};
-use crate::words;
 
 /// Steps between two knots in the search for extremes.
 const SAMPLES: usize = 16;
-
-words! {
-    /// The outline of a section.
-    pub enum Outline {
-        /// A circle, whose width and thickness are the same.
-        Circle = "circle",
-        /// An ellipse with its width along d2 and its thickness along d3.
-        Ellipse = "ellipse",
-        /// A rectangle with the same sides.
-        Rectangle = "rectangle",
-    }
-}
 
 /// A property that a section determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,12 +65,30 @@ impl Property {
     }
 }
 
+/// What makes a section hollow, as it is given.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Hollow {
+    /// The thickness of the wall.
+    Wall(Profile),
+    /// The inner diameter of a circle.
+    Bore(Profile),
+}
+
+impl Hollow {
+    pub(super) fn profile(&self) -> &Profile {
+        match self {
+            Hollow::Wall(profile) | Hollow::Bore(profile) => profile,
+        }
+    }
+}
+
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     pub(super) outline: Outline,
     pub(super) width: Profile,
     pub(super) thickness: Profile,
+    pub(super) hollow: Option<Hollow>,
     pub(super) young: Profile,
     pub(super) poisson: Profile,
     /// Mass per volume; zero where it is not given.
@@ -98,19 +104,21 @@ impl Section {
     pub(super) fn new(
         outline: Outline,
         [width, thickness]: [Profile; 2],
+        hollow: Option<Hollow>,
         [young, poisson, mass_density]: [Profile; 3],
     ) -> Section {
         let mut section = Section {
             outline,
             width,
             thickness,
+            hollow,
             young,
             poisson,
             mass_density,
             kinks: Vec::new(),
             extremes: [[f64::INFINITY, f64::NEG_INFINITY]; Property::ALL.len()],
         };
-        let profiles = section.profiles().into_iter();
+        let profiles = section.profiles();
         section.kinks = ascending(profiles.flat_map(Profile::kinks).copied());
         let varies = !section.is_constant();
         for sigma in section.fractions().filter(|_| varies) {
@@ -123,21 +131,23 @@ impl Section {
         section
     }
 
-    fn profiles(&self) -> [&Profile; 5] {
+    fn profiles(&self) -> impl Iterator<Item = &Profile> {
         let Section {
             width,
             thickness,
+            hollow,
             young,
             poisson,
             mass_density,
             ..
         } = self;
-        [width, thickness, young, poisson, mass_density]
+        let all = [width, thickness, young, poisson, mass_density];
+        all.into_iter().chain(hollow.iter().map(Hollow::profile))
     }
 
     /// Whether it is the same along the whole rod.
     fn is_constant(&self) -> bool {
-        let mut profiles = self.profiles().into_iter();
+        let mut profiles = self.profiles();
         profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
@@ -146,12 +156,17 @@ impl Section {
         &self.kinks
     }
 
-    /// Its area at a fraction of the length.
-    pub fn area(&self, sigma: f64) -> f64 {
-        let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
-        match self.outline {
-            Outline::Circle | Outline::Ellipse => PI / 4.0 * w * t,
-            Outline::Rectangle => w * t,
+    /// Its sides at a fraction of the length.
+    fn sides(&self, sigma: f64) -> Sides {
+        let (width, thickness) = (self.width.at(sigma), self.thickness.at(sigma));
+        Sides {
+            outline: self.outline,
+            width,
+            thickness,
+            wall: self.hollow.as_ref().map(|hollow| match hollow {
+                Hollow::Wall(wall) => wall.at(sigma),
+                Hollow::Bore(inner) => 0.5 * (width - inner.at(sigma)),
+            }),
         }
     }
 
@@ -162,21 +177,16 @@ impl Section {
 
     /// A property at a fraction of the length.
     pub fn at(&self, property: Property, sigma: f64) -> f64 {
-        let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
+        let sides = self.sides(sigma);
         let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
         let shear = young / (2.0 * (1.0 + poisson));
-        let area = self.area(sigma);
-        let second = match self.outline {
-            Outline::Circle | Outline::Ellipse => PI / 64.0,
-            Outline::Rectangle => 1.0 / 12.0,
-        };
-        let second = [second * w * t * t * t, second * t * w * w * w];
+        let area = sides.area();
+        let second = sides.second_moments();
         match property {
-            Property::Couple(0) => shear * self.outline.torsion(w, t),
+            Property::Couple(0) => shear * sides.torsion(),
             Property::Couple(axis) => young * second[axis - 1],
             Property::Force(0) => young * area,
-            Property::Force(1) => self.outline.shear_factor(w, t, poisson) * shear * area,
-            Property::Force(_) => self.outline.shear_factor(t, w, poisson) * shear * area,
+            Property::Force(axis) => sides.shear_factors(poisson)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(sigma) * area,
             Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
         }
@@ -201,12 +211,8 @@ impl Section {
 
     /// Cowper's factors for both shear forces, likewise.
     pub(super) fn shear_factors(&self) -> impl Iterator<Item = f64> {
-        self.fractions().flat_map(|sigma| {
-            let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
-            let poisson = self.poisson.at(sigma);
-            [(w, t), (t, w)]
-                .map(|(along, across)| self.outline.shear_factor(along, across, poisson))
-        })
+        let fractions = self.fractions();
+        fractions.flat_map(|sigma| self.sides(sigma).shear_factors(self.poisson.at(sigma)))
     }
 
     fn fractions(&self) -> impl Iterator<Item = f64> + use<> {
@@ -215,43 +221,6 @@ impl Section {
             let (from, to) = (edges[panel], edges[panel + 1]);
             (0..=SAMPLES).map(move |k| from + k as f64 / SAMPLES as f64 * (to - from))
         })
-    }
-}
-
-impl Outline {
-    /// The torsion constant J. Of a rectangle with the long side a and the short
-    /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
-    fn torsion(self, width: f64, thickness: f64) -> f64 {
-        match self {
-            Outline::Circle | Outline::Ellipse => {
-                let (a, b) = (width / 2.0, thickness / 2.0);
-                // In this order equal sides give the circle's value to the last bit but one.
-                PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
-            }
-            Outline::Rectangle => {
-                let (long, short) = (width.max(thickness), width.min(thickness));
-                let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
-                // From n = 17 on every tanh is 1, so the rest of the sum is known (zeta(5)
-                // times 31/32, less the terms before).
-                let all = 31.0 / 32.0 * 1.036_927_755_143_37;
-                let odd = (0..8).map(|k| (2 * k + 1) as f64);
-                let deficit: f64 = odd.map(|n| n.powi(-5) - term(n)).sum();
-                let sum = all - deficit;
-                long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * sum)
-            }
-        }
-    }
-
-    /// Cowper's factor for a shear force along the side `along`.
-    fn shear_factor(self, along: f64, across: f64, nu: f64) -> f64 {
-        match self {
-            Outline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
-            Outline::Circle | Outline::Ellipse => {
-                let (a, b) = (along * along, across * across);
-                12.0 * (1.0 + nu) * a * (3.0 * a + b)
-                    / ((40.0 + 37.0 * nu) * a * a + (16.0 + 10.0 * nu) * a * b + nu * b * b)
-            }
-        }
     }
 }
 
@@ -271,10 +240,10 @@ impl Radii {
     }
 
     /// The radius of a rod at a fraction of its length: that of a circle with the area of
-    /// its section. `None` if stiffnesses are given in place of sections.
+    /// the outline of its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
-        Some((section.area(sigma) / std::f64::consts::PI).sqrt())
+        Some((section.sides(sigma).enclosed() / PI).sqrt())
     }
 }
 
@@ -303,41 +272,19 @@ impl PartialEq for Radii {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Scenario;
+    use leafdyn_testing::pairs;
 
     fn section(outline: Outline, width: f64, thickness: f64, poisson: f64) -> Section {
         let constant = Profile::Constant;
         let material = [constant(2.0), constant(poisson), constant(3.0)];
-        Section::new(outline, [constant(width), constant(thickness)], material)
+        let sides = [constant(width), constant(thickness)];
+        Section::new(outline, sides, None, material)
     }
 
     #[track_caller]
     fn close(found: f64, wanted: f64, relative: f64) {
         assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
-    }
-
-    /// Table 6 of Timoshenko and Goodier, art. 109, with more digits from summing the series
-    /// term by term, and the thin strip.
-    #[test]
-    fn torsion_of_rectangles() {
-        for (sides, constant) in [
-            (1.0, 0.140_577_014_955),
-            (2.0, 0.228_681_655_7),
-            (10.0, 0.312_332_5),
-        ] {
-            for (width, thickness) in [(sides, 1.0), (1.0, sides)] {
-                let found = Outline::Rectangle.torsion(width, thickness);
-                close(found, constant * sides, 3e-5);
-            }
-        }
-        let direct = |long: f64| {
-            let odd = (0..20_000).map(|k| (2 * k + 1) as f64);
-            let sum: f64 = odd.map(|n| (n * PI * long / 2.0).tanh() / n.powi(5)).sum();
-            long * (1.0 / 3.0 - 64.0 / PI.powi(5) / long * sum)
-        };
-        for long in [1.0, 1.3, 4.0, 50.0] {
-            close(Outline::Rectangle.torsion(long, 1.0), direct(long), 1e-13);
-        }
-        close(Outline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
     }
 
     /// A round section of diameter d: J = pi d^4/32, I = pi d^4/64, Cowper's factor
@@ -375,5 +322,45 @@ mod tests {
         let second = PI / 64.0 * 0.4 * 0.1 * (0.16 + 0.01);
         let inertia = ellipse.at(Property::RotaryInertia, 0.0);
         close(inertia, 1.5 * second, 1e-14);
+    }
+
+    #[test]
+    fn hollow_sections_are_read_refused_and_written() {
+        let text = |section: &str| {
+            format!(
+                "name = 'tube'\nleaf = {{ rods = 2, length = 1, fan = 'symmetric' }}\nsection = {{ {section}, young = 1 }}"
+            )
+        };
+        let table = r#"
+            shape = 'circle', diameter = [0.1, 0.2], wall = 0.06 => section.wall = 0.06: must be at most half of the section's smaller side
+            shape = 'rectangle', width = 0.4, thickness = { at = [0, 0.5, 1], value = [0.1, 0.05, 0.1] }, wall = 0.03 => at most half of
+            shape = 'ellipse', width = 0.4, thickness = 0.1, inner_diameter = 0.05 => belongs to a circle: give section.wall
+            shape = 'circle', diameter = 0.1, inner_diameter = [0.05, 0.1] => section.inner_diameter, entry 2 = 0.1: must be less
+            shape = 'circle', diameter = 0.1, wall = 0 => must be greater than 0
+        "#;
+        for (section, said) in pairs(table) {
+            let refused = Scenario::from_toml(&text(section)).unwrap_err().to_string();
+            assert!(refused.contains(said), "{section}: {refused}");
+        }
+        // A bore and its wall are the same tube, and a bore of nothing none.
+        let of = |section: &str| Scenario::from_toml(&text(section)).unwrap();
+        let bore = of("shape = 'circle', diameter = 0.5, inner_diameter = 0.25, mass_density = 1");
+        let wall = of("shape = 'circle', diameter = 0.5, wall = 0.125, mass_density = 1");
+        assert_eq!(bore, wall);
+        for leaf in [&bore, &wall] {
+            let again = Scenario::from_toml(&serde_json::to_string(leaf).unwrap());
+            assert_eq!(again.unwrap(), *leaf);
+        }
+        let full = of("shape = 'circle', diameter = 0.5, mass_density = 1");
+        let none = of("shape = 'circle', diameter = 0.5, inner_diameter = 0, mass_density = 1");
+        let stiffness = |leaf: &Scenario| {
+            let rod = &leaf.rods[0];
+            let all = rod.couple_stiffness.iter().chain(&rod.force_stiffness);
+            all.map(|it| it.at(0.0)).collect::<Vec<f64>>()
+        };
+        for (one, other) in stiffness(&full).into_iter().zip(stiffness(&none)) {
+            assert!((one / other - 1.0).abs() < 1e-13, "{one} {other}");
+        }
+        assert_eq!(full.dynamics.density[0], Profile::Constant(PI / 16.0));
     }
 }

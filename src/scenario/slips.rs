@@ -55,11 +55,14 @@ pub fn obstacle(scenario: &Scenario) -> Option<String> {
 
 /// A tip that is held farther from the base than a vein plausibly stretches.
 pub fn out_of_reach(scenario: &Scenario) -> Option<String> {
-    let away = DVec3::from_array(scenario.held_tip.as_ref()?.position).length();
-    let long = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
-    let all = scenario.rods.iter().map(long).enumerate();
-    let (j, length) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let stretch = away / length - 1.0;
+    let tip = DVec3::from_array(scenario.held_tip.as_ref()?.position);
+    let of = |rod: &Rod| {
+        let length = rod.length * rod.rest_stretch.integral(1.0);
+        let away = tip.distance(rod.base_position());
+        (away / length - 1.0, away, length)
+    };
+    let all = scenario.rods.iter().map(of).enumerate();
+    let (j, (stretch, away, length)) = all.min_by(|(_, a), (_, b)| b.0.total_cmp(&a.0))?;
     (stretch > STRETCHED).then(|| {
         format!(
             "tip.position is {} from the base, and vein {} is {} long: it would stretch by {:.0} %; check both numbers and their units",
@@ -77,13 +80,16 @@ fn four_digits(number: f64) -> f64 {
 
 /// Base angles of more than a right angle: a vein that grows backwards.
 fn in_degrees(scenario: &Scenario) -> Option<String> {
-    let angle = scenario.rods.iter().map(|rod| rod.angle);
-    let angle = angle.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    (angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED)).then(|| {
-        format!(
-            "leaf.fan is in radians, and {angle} is {}",
-            turned_by(angle)
-        )
+    type Angle = fn(&Rod) -> f64;
+    let kinds: [(&str, Angle); 2] = [
+        ("leaf.fan", |rod| rod.angle),
+        ("leaf.elevation", |rod| rod.elevation),
+    ];
+    kinds.into_iter().find_map(|(key, of)| {
+        let angles = scenario.rods.iter().map(of);
+        let angle = angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let turned = angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED);
+        turned.then(|| format!("{key} is in radians, and {angle} is {}", turned_by(angle)))
     })
 }
 
@@ -127,7 +133,9 @@ fn thicker_than_long(scenario: &Scenario) -> Option<String> {
 
 /// A weight that is not that of the mass, if both are given, in seconds.
 fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
-    let weight = DVec3::from_array(scenario.gravity).length();
+    let even = (0..scenario.rods.len()).map(|vein| scenario.weight(vein).even);
+    let weight = even.map(|even| DVec3::from_array(even).length());
+    let weight = weight.fold(0.0, f64::max);
     let given = scenario.dynamics.density != Dynamics::default_for(&scenario.rods).density;
     let unit = scenario.units.length.as_deref();
     let known = ACCELERATIONS.iter().find(|(name, _)| Some(*name) == unit);
@@ -155,10 +163,13 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     if scenario.held_tip.is_some() {
         return None;
     }
-    let weight = DVec3::from_array(scenario.gravity).length();
+    let weights = (0..scenario.rods.len()).map(|vein| scenario.weight(vein).at(0.5));
+    let weights = weights.map(|weight| DVec3::from_array(weight).length());
+    let weight = weights.fold(0.0, f64::max);
     // 9.81 times a power of ten, for other units of length.
     let digits = weight / 10_f64.powf((weight / ACCELERATION).log10().round());
-    let slip = (digits / ACCELERATION - 1.0).abs() < ROUNDED;
+    let of_mass = scenario.g != [0.0; 3];
+    let slip = !of_mass && (digits / ACCELERATION - 1.0).abs() < ROUNDED;
     // A blade's edge may carry what its face does not: only the mistake is sought by their mean.
     let stiffness = |rod: &Rod| {
         let [face, edge] = [1, 2].map(|axis| rod.couple_stiffness[axis].at(0.0));
@@ -180,6 +191,9 @@ fn too_long(scenario: &Scenario) -> Option<String> {
     let advice = match slip {
         true => {
             "load.gravity is a force per length, mass per length times 9.81, not the acceleration"
+        }
+        false if of_mass => {
+            "load.g is an acceleration: check it, the mass, the stiffnesses and the units"
         }
         false => "load.gravity is a force per length: check it, the stiffnesses and the units",
     };

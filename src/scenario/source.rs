@@ -9,8 +9,10 @@ use toml::{Spanned, Table, Value};
 
 use super::error::{Place, Result, ScenarioError};
 use super::excerpt::{line_of, shorten, snippet};
-use super::key::{Key, Range as Allowed};
+use super::form::Range as Allowed;
+use super::key::{Key, split};
 use super::part::Part;
+use super::spelling::brackets;
 
 /// Where the entries of a scenario are from.
 #[derive(Clone, Debug, Default)]
@@ -58,14 +60,24 @@ impl Source {
         Ok((source, table))
     }
 
-    /// The places of a key, and of its value or a part of that.
-    pub fn find(&self, (table, name): (&str, &str), part: Option<Part>) -> Option<Spans> {
+    /// The places of a key, and of its value or a part of that; in one of its tables if there are
+    /// several.
+    pub fn find(
+        &self,
+        (table, name): (&str, &str),
+        row: usize,
+        part: Option<Part>,
+    ) -> Option<Spans> {
         let document = self.has_lines.then(|| DeTable::parse(&self.text).ok());
         let document = document??.into_inner();
-        let entries = match table {
-            "" => &document,
-            _ => document.get(table)?.get_ref().as_table()?,
-        };
+        let mut entries = &document;
+        for inner in table.split('.').filter(|inner| !inner.is_empty()) {
+            let inner = entries.get(inner)?.get_ref();
+            entries = match inner.as_array() {
+                Some(tables) => tables.get(row)?.get_ref().as_table()?,
+                None => inner.as_table()?,
+            };
+        }
         let (key, value) = entries.get_key_value(name)?;
         Some(Spans {
             key: key.span(),
@@ -96,19 +108,24 @@ impl Source {
     }
 
     /// The error about a key that is none of the format, with its line.
-    pub fn refuse_key(&self, parts: (&str, &str), problem: String) -> ScenarioError {
-        let span = self.find(parts, None).map(|spans| spans.key);
+    pub fn refuse_key(&self, parts: (&str, &str), row: usize, problem: String) -> ScenarioError {
+        let span = self.find(parts, row, None).map(|spans| spans.key);
         let line = span.clone().map(|span| snippet(&self.text, span));
         self.refuse(span, problem + &line.unwrap_or_default())
     }
 
-    /// The error about a value in place of a table.
+    /// The error about a value in place of a table, or of several.
     pub fn refuse_value(&self, table: &str, value: &Value) -> ScenarioError {
-        let spans = self.find(("", table), None);
+        let spans = self.find(split(table), 0, None);
         let found = self.shown(spans.as_ref(), value);
         let allowed = Key::allowed_in(table).join(", ");
+        let (open, close) = brackets(table);
+        let kind = match open.len() {
+            1 => "a table",
+            _ => "one table or several",
+        };
         let problem = format!(
-            "{table} = {found}: must be a table: write [{table}] on a line of its own, below it {allowed}"
+            "{table} = {found}: must be {kind}: write {open}{table}{close} on a line of its own, below it {allowed}"
         );
         self.refuse(spans.map(|spans| spans.key), problem)
     }

@@ -106,7 +106,11 @@ pub(super) fn held(entries: &Entries, rods: &[Rod], joined: bool) -> Result<Opti
 
 /// Refuses positions that the rods cannot reach.
 fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<()> {
-    let distance = x.hypot(y).hypot(z);
+    let distance_from = |rod: &Rod| {
+        let [from_x, from_y, from_z] = rod.base;
+        (x - from_x).hypot(y - from_y).hypot(z - from_z)
+    };
+    let distance = rods.iter().map(distance_from).fold(0.0, f64::max);
     let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
     let most = FARTHEST * rods.iter().map(reach).fold(longest(rods), f64::max);
     at.ensure(
@@ -116,6 +120,7 @@ fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<()> {
         ),
     )?;
     for (index, rod) in rods.iter().enumerate() {
+        let distance = distance_from(rod);
         at.ensure(
             !rod.force_stiffness[0].min().is_infinite() || distance < reach(rod),
             format_args!(

@@ -14,7 +14,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::limit::Limit;
-use crate::scenario::{Profile, Rod, Scenario, Turning, ascending, longest};
+use crate::scenario::{Profile, Scenario, Turning, longest};
 use crate::shooting::arcs;
 use crate::shooting::arcs::Arc;
 use crate::shooting::state::{RodState, STATE};
@@ -157,7 +157,7 @@ impl<'a> Equations<'a> {
             softest,
             turnings: scenario.turnings(),
             arcs: arcs::arcs(scenario, &lengths),
-            kinks: kinks(scenario),
+            kinks: scenario.kinks(),
             lengths,
             part: 1.0,
             softened: 1.0,
@@ -207,7 +207,7 @@ impl<'a> Equations<'a> {
     pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
         RodState {
             r: DVec3::ZERO,
-            q: DQuat::from_rotation_z(self.scenario.rods[j].angle),
+            q: self.scenario.rods[j].base_rotation(),
             n,
             m,
         }
@@ -365,11 +365,6 @@ impl<'a> Equations<'a> {
             .sum();
         -self.part * work
     }
-}
-
-fn kinks(scenario: &Scenario) -> Vec<f64> {
-    let profiles = scenario.rods.iter().flat_map(Rod::profiles);
-    ascending(profiles.flat_map(Profile::kinks).copied())
 }
 
 /// The matrix \[a\] with \[a\] b = a x b.

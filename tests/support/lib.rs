@@ -23,7 +23,7 @@ pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
 pub use leafdyn::relax::{Equilibrium, Limit, Method, NodeState, Options, Outcome, RodShape};
-use leafdyn::scenario::{Dynamics, Radii, Rod, Units};
+use leafdyn::scenario::{Dynamics, Hold, Radii, Rod, Units};
 pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::Base;
@@ -257,7 +257,9 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
     let veins: Vec<_> = (1..=rods)
         .map(|n| Rod {
             length: 1.0,
+            base: [0.0; 3],
             angle: angle(n),
+            elevation: 0.0,
             couple_stiffness: constant(couple),
             force_stiffness: constant(force),
             rest_curvature: constant([0.0; 3]),
@@ -271,12 +273,20 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
         radii: Radii::default(),
+        base_held: Hold::Clamped,
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
+        tissue: None,
         gravity,
+        own_gravity: Vec::new(),
+        g: [0.0; 3],
+        distributed: None,
+        points: Vec::new(),
         tip_force: [0.0; 3],
         tip_moment: [0.0; 3],
         held_tip: None,
+        grips: Vec::new(),
+        wind: None,
         tolerance: 1e-6,
     }
 }

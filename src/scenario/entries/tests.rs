@@ -65,7 +65,9 @@ fn slips_are_explained() {
         load.gravity[z]=1 => an index is a whole number from 0
         load.gravity[1=1 => an index is a whole number from 0
         load.gravity[1]x=1 => an index is a whole number from 0
-        load.gravity[1][1]=1 => is no list in the scenario
+        coupling.y[1][1]=1 => is no list in the scenario
+        load.gravity[1][3]=1 => x, y, z have the indices 0, 1, 2
+        load.gravity[3][1]=1 => there are 3 entries
         load.gravity[1][1][1]=1 => an index is a whole number from 0
         leaf.rods[0]=1 => leave the index out
         scale:leaf.rods=2 => no numbers that could be scaled

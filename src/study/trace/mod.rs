@@ -75,7 +75,11 @@ impl TraceRequest {
                 Target::Entry(part) => match part.key {
                     Key::TipMoment => NO_MOMENT,
                     Key::Tolerance => "changes no leaf",
-                    key if key.path().starts_with("dynamics.") => {
+                    Key::Density if self.base.scenario().g != [0.0; 3] => continue,
+                    key if ["dynamics.", "wind."]
+                        .iter()
+                        .any(|it| key.path().starts_with(it)) =>
+                    {
                         "changes a motion, but no equilibrium"
                     }
                     _ => continue,

@@ -168,7 +168,7 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     let [
         Target::Entry(Part {
             key: Key::TipForce | Key::TipPosition,
-            indices: [Some(axis), None],
+            indices: [Some(axis), None, ..],
             scale: false,
             ..
         }),

@@ -165,9 +165,9 @@ impl Base {
             if part.key.form() == Form::Whole {
                 return refuse("is a whole number, and cannot change by a little");
             }
-            if part.list == Some("at") {
+            if part.is_place() {
                 return refuse(
-                    "where knots are cannot change by a little: the grids have nodes there",
+                    "where knots and points are cannot change by a little: the grids have nodes there",
                 );
             }
             if self.entries.value_at(part).is_none() {

@@ -1,0 +1,148 @@
+//! Weight, and loads on points and along veins.
+
+use super::entries::Entries;
+use super::error::Result;
+use super::item::Item;
+use super::key::Key;
+use super::{Profile, Scenario};
+
+/// A dead load on a point of a vein.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLoad {
+    /// The vein, counted from 0.
+    pub vein: usize,
+    /// Where, as a fraction of its length in (0, 1].
+    pub at: f64,
+    /// The force, besides the weight of the mass.
+    pub force: [f64; 3],
+    /// The moment about the lab axes; zero unless the leaf is a single rod.
+    pub moment: [f64; 3],
+    /// The mass, which [`Scenario::g`] pulls; not negative.
+    pub mass: f64,
+}
+
+/// The weight of a vein per reference length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight<'s> {
+    /// The part that is the same all along the vein.
+    pub even: [f64; 3],
+    /// The acceleration of gravity, and the mass per length that it pulls, if any.
+    pub of_mass: Option<([f64; 3], &'s Profile)>,
+}
+
+impl Weight<'_> {
+    /// The weight per length at a fraction of the length.
+    pub fn at(&self, sigma: f64) -> [f64; 3] {
+        let Some((g, mass)) = self.of_mass else {
+            return self.even;
+        };
+        let mass = mass.at(sigma);
+        [0, 1, 2].map(|axis| self.even[axis] + mass * g[axis])
+    }
+}
+
+impl Scenario {
+    /// The weight of a vein per reference length.
+    pub fn weight(&self, vein: usize) -> Weight<'_> {
+        let own = self.own_gravity.get(vein).copied().unwrap_or([0.0; 3]);
+        let pulls = self.g != [0.0; 3];
+        Weight {
+            even: [0, 1, 2].map(|axis| self.gravity[axis] + own[axis]),
+            of_mass: pulls.then(|| (self.g, &self.dynamics.density[vein])),
+        }
+    }
+
+    /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
+    pub fn is_loaded_in_plane(&self) -> bool {
+        let flat = |load: [f64; 3]| load[2] == 0.0;
+        let even = |vein: usize| flat(self.weight(vein).even);
+        let point = |load: &PointLoad| flat(load.force) && load.moment == [0.0; 3];
+        self.rods
+            .iter()
+            .all(|rod| flat(rod.base) && rod.elevation == 0.0)
+            && (0..self.rods.len()).all(even)
+            && flat(self.g)
+            && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
+            && self.points.iter().all(point)
+            && self.grips.iter().all(|grip| flat(grip.displacement))
+            && flat(self.tip_force)
+            && self.tip_moment == [0.0; 3]
+    }
+
+    /// The force on a point: what is given, and the weight of its mass.
+    pub fn force_on(&self, point: &PointLoad) -> [f64; 3] {
+        [0, 1, 2].map(|axis| point.force[axis] + point.mass * self.g[axis])
+    }
+}
+
+/// Reads `load.gravity`: the weight that all rods share, and their own besides; empty if these do
+/// not differ.
+pub(super) fn gravity(entries: &Entries, rods: usize) -> Result<([f64; 3], Vec<[f64; 3]>)> {
+    let item = entries.item(Key::Gravity)?;
+    let each = item.vectors(rods)?;
+    let first = each.first().copied().unwrap_or([0.0; 3]);
+    if each.iter().all(|own| *own == first) {
+        return Ok((first, Vec::new()));
+    }
+    item.ensure(
+        !entries.is_given(Key::GravityInTime),
+        "dynamics.gravity, one vector for all rods, would replace these: leave one of them out",
+    )?;
+    Ok(([0.0; 3], each))
+}
+
+/// Reads `load.g`, which needs a mass.
+pub(super) fn g(entries: &Entries) -> Result<[f64; 3]> {
+    let item = entries.item(Key::G)?;
+    let g = item.vector()?;
+    let has_mass = entries.is_given(Key::Density) || entries.is_given(Key::MassDensity);
+    item.ensure(
+        has_mass || g == [0.0; 3],
+        "is an acceleration and needs the mass that it pulls: give dynamics.density, or \
+         mass_density in [section]; a force per length is load.gravity",
+    )?;
+    Ok(g)
+}
+
+/// Reads `load.distributed`; `None` if it is left out or zero.
+pub(super) fn distributed(entries: &Entries, rods: usize) -> Result<Option<Vec<[Profile; 3]>>> {
+    let Some(item) = entries.given(Key::Distributed) else {
+        return Ok(None);
+    };
+    let loads = item.vector_profiles(rods)?;
+    let some = loads.iter().flatten().any(|load| load.max_abs() > 0.0);
+    Ok(some.then_some(loads))
+}
+
+/// Reads `[[load.point]]`.
+pub(super) fn points(entries: &Entries, rods: usize) -> Result<Vec<PointLoad>> {
+    let count = entries.rows("load.point").unwrap_or(0);
+    (0..count).map(|row| point(entries, row, rods)).collect()
+}
+
+fn point(entries: &Entries, row: usize, rods: usize) -> Result<PointLoad> {
+    let item = |key| entries.item_of(key, row);
+    let turned = item(Key::PointMoment)?;
+    let moment = turned.vector()?;
+    on_one_rod(turned, rods, &[moment])?;
+    Ok(PointLoad {
+        vein: item(Key::PointVein)?.whole(rods)? - 1,
+        at: item(Key::PointAt)?.fraction()?,
+        force: item(Key::PointForce)?.vector()?,
+        moment,
+        mass: item(Key::PointMass)?.number()?,
+    })
+}
+
+/// Refuses moments on more than one rod.
+pub(super) fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> Result<()> {
+    let allowed = rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]);
+    let (what, why) = match item.key() {
+        Key::PointMoment => ("on a point", "a dead moment has no potential"),
+        _ => ("at the tip", "joined tips pass on no moment"),
+    };
+    item.ensure(
+        allowed,
+        format_args!("a moment {what} needs leaf.rods = 1 (here {rods}): {why}"),
+    )
+}
