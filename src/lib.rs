@@ -97,6 +97,7 @@
 #![warn(missing_docs)]
 
 mod branch;
+mod homotopy;
 mod lanes;
 pub mod largest;
 mod leaf;

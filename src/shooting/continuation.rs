@@ -1,6 +1,7 @@
 //! A boundary-value solution without a given start: by continuation from the leaf
 //! that rests in arcs, whose solution is known, to the scenario's.
 
+use crate::homotopy::Homotopy;
 use crate::shape::equally_spaced;
 use crate::shooting::equations::Equations;
 use crate::shooting::newton::Newton;
@@ -11,7 +12,7 @@ use crate::shooting::trajectory::Trajectory;
 const ROUGH: f64 = 1e-6;
 
 /// Smallest step, as a part of the whole change.
-const LEAST_STEP: f64 = 1e-4;
+const LEAST_STEP: f64 = 1.0 / 16384.0;
 
 /// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
 const BUDGET: usize = 4_000_000;
@@ -104,33 +105,31 @@ impl Attempt<'_, '_, '_> {
         stage: Stage,
         mut near: Trajectory,
     ) -> Result<Trajectory, Interrupted> {
-        let (mut part, mut step) = (0.0, 1.0);
+        let mut path = Homotopy::new(1.0, [LEAST_STEP, 1.0]);
         let mut before: Option<(Trajectory, f64)> = None;
         let (begun, rods) = (self.log.work.slopes, self.equations.rods());
-        while part < 1.0 {
+        while path.part < 1.0 {
+            let part = path.part;
             self.log.part = part;
-            let next = if step >= 1.0 - part { 1.0 } else { part + step };
-            *stage(self.equations) = next;
+            *stage(self.equations) = path.next();
             let predicted = match &before {
                 Some((earlier, at)) => {
-                    near.beyond(self.equations, earlier, (next - part) / (part - at))
+                    near.beyond(self.equations, earlier, path.length() / (part - at))
                 }
                 None => near.clone(),
             };
-            let found = self.solve_near(&predicted);
-            let spent = (self.log.work.slopes - begun) * rods;
-            match found {
+            match self.solve_near(&predicted) {
                 Ok(trajectory) => {
                     before = Some((std::mem::replace(&mut near, trajectory), part));
-                    part = next;
-                    step *= 2.0;
+                    path.advance(2.0 * path.length());
                 }
-                Err(reason)
-                    if reason == Reason::OutOfTime || step <= LEAST_STEP || spent >= BUDGET =>
-                {
-                    return Err(Interrupted { reason, part, near });
+                Err(reason) => {
+                    let spent = (self.log.work.slopes - begun) * rods;
+                    let ends = reason == Reason::OutOfTime || spent >= BUDGET;
+                    if ends || !path.shorten(0.5) {
+                        return Err(Interrupted { reason, part, near });
+                    }
                 }
-                Err(_) => step *= 0.5,
             }
         }
         self.log.part = 1.0;

@@ -1,6 +1,7 @@
 //! The walk along the path of equilibria: a predictor through the last states, Newton's method
 //! as corrector, and the Morse index watched.
 
+use crate::homotopy::Homotopy;
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::limit::Limit;
 use crate::newton::{Definite, Equations, Newton, Stop, Work};
@@ -127,36 +128,26 @@ impl<'w> Walk<'w> {
     }
 
     fn walk_stage(&mut self) -> Result<(), Stop> {
-        let mut step = FIRST_STEP;
+        let mut path = Homotopy::new(FIRST_STEP, [SHORTEST_STEP, LONGEST_STEP]);
         while self.part < 1.0 {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 return Err(Stop::StepLimit);
             }
-            let at = self.part;
-            let part = match at + step {
-                part if part < 1.0 - 0.5 * SHORTEST_STEP => part,
-                _ => 1.0,
-            };
-            // A last step may be longer by a half.
-            let shortest = step <= 1.01 * SHORTEST_STEP;
-            match self.step_to(part, shortest) {
+            let part = path.next();
+            match self.step_to(part, path.is_shortest()) {
                 Step::Stable(drift) => {
                     self.accept(part);
-                    let factor = (WANTED_DRIFT / drift).sqrt().min(GROWTH);
-                    step = ((part - at) * factor).clamp(SHORTEST_STEP, LONGEST_STEP);
+                    path.advance(path.length() * (WANTED_DRIFT / drift).sqrt().min(GROWTH));
                     continue;
                 }
                 Step::Lost(Stop::Unresolved) => return Err(Stop::Unresolved),
-                Step::Unstable | Step::Lost(_) if !shortest => {
-                    step = (SHORTENED * (part - at)).max(SHORTEST_STEP);
-                    continue;
-                }
+                Step::Unstable | Step::Lost(_) if path.shorten(SHORTENED) => continue,
                 Step::Unstable => self.turn_aside(part)?,
                 Step::Lost(_) => self.snap(part)?,
             }
             self.known.clear();
             self.accept(part);
-            step = FIRST_STEP;
+            path.advance(FIRST_STEP);
         }
         Ok(())
     }

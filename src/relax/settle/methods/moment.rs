@@ -12,6 +12,7 @@
 //!
 //! Where the path ends at a fold, the moment is applied before the other loads, or after them.
 
+use crate::homotopy::Homotopy;
 use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::{Equations, Newton, Stop};
@@ -113,16 +114,17 @@ fn load(
     system: &mut System,
     rod: &mut Relaxation,
     order: Order,
-    (mut step, mut steps): (f64, usize),
+    (step, mut steps): (f64, usize),
 ) -> Result<f64, Stop> {
     let loads = leaf.loads;
-    let (mut reached, mut before) = (0.0, rod.state.clone());
+    let mut path = Homotopy::new(step, [SMALLEST_STEP, 1.0]);
+    let mut before = rod.state.clone();
     let end = loop {
         if steps == 0 || rod.limit.reached() {
             break Err(Stop::StepLimit);
         }
         steps -= 1;
-        let part: f64 = (reached + step).min(1.0);
+        let part = path.next();
         let [moment, others] = order(part).map(|part| part.clamp(0.0, 1.0));
         leaf.loads.tip_moment = moment * loads.tip_moment;
         leaf.loads.gravity = others * loads.gravity;
@@ -134,14 +136,13 @@ fn load(
         match newton(leaf, system, rod, wanted) {
             Ok(remaining) if part == 1.0 => break Ok(remaining),
             Ok(_) => {
-                reached = part;
+                path.advance(path.length());
                 before.clone_from(&rod.state);
             }
             Err(stop) => {
                 rod.state.clone_from(&before);
-                step /= 2.0;
                 let mut coarse = || leaf.assemble(&before, system).turn > COARSE;
-                if step < SMALLEST_STEP || stop == Stop::Unresolved && coarse() {
+                if !path.shorten(0.5) || stop == Stop::Unresolved && coarse() {
                     break Err(match coarse() {
                         true => Stop::Unresolved,
                         false => Stop::Stuck,
