@@ -105,6 +105,7 @@ mod limit;
 pub mod memory;
 mod modes;
 mod motion;
+mod natural;
 mod newton;
 pub mod numbers;
 mod refusal;

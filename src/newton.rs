@@ -122,7 +122,7 @@ impl Definite {
         work: &mut Work,
     ) -> Result<(), Unsolved> {
         work.factorizations += 1;
-        if self.direct.is_none() {
+        if self.direct.is_none() && !system.tied() {
             if !system.factorize(shift) {
                 return Err(Unsolved::Indefinite);
             }

@@ -2,6 +2,7 @@
 
 use super::state::State;
 use crate::rod::Section;
+use crate::rotation;
 use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, Turning, ascending};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -58,6 +59,8 @@ pub struct Loads {
     pub tip_force: DVec3,
     /// Moment on the tip of a single rod.
     pub tip_moment: DVec3,
+    /// Part of the loads that veins have of their own: zero without any.
+    pub own: f64,
 }
 
 impl std::ops::Sub for Loads {
@@ -68,6 +71,7 @@ impl std::ops::Sub for Loads {
             gravity: self.gravity - other.gravity,
             tip_force: self.tip_force - other.tip_force,
             tip_moment: self.tip_moment - other.tip_moment,
+            own: self.own - other.own,
         }
     }
 }
@@ -80,6 +84,7 @@ impl std::ops::Mul<f64> for Loads {
             gravity: self.gravity * factor,
             tip_force: self.tip_force * factor,
             tip_moment: self.tip_moment * factor,
+            own: self.own * factor,
         }
     }
 }
@@ -105,13 +110,14 @@ impl Leaf {
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
-        Leaf {
+        let mut leaf = Leaf {
             mirrored: false,
             scale,
             loads: Loads {
                 gravity: vector(scenario.gravity, scale.force() / scale.length),
                 tip_force: vector(scenario.tip_force, scale.force()),
                 tip_moment: vector(scenario.tip_moment, scale.moment()),
+                own: 0.0,
             },
             held: scenario.held_tip.as_ref().map(|held| Held {
                 position: vector(held.position, scale.length),
@@ -121,7 +127,13 @@ impl Leaf {
             kinks,
             softest: softest / scale.stiffness,
             scenario,
-        }
+        };
+        leaf.loads.own = if leaf.scenario.has_own_loads() {
+            1.0
+        } else {
+            0.0
+        };
+        leaf
     }
 
     /// The scenario it was made from.
@@ -205,9 +217,15 @@ impl Leaf {
         self.length(j) * self.rod(j).rest_stretch.integral(sigma)
     }
 
-    /// Base rotation of rod `j` (paper, section 2.4 (c)).
-    pub fn base(&self, j: usize) -> DQuat {
-        self.rod(j).base_rotation()
+    /// Position and rotation of the base of rod `j` (paper, section 2.4 (a) and (c)).
+    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+        let (rod, length) = (self.rod(j), self.scale.length);
+        let fan = rotation::exp(rod.angle * DVec3::Z);
+        let rotation = match rod.elevation == 0.0 {
+            true => fan,
+            false => fan * DQuat::from_rotation_y(-rod.elevation),
+        };
+        (rod.base_position() / length, rotation)
     }
 
     /// Whether sections are the same all along each rod.
@@ -243,6 +261,33 @@ impl Leaf {
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
         DVec3::from_array(self.scenario.coupling[g]) * gap_length * self.scale.length.powi(2)
             / self.scale.force()
+    }
+
+    /// Whether the tip, or a part of a rod, is held by something that is moved to its place.
+    pub fn is_held(&self) -> bool {
+        self.held.is_some() || !self.scenario.grips.is_empty()
+    }
+
+    /// Whether all rods begin in the origin, in the plane z = 0.
+    pub fn is_fan(&self) -> bool {
+        let in_plane = |rod: &Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;
+        self.scenario.rods.iter().all(in_plane)
+    }
+
+    /// Whether tissue ties the rods.
+    pub fn has_tissue(&self) -> bool {
+        self.scenario.tissue.is_some()
+    }
+
+    /// Stiffness k of the tissue in gap `g` per displacement, and c_1 (in the first component) per
+    /// radian, both per unit of sigma.
+    pub fn tissue(&self, g: usize) -> [DVec3; 2] {
+        let Some(tissue) = &self.scenario.tissue else {
+            return [DVec3::ZERO; 2];
+        };
+        let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
+        let k = DVec3::from_array(tissue[g].stiffness) * self.scale.length.powi(2);
+        [k, tissue[g].fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
     }
 
     fn rod(&self, j: usize) -> &Rod {

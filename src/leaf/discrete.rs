@@ -2,11 +2,14 @@
 
 use super::dimensionless::{Leaf, Loads};
 use super::grid::Grid;
+use super::holds::Gripped;
 use super::loads::{RodLoad, RodLoads, group_loads};
 use super::state::State;
+use super::tissue::NodeLoad;
 use crate::lanes::{GROUP, Vectors};
 use crate::largest::largest;
-use crate::rod::{Ends, Section, Segment};
+use crate::rod::{Section, Segment, Strip};
+use crate::rotation;
 use glam::DVec3;
 use pulp::Scalar;
 
@@ -27,6 +30,12 @@ pub struct DiscreteLeaf {
     /// Coupling of each gap, per unit of sigma; the last may be the one between
     /// a rod and its image.
     coupling: Vec<DVec3>,
+    /// Tissue of each gap at every node; empty if there is none.
+    pub(super) strips: Vec<Strip>,
+    /// Forces on all nodes by loads of their veins alone; empty if there are none.
+    pub(super) own_loads: Vec<DVec3>,
+    /// Nodes that grips hold.
+    pub(super) grips: Vec<Gripped>,
     /// Part of the loads that acts: one, except during continuation in the loads.
     pub load_factor: f64,
     /// The loads.
@@ -56,14 +65,46 @@ impl DiscreteLeaf {
     fn with_sections(leaf: &Leaf, grid: Grid, sections: Vec<Section>) -> Self {
         let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
-        DiscreteLeaf {
+        let mut discrete = DiscreteLeaf {
             leaf: leaf.clone(),
             grid,
             sections,
             coupling,
+            strips: Vec::new(),
+            own_loads: Vec::new(),
+            grips: Vec::new(),
             load_factor: 1.0,
             loads: leaf.loads,
+        };
+        discrete.own_loads = discrete.own_loads_of(leaf);
+        let gripped = !leaf.scenario().grips.is_empty();
+        if leaf.has_tissue() || gripped {
+            let natural = discrete.natural();
+            discrete.grips = discrete.gripped(&natural);
+            if leaf.has_tissue() {
+                discrete.strips = discrete.strips(&natural);
+            }
         }
+        discrete
+    }
+
+    /// The natural leaf, unstrained rods: v = v0, u = u0, each from its base.
+    pub fn natural(&self) -> State {
+        let (mut xs, mut qs) = (Vec::new(), Vec::new());
+        for j in 0..self.rods() {
+            let (mut x, mut q) = self.leaf.base(j);
+            xs.push(x);
+            qs.push(q);
+            for i in 0..self.segments() {
+                let section = self.section(j, i);
+                let next = (q * rotation::exp(section.rest_curvature * section.ds)).normalize();
+                x += section.ds * (rotation::midpoint(q, next) * section.rest_strain);
+                q = next;
+                xs.push(x);
+                qs.push(q);
+            }
+        }
+        State::new(self.segments(), xs, qs)
     }
 
     /// The smallest compliance of any segment, in units of L^2/A.
@@ -91,12 +132,10 @@ impl DiscreteLeaf {
         let (n, mut violation) = (self.segments(), 0.0_f64);
         for (j, i) in self.each(0..n) {
             let section = self.section(j, i);
-            let idle = self.segment(state, j, i, DVec3::ZERO);
-            let strain = idle.v(section) - section.rest_strain;
             let rigid = section.compliance.cmpeq(DVec3::ZERO);
-            let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
-            state.n[j * n + i] = idle.frame * force;
-            let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
+            let strained = self.strained_segment(state, j, i);
+            state.n[j * n + i] = strained.frame * strained.nu;
+            let off = DVec3::select(rigid, strained.gap, DVec3::ZERO);
             violation = largest([violation, off.x.abs(), off.y.abs(), off.z.abs()]);
         }
         violation
@@ -193,14 +232,6 @@ impl DiscreteLeaf {
         self.leaf.joined() && self.rods() > 1 && self.leaf.held.is_none()
     }
 
-    /// Whether node `i` of the rods may rotate, and be displaced; a held tip is constrained.
-    pub fn moves(&self, i: usize) -> [bool; 2] {
-        match &self.leaf.held {
-            Some(held) if i == self.segments() => [held.clamps.is_none(), false],
-            _ => [true, true],
-        }
-    }
-
     /// The force on the holder of a held tip, and the moments of the rods on a clamp.
     pub fn reaction(&self, state: &State) -> (DVec3, Vec<DVec3>) {
         let n = self.segments();
@@ -209,8 +240,9 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
             let (g_x, _, g_b) = segment.gradient(self.section(j, n - 1));
-            force += self.load(state, j, n).0 - g_x;
-            moments.push(-g_b);
+            let load = self.load(state, j, n);
+            force += load.force - g_x;
+            moments.push(load.moment - g_b);
         }
         (force, moments)
     }
@@ -225,12 +257,12 @@ impl DiscreteLeaf {
 
     /// Segment `i` of rod `j` in `state`, carrying the force `n`.
     pub fn segment(&self, state: &State, j: usize, i: usize, n: DVec3) -> Segment {
-        let k = state.base(j) + i;
-        let ends = Ends {
-            x: [state.x[k], state.x[k + 1]],
-            q: [state.q[k], state.q[k + 1]],
-        };
-        Segment::new(self.section(j, i), &ends, n)
+        Segment::new(self.section(j, i), &state.ends(j, i), n)
+    }
+
+    /// The same, carrying the force of its strains.
+    pub fn strained_segment(&self, state: &State, j: usize, i: usize) -> Segment {
+        Segment::strained(self.section(j, i), &state.ends(j, i))
     }
 
     /// Section of segment `i` of rod `j`.
@@ -272,12 +304,11 @@ impl DiscreteLeaf {
 
     /// Force on the tip of rod `j`: its share if the tips are one.
     pub fn tip_force(&self, j: usize) -> DVec3 {
-        self.rod_load(j).tip
+        self.rod_load(j).tip + self.force_on_points(j, 1.0)
     }
 
-    /// Dead load and coupling on node `i` of rod `j`, and its share of the
-    /// potential energy (a gap's belongs to its lower rod).
-    pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
+    /// Dead load, coupling and tissue on node `i` of rod `j`.
+    pub fn load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
         let (k, nodes) = (state.base(j) + i, self.segments() + 1);
         let x = |present: bool, k: usize| state.x[if present { k } else { state.base(j) + i }];
         let (first, last) = (j == 0, j + 1 == self.rods());
@@ -289,24 +320,29 @@ impl DiscreteLeaf {
         let load = RodLoads::of(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
         let weights = [self.grid.weight(i), self.coupling_weight(i)];
         let (force, energy) = load.at(x.map(Vectors::from), weights, i == self.segments());
-        (force.into(), energy.into())
+        let (tissue, own) = (self.tissue_load(state, j, i), self.own_load(j, i));
+        NodeLoad {
+            moment: tissue.moment,
+            force: DVec3::from(force) + tissue.force + own,
+            energy: f64::from(energy) + tissue.energy - own.dot(state.x[k]),
+        }
     }
 
     /// Potential energy of the dead loads in a state.
     pub fn potential(&self, state: &State) -> f64 {
         self.each(0..self.segments() + 1)
-            .map(|(j, i)| self.load(state, j, i).1 - self.coupling_energy(state, j, i))
+            .map(|(j, i)| self.load(state, j, i).energy - self.coupling_energy(state, j, i))
             .sum()
     }
 
-    /// Energy of the coupling of node `i` of rod `j` to the next rod.
+    /// Energy of the coupling and of the tissue between node `i` of rod `j` and the next rod.
     pub fn coupling_energy(&self, state: &State, j: usize, i: usize) -> f64 {
         if j + 1 == self.rods() {
             return 0.0;
         }
         let k = state.base(j) + i;
         let stretch = state.x[k + self.segments() + 1] - state.x[k];
-        0.5 * stretch.dot(self.spring(j, i) * stretch)
+        0.5 * stretch.dot(self.spring(j, i) * stretch) + self.tissue_load(state, j, i).energy
     }
 
     /// Puts on parts of the loads and of the coupling of the `whole` leaf.

@@ -5,7 +5,8 @@ use super::chain::lanes_of;
 use super::discrete::DiscreteLeaf;
 use super::loads::{GroupLoads, RodLoads, group_loads};
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, run, widest_arch};
-use crate::rod::{FIELDS, Fields, GroupFields, GroupLaws, laws};
+use crate::natural::Natural;
+use crate::rod::{Ends, FIELDS, Fields, GroupFields, GroupLaws, Strip, laws};
 use crate::tableau::{A, B, C, STAGES};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
@@ -30,14 +31,19 @@ pub struct Slice(Vec<GroupFields>);
 impl Slice {
     /// Rod `j`.
     pub fn rod(&self, j: usize) -> RodFields {
-        let number = |k: usize| self.0[j / GROUP][k].0[j % GROUP];
-        let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
-        RodFields {
-            x: vector(0),
-            q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
-            n: vector(7),
-            m: vector(10),
-        }
+        rod_of(&self.0, j)
+    }
+}
+
+/// The fields of rod `j`.
+fn rod_of(groups: &[GroupFields], j: usize) -> RodFields {
+    let number = |k: usize| groups[j / GROUP][k].0[j % GROUP];
+    let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+    RodFields {
+        x: vector(0),
+        q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
+        n: vector(7),
+        m: vector(10),
     }
 }
 
@@ -53,6 +59,8 @@ pub struct Flow<'a> {
     /// Constitutive laws at the present stage; constant if the rods are uniform.
     laws: Vec<GroupLaws>,
     uniform: bool,
+    /// Where tissue has no force, if there is any.
+    natural: Option<Natural<'a>>,
 }
 
 /// The fields of a Runge-Kutta stage.
@@ -89,6 +97,7 @@ impl<'a> Flow<'a> {
             slopes: vec![fields.clone(); STAGES],
             laws: Vec::with_capacity(groups),
             uniform: leaf.leaf.uniform(),
+            natural: leaf.tied().then(|| Natural::new(leaf.leaf.scenario())),
             fields,
         };
         flow.look_up_laws(0.0);
@@ -96,7 +105,8 @@ impl<'a> Flow<'a> {
     }
 
     /// Integrates all rods from the fields `begin` at sigma = `from` to `to` in equal steps,
-    /// one per slice of `after`, and writes the fields after every step.
+    /// one per slice of `after`, and writes the fields after every step. Where a load acts on a
+    /// point, the fields are those just before it, seen from the base.
     pub fn integrate(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
@@ -117,9 +127,16 @@ impl<'a> Flow<'a> {
                 group[13].0[lane] = 0.0;
             }
         }
-        let h = (to - from) / after.len() as f64;
+        let (h, last) = ((to - from) / after.len() as f64, after.len() - 1);
+        let points = !self.leaf.leaf.scenario().points.is_empty();
+        if points && h > 0.0 {
+            self.jump(from, -1.0);
+        }
         for (step, Slice(after)) in after.iter_mut().enumerate() {
             self.step(from + h * step as f64, h);
+            if points && h < 0.0 && step == last {
+                self.jump(to, 1.0);
+            }
             after.clone_from(&self.fields);
         }
     }
@@ -144,9 +161,78 @@ impl<'a> Flow<'a> {
                 out: &mut self.slopes[i],
             };
             run(self.arch, &mut kernel);
+            self.add_tissue(sigma + C[i] * h, i);
+            self.add_own_loads(sigma + C[i] * h, i);
         }
         self.combine(h, &B);
         std::mem::swap(&mut self.fields, &mut self.stage.fields);
+    }
+
+    /// Adds the forces and moments of the tissue to the slopes of a stage, at `sigma`.
+    fn add_tissue(&mut self, sigma: f64, stage: usize) {
+        let Some(natural) = &self.natural else {
+            return;
+        };
+        let (leaf, fields, slopes) = (&self.leaf.leaf, &self.stage.fields, &mut self.slopes[stage]);
+        let at_rest = |j: usize| {
+            let (x, q) = natural.at(j, sigma);
+            (x / leaf.scale.length, q)
+        };
+        let here = |j: usize| {
+            let RodFields { x, q, .. } = rod_of(fields, j);
+            (x, q)
+        };
+        let ends = |a: (DVec3, DQuat), b: (DVec3, DQuat)| Ends {
+            x: [a.0, b.0],
+            q: [a.1, b.1],
+        };
+        let mut left = (at_rest(0), here(0));
+        for g in 0..leaf.rods() - 1 {
+            let right = (at_rest(g + 1), here(g + 1));
+            let [stiffness, fold] = leaf.tissue(g);
+            let strip = Strip::natural(stiffness, fold.x, &ends(left.0, right.0));
+            let ends = ends(left.1, right.1);
+            slopes[g / GROUP][13].0[g % GROUP] += strip.energy(&ends);
+            for (j, [mut moment, mut force]) in [g, g + 1].into_iter().zip(strip.loads(&ends)) {
+                if leaf.in_plane(j) {
+                    // The image of its neighbour pulls it back into the plane.
+                    (moment.x, moment.z, force.y) = (0.0, 0.0, 0.0);
+                }
+                let (slopes, lane) = (&mut slopes[j / GROUP], j % GROUP);
+                for c in 0..3 {
+                    slopes[7 + c].0[lane] -= force[c];
+                    slopes[10 + c].0[lane] -= moment[c];
+                }
+            }
+            left = right;
+        }
+    }
+
+    /// Adds the loads that veins have of their own to the slopes of a stage, at `sigma`.
+    fn add_own_loads(&mut self, sigma: f64, stage: usize) {
+        if self.leaf.loads.own == 0.0 {
+            return;
+        }
+        for j in 0..self.leaf.rods() {
+            let force = self.leaf.own_part() * self.leaf.leaf.own_load(j, sigma);
+            let slopes = &mut self.slopes[stage][j / GROUP];
+            for c in 0..3 {
+                slopes[7 + c].0[j % GROUP] -= force[c];
+            }
+            let x = rod_of(&self.stage.fields, j).x;
+            slopes[13].0[j % GROUP] -= force.dot(x);
+        }
+    }
+
+    /// Adds `sign` times the forces on points at `sigma` to the forces of the fields.
+    fn jump(&mut self, sigma: f64, sign: f64) {
+        for j in 0..self.leaf.rods() {
+            let force = sign * self.leaf.force_on_points(j, sigma);
+            let fields = &mut self.fields[j / GROUP];
+            for c in 0..3 {
+                fields[7 + c].0[j % GROUP] += force[c];
+            }
+        }
     }
 
     /// Sets the stage to the fields plus h times the weighted sum of slopes.

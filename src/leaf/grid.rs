@@ -101,6 +101,19 @@ impl Grid {
         &self.sigma
     }
 
+    /// The node nearest to a fraction of the length.
+    pub fn nearest(&self, sigma: f64) -> usize {
+        let after = self
+            .sigma
+            .partition_point(|at| *at < sigma)
+            .min(self.segments());
+        let before = after.saturating_sub(1);
+        match sigma - self.sigma[before] < self.sigma[after] - sigma {
+            true => before,
+            false => after,
+        }
+    }
+
     /// Midpoint of segment `i`.
     pub fn middle(&self, i: usize) -> f64 {
         0.5 * (self.sigma[i] + self.sigma[i + 1])

@@ -1,6 +1,7 @@
 //! Positions, rotations and segment forces of all nodes of a leaf.
 
 use crate::largest::{larger, largest};
+use crate::rod::Ends;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 
@@ -91,6 +92,15 @@ impl State {
         for j in 0..rods {
             let tip = self.base(j) + self.segments;
             self.x[tip] = mean;
+        }
+    }
+
+    /// The nodes of segment `i` of rod `j`.
+    pub fn ends(&self, j: usize, i: usize) -> Ends {
+        let k = self.base(j) + i;
+        Ends {
+            x: [self.x[k], self.x[k + 1]],
+            q: [self.q[k], self.q[k + 1]],
         }
     }
 

@@ -73,15 +73,19 @@ impl DiscreteLeaf {
     /// (towards -e3), so that of a circle of equilibria it is always the same one, on all grids.
     pub fn lean_down(&self, state: &mut State) {
         let n = self.segments();
-        let [turns, shifts] = self.moves(n);
+        let [turns, shifts] = self.moves(0, n);
         for Turning { rods, axis } in self.turnings() {
             let moment = |j: usize| {
                 let segment = self.segment(state, j, 0, state.n[j * n]);
                 -segment.gradient(self.section(j, 0)).1
             };
             let moment: DVec3 = rods.clone().map(moment).sum();
-            // Down is normal to the axis, as the base is in the e1-e2 plane.
-            let angle = angle_about(*axis, moment, axis.cross(-DVec3::Z));
+            // Down, or for a vertical axis e1, normal to the axis.
+            let down = match axis.z.abs() > 0.99 {
+                true => DVec3::X,
+                false => -DVec3::Z,
+            };
+            let angle = angle_about(*axis, moment, axis.cross(down));
             let (turn, back) = (
                 DQuat::from_axis_angle(*axis, angle),
                 DQuat::from_rotation_x(-angle),

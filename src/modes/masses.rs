@@ -31,7 +31,7 @@ impl Masses {
             let inertia = physics.inertia(leaf, j, i);
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
             // Fixed components have no mass.
-            let [turns, shifts] = leaf.moves(i);
+            let [turns, shifts] = leaf.moves(j, i);
             Node {
                 index: (j, i),
                 unknowns: pattern.unknowns(j, i),

@@ -189,13 +189,13 @@ impl Vibration<'_> {
     }
 
     /// K - shift M, factorised.
-    fn factorize(&self, system: &mut System, shift: f64) -> Option<Factors<'_>> {
+    fn factorize(&self, system: &mut System, shift: f64) -> Option<Factors> {
         self.assemble(system, shift);
         self.pattern.factorize(system, 0.0).ok()
     }
 
     /// A shift below all eigenvalues that are wanted, as close to them as necessary.
-    fn below_all(&self, system: &mut System) -> Option<(f64, Factors<'_>)> {
+    fn below_all(&self, system: &mut System) -> Option<(f64, Factors)> {
         let (others, mut shift, next) = match self.wanted.above {
             Some((others, shift)) => (others, shift, NEXT_BELOW),
             None => (0, -self.leaf.neutral_shift(), NEXT_SHIFT),
@@ -307,7 +307,7 @@ impl Vibration<'_> {
         shift: f64,
         bound: Bound,
         found: usize,
-    ) -> Option<Option<(f64, Factors<'_>)>> {
+    ) -> Option<Option<(f64, Factors)>> {
         let mut part = FIRST_PART.max(OF_ERROR * bound.error);
         while part < 1.0 {
             let closer = bound.eigenvalue - part * (bound.eigenvalue - shift);

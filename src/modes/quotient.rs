@@ -45,7 +45,7 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.spring(j, i) * (b - a));
     }
-    sum
+    sum + leaf.tissue_curvature(state, shape)
 }
 
 /// The contribution of second derivatives with respect to rotations, at constant force.

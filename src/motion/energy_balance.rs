@@ -36,19 +36,14 @@ pub fn measure(
         let turning = angular.length_squared() + inertia.excess * spin * spin;
         energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
         energy.kinetic += 0.5 * inertia.transverse * turning;
-        let (_, potential) = leaf.load(state, j, i);
+        let potential = leaf.load(state, j, i).energy;
         let stretch = leaf.coupling_energy(state, j, i);
         energy.coupling += stretch;
         energy.potential += potential - stretch;
         if i < n {
             // From the strains: the force may include friction.
-            let (section, force) = (leaf.section(j, i), state.n[j * n + i]);
-            let segment = leaf.segment(state, j, i, force);
-            let strain = segment.v(section) - section.rest_strain;
-            energy.elastic += section.bending_energy(&segment);
-            for c in (0..3).filter(|&c| section.compliance[c] > 0.0) {
-                energy.elastic += 0.5 * section.ds * strain[c] * strain[c] / section.compliance[c];
-            }
+            let strained = leaf.strained_segment(state, j, i);
+            energy.elastic += leaf.section(j, i).elastic_energy(&strained);
         }
     }
     energy

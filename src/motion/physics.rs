@@ -44,6 +44,8 @@ pub struct Physics {
     pub damping: f64,
     /// Internal damping: retardation time.
     pub retardation: f64,
+    /// Part of the loads of single veins.
+    own_loads: f64,
     /// The loads, if they are constant.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
@@ -74,6 +76,7 @@ impl Physics {
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
         let still = schedules(&dynamics).iter().all(|load| load.is_constant());
         let mut physics = Physics {
+            own_loads: leaf.loads.own,
             constant_loads: None,
             knots: knots(&dynamics, time),
             constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
@@ -134,6 +137,7 @@ impl Physics {
             gravity: gravity * (self.scale.length / force),
             tip_force: tip_force / force,
             tip_moment: tip_moment / self.scale.moment(),
+            own: self.own_loads,
         }
     }
 

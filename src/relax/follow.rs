@@ -134,7 +134,7 @@ fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
     state.n.iter_mut().for_each(|n| *n *= force);
     for j in 0..leaf.rods() {
         let base = state.base(j);
-        state.q[base] = leaf.base(j);
+        (state.x[base], state.q[base]) = leaf.base(j);
     }
     state
 }

@@ -27,13 +27,14 @@ pub use crate::relax::relaxation::Relaxation;
 pub use crate::relax::request::method::{Method, SemiImplicit, Settings, Unfit};
 pub use crate::relax::request::options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
-    check_tolerance,
+    check_tolerance, without_grips,
 };
 pub(crate) use crate::relax::result::equilibrium::serialize_index;
 pub use crate::relax::result::equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
+    Accuracy, Equilibrium, Mode, Model, Outcome, Sensitivity, Shape, Stability,
 };
 pub use crate::relax::result::margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
+pub use crate::relax::result::reaction::{GripReaction, Reaction};
 pub(crate) use crate::relax::sensitivity::parameter::Parameter;
 pub(crate) use crate::relax::settle::segments::check_segments;
 pub(crate) use crate::relax::settle::start::start;

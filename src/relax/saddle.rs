@@ -1,7 +1,7 @@
 //! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
 
 use crate::largest::larger;
-use crate::leaf::{DirectSolver, DiscreteLeaf, Solved, State, System};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Factorised, Solved, State, System};
 use crate::newton::{Equations, Newton, Work};
 use crate::relax::preference::preference;
 use glam::DVec3;
@@ -63,6 +63,9 @@ fn count(
     (excess, shift): (f64, f64),
     work: &mut Work,
 ) -> Option<usize> {
+    if system.tied() {
+        return count_coupled(leaf, state, system, (excess, shift), work);
+    }
     assemble(leaf, state, system, excess, work);
     // For most stable leaves one linear-time factorisation is enough.
     if system.stable_without_coupling(shift) {
@@ -208,19 +211,21 @@ pub fn find_unstable_mode(
     let momentum = system.momentum(&preference(leaf, state, leaning));
     system.set_rhs(&momentum);
     let mut shift = 1e-4;
-    loop {
+    let mut factors = loop {
         work.factorizations += 1;
-        if system.factorize(shift) && matches!(system.solve(None, 1e-3), Solved::Yes(_)) {
-            break;
+        if let Some(mut factors) = Factorised::new(system, shift)
+            && matches!(factors.solve(system, 1e-3), Solved::Yes(_))
+        {
+            break factors;
         }
         shift *= 2.0;
         if !shift.is_finite() {
             return false;
         }
-    }
+    };
     for _ in 0..MODE_ITERATIONS {
         system.iterate_mode();
-        if !matches!(system.solve(None, 1e-3), Solved::Yes(_)) {
+        if !matches!(factors.solve(system, 1e-3), Solved::Yes(_)) {
             break;
         }
     }

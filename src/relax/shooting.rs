@@ -5,12 +5,11 @@ use crate::memory;
 use crate::newton::Work;
 use crate::refusal::RefusedOption;
 use crate::relax::request::method::Method;
-use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError};
+use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError, without_grips};
 use crate::relax::rest::relax_on_grids;
-use crate::relax::result::equilibrium::{
-    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
-};
+use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::result::plausible;
+use crate::relax::result::reaction::Reaction;
 use crate::relax::result::report::neutral_directions;
 use crate::relax::result::stations::SAME;
 use crate::relax::settle::segments::coarsest;
@@ -92,6 +91,12 @@ pub fn relax(
         _ => (Some(1), false),
     };
     check_intervals(scenario.rods.len(), intervals)?;
+    without_grips(scenario, "shooting")?;
+    if !from_rest && scenario.joined && scenario.rods.len() > 1 && !Leaf::new(scenario).is_fan() {
+        let why = "veins that begin apart are led to their joint tip by the relaxation; \
+                   use shooting-from-rest";
+        return Err(RefusedOption::new("method", options.method.word(), why).into());
+    }
     if !from_rest && scenario.held_tip.is_some() {
         // Shooting from arcs has no continuation to a held tip.
         let why =
@@ -209,6 +214,7 @@ fn shoot(
         energy,
         tips: tips.iter().take(listed).map(|node| node.position).collect(),
         tip_force_sum,
+        grip_reactions: Vec::new(),
         reaction: scenario.held_tip.as_ref().map(|held| Reaction {
             force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
             moments: (held.clamps.is_some())

@@ -20,6 +20,7 @@
 //! segment, so that the nodes see a 12 x 12 matrix, and Newton's method converges as fast for
 //! any stiffness in stretch and shear: a rigid rod is c = 0.
 
+use super::derivatives::{First, Hessian, Rows, Second, transposed};
 use super::section::Sections;
 use crate::lanes::{Lanes, Vectors};
 use crate::rotation::{Quaternions, Relative};
@@ -46,24 +47,6 @@ pub struct Element<S: Simd> {
     pub(super) relative: Relative<S>,
 }
 
-/// A matrix, rows first.
-pub type Rows<S> = [Vectors<S>; 3];
-
-/// First derivatives: with respect to x1 (that to x0 is its negative), and to
-/// the rotations of the two nodes.
-pub type First<S> = [Vectors<S>; 3];
-
-/// Second derivatives with respect to (x1 - x0) and the spatial rotation
-/// increments a, b of the two nodes.
-pub struct Second<S: Simd> {
-    pub xx: Rows<S>,
-    pub xa: Rows<S>,
-    pub xb: Rows<S>,
-    pub aa: Rows<S>,
-    pub ab: Rows<S>,
-    pub bb: Rows<S>,
-}
-
 impl<S: Simd> Element<S> {
     /// The segments between `nodes` that carry the spatial forces `n`.
     #[inline(always)]
@@ -80,6 +63,25 @@ impl<S: Simd> Element<S> {
             nu,
             w,
             gap: w.neg_mul_add(sections.ds, dx),
+            relative,
+        }
+    }
+
+    /// The segments between `nodes` that carry the forces of their strains, whose stiffness is the
+    /// condensing one: zero is allowed.
+    #[inline(always)]
+    pub fn strained(sections: &Sections<S>, nodes: &Nodes<S>) -> Self {
+        let (relative, frame) = Relative::between(nodes.q);
+        let u = relative.psi.scale(sections.per_ds);
+        let dx = (nodes.x[1] - nodes.x[0]).onto(frame);
+        let w = dx.scale(sections.per_ds);
+        Element {
+            frame,
+            u,
+            m: sections.couple_stiffness * (u - sections.rest_curvature),
+            nu: sections.condensing * (w - sections.rest_strain),
+            w,
+            gap: Vectors::splat(sections.ds.simd, [0.0; 3]),
             relative,
         }
     }
@@ -186,6 +188,41 @@ impl<S: Simd> Element<S> {
         ]
     }
 
+    /// As [`Element::midpoint`] for segments that carry the forces of their strains: the limit of
+    /// exact condensation, k = 1/c, in which c drops out, so that k may be zero,
+    ///
+    /// diag(k) D = \[nu\] - diag(k) \[w\],
+    /// -\[w\] diag(k) \[w\] + (w nu^T + nu w^T)/2 - w.nu.
+    #[inline(always)]
+    fn midpoint_strained(&self, sections: &Sections<S>) -> [Rows<S>; 2] {
+        let (nu, w, k) = (self.nu, self.w, sections.condensing);
+        let zero = Lanes::splat(k.x.simd, 0.0);
+        let half = Lanes::splat(k.x.simd, 0.5);
+        let (k01, k02) = (k.x.mul_add(w.z, -nu.z), k.x.neg_mul_add(w.y, nu.y));
+        let (k10, k12) = (k.y.neg_mul_add(w.z, nu.z), k.y.mul_add(w.x, -nu.x));
+        let (k20, k21) = (k.z.mul_add(w.y, -nu.y), k.z.neg_mul_add(w.x, nu.x));
+        let (products, squares) = (w * nu, w * w);
+        let xx = k.y.mul_add(squares.z, k.z * squares.y) - products.y - products.z;
+        let yy = k.x.mul_add(squares.z, k.z * squares.x) - products.x - products.z;
+        let zz = k.x.mul_add(squares.y, k.y * squares.x) - products.x - products.y;
+        let mean = |a: Lanes<S>, b: Lanes<S>, c: Lanes<S>, d: Lanes<S>| half * a.mul_add(b, c * d);
+        let xy = mean(w.x, nu.y, w.y, nu.x) - k.z * w.x * w.y;
+        let xz = mean(w.x, nu.z, w.z, nu.x) - k.y * w.x * w.z;
+        let yz = mean(w.y, nu.z, w.z, nu.y) - k.x * w.y * w.z;
+        [
+            [
+                Vectors::new(zero, k10, k20),
+                Vectors::new(k01, zero, k21),
+                Vectors::new(k02, k12, zero),
+            ],
+            [
+                Vectors::new(xx, xy, xz).scale(sections.ds),
+                Vectors::new(xy, yy, yz).scale(sections.ds),
+                Vectors::new(xz, yz, zz).scale(sections.ds),
+            ],
+        ]
+    }
+
     /// F K F^T from the columns of K, F having the directors as columns.
     #[inline(always)]
     fn in_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
@@ -211,10 +248,21 @@ impl<S: Simd> Element<S> {
     /// then of the two nodes.
     #[inline(always)]
     pub fn second(&self, sections: &Sections<S>) -> Second<S> {
+        self.second_of(sections, self.midpoint(sections))
+    }
+
+    /// As [`Element::second`] for segments that carry the forces of their strains.
+    #[inline(always)]
+    pub fn second_strained(&self, sections: &Sections<S>) -> Second<S> {
+        self.second_of(sections, self.midpoint_strained(sections))
+    }
+
+    /// The second derivatives from those with respect to the rotation of the midpoint.
+    #[inline(always)]
+    fn second_of(&self, sections: &Sections<S>, [stiff, midpoint]: [Rows<S>; 2]) -> Second<S> {
         let simd = sections.ds.simd;
         let number = |value: f64| Lanes::splat(simd, value);
         let (half, quarter, eighth) = (number(0.5), number(0.25), number(0.125));
-        let [stiff, midpoint] = self.midpoint(sections);
         let (stiff, p) = (self.in_lab(stiff), self.in_lab(midpoint));
         let xx = self.diagonal_to_lab(sections.condensing.scale(sections.per_ds));
         let lab = |v: Vectors<S>| v.along(self.frame);
@@ -280,37 +328,7 @@ impl<S: Simd> Element<S> {
     /// Second derivatives by nodes.
     #[inline(always)]
     pub fn hessian(&self, sections: &Sections<S>) -> Hessian<S> {
-        let Second {
-            xx,
-            xa,
-            xb,
-            aa,
-            ab,
-            bb,
-        } = self.second(sections);
-        let none = [[sections.ds; UNKNOWNS]; UNKNOWNS];
-        let (mut left, mut right, mut across) = (none, none, none);
-        let (ax, bx) = (transposed(xa), transposed(xb));
-        for r in 0..3 {
-            let (xx, xb, aa, ab) = (xx[r].array(), xb[r].array(), aa[r].array(), ab[r].array());
-            let (ax, bx, bb) = (ax[r].array(), bx[r].array(), bb[r].array());
-            for c in 0..3 {
-                left[r][c] = aa[c];
-                left[r][3 + c] = -ax[c];
-                left[3 + r][3 + c] = xx[c];
-                right[r][c] = bb[c];
-                right[r][3 + c] = bx[c];
-                right[3 + r][3 + c] = xx[c];
-                across[r][c] = ab[c];
-                across[r][3 + c] = ax[c];
-                across[3 + r][c] = -xb[c];
-                across[3 + r][3 + c] = -xx[c];
-            }
-        }
-        Hessian {
-            own: [left, right],
-            across,
-        }
+        self.second(sections).by_nodes()
     }
 
     /// The change of the spatial force for the nodal increments `dx` = dx1 - dx0 and the
@@ -330,37 +348,4 @@ impl<S: Simd> Element<S> {
         let change = sections.condensing * gap.scale(sections.per_ds);
         change.along(self.frame)
     }
-}
-
-/// Second derivatives with respect to the unknowns of the two nodes, the force condensed out.
-pub struct Hessian<S: Simd> {
-    /// The nodes' own blocks, upper triangles.
-    pub own: [Block<S>; 2],
-    /// The block between the first and the second.
-    pub across: Block<S>,
-}
-
-/// A block of a matrix of nodal unknowns, rows first.
-pub type Block<S> = [[Lanes<S>; UNKNOWNS]; UNKNOWNS];
-
-/// Unknowns of a node: rotation, then displacement.
-pub const UNKNOWNS: usize = 6;
-
-/// The transposed matrix.
-#[inline(always)]
-fn transposed<S: Simd>([a, b, c]: Rows<S>) -> Rows<S> {
-    [
-        Vectors::new(a.x, b.x, c.x),
-        Vectors::new(a.y, b.y, c.y),
-        Vectors::new(a.z, b.z, c.z),
-    ]
-}
-
-/// First derivatives with respect to the unknowns of the two nodes.
-#[inline(always)]
-pub fn on_nodes<S: Simd>([x, a, b]: First<S>) -> [[Lanes<S>; UNKNOWNS]; 2] {
-    [
-        [a.x, a.y, a.z, -x.x, -x.y, -x.z],
-        [b.x, b.y, b.z, x.x, x.y, x.z],
-    ]
 }

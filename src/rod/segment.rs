@@ -121,6 +121,16 @@ impl Segment {
         }
     }
 
+    /// The segment between `ends` that carries the force of its strains; in rigid directions it
+    /// carries none, and the gap is what it is strained there.
+    pub fn strained(section: &Section, ends: &Ends) -> Self {
+        let idle = Segment::new(section, ends, DVec3::ZERO);
+        let strain = idle.v(section) - section.rest_strain;
+        let rigid = section.compliance.cmpeq(DVec3::ZERO);
+        let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
+        Segment::new(section, ends, idle.frame * force)
+    }
+
     fn element(&self) -> Element<Scalar> {
         let DMat3 {
             x_axis,

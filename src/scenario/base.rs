@@ -25,6 +25,12 @@ impl Rod {
 }
 
 impl Scenario {
+    /// Where vein `j` begins, and the rotation of its directors there.
+    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+        let rod = &self.rods[j];
+        (rod.base_position(), rod.base_rotation())
+    }
+
     /// Fractions inside (0, 1) where a grid must have a node: kinks of stiffnesses, rest shapes,
     /// loads and the wind's width, points that are loaded, and the ends of what is gripped;
     /// ascending, each once, and none within rounding of another or of an end: what is there is at

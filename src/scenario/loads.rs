@@ -1,5 +1,7 @@
 //! Weight, and loads on points and along veins.
 
+use glam::DVec3;
+
 use super::entries::Entries;
 use super::error::Result;
 use super::item::Item;
@@ -52,6 +54,12 @@ impl Scenario {
         }
     }
 
+    /// Whether veins have loads of their own besides the gravity that all share.
+    pub fn has_own_loads(&self) -> bool {
+        let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];
+        weights || self.distributed.is_some() || !self.points.is_empty()
+    }
+
     /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
     pub fn is_loaded_in_plane(&self) -> bool {
         let flat = |load: [f64; 3]| load[2] == 0.0;
@@ -67,6 +75,29 @@ impl Scenario {
             && self.grips.iter().all(|grip| flat(grip.displacement))
             && flat(self.tip_force)
             && self.tip_moment == [0.0; 3]
+    }
+
+    /// The sum of all weights, and of the loads along veins and on points.
+    pub fn total_load(&self) -> DVec3 {
+        let length: f64 = self.rods.iter().map(|rod| rod.length).sum();
+        let mut total = length * DVec3::from_array(self.gravity);
+        for (vein, rod) in self.rods.iter().enumerate() {
+            let Weight { even, of_mass } = self.weight(vein);
+            let own = DVec3::from_array(even) - DVec3::from_array(self.gravity);
+            total += rod.length * own;
+            if let Some((g, mass)) = of_mass {
+                total += rod.length * mass.integral(1.0) * DVec3::from_array(g);
+            }
+            for load in self.distributed.iter().map(|all| &all[vein]) {
+                let sums = load.each_ref().map(|one| one.integral(1.0));
+                total += rod.length * DVec3::from_array(sums);
+            }
+        }
+        let points = self
+            .points
+            .iter()
+            .map(|point| DVec3::from_array(self.force_on(point)));
+        total + points.sum::<DVec3>()
     }
 
     /// The force on a point: what is given, and the weight of its mass.

@@ -94,6 +94,11 @@ impl<'e, 'a> Integrator<'e, 'a> {
     /// One step towards `until`, never beyond it or a kink.
     pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
         let failed = Unbounded { sigma: self.sigma };
+        // States are those just before a load on a point, which the first step beyond it passes.
+        if self.equations.pass_points(self.sigma, &mut self.y) {
+            self.equations
+                .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+        }
         let until = self.equations.stop(self.sigma, until);
         loop {
             self.steps += 1;

@@ -17,7 +17,8 @@ use crate::limit::Limit;
 use crate::scenario::{Profile, Scenario, Turning, longest};
 use crate::shooting::arcs;
 use crate::shooting::arcs::Arc;
-use crate::shooting::state::{RodState, STATE};
+use crate::shooting::state::{Derivatives, RodState, STATE};
+use crate::shooting::tissue::{Tangent, Tissue};
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -25,13 +26,16 @@ use crate::shooting::state::{RodState, STATE};
 /// energy of everything from the base up to sigma.
 #[derive(Clone, Debug)]
 pub struct Equations<'a> {
-    scenario: &'a Scenario,
+    pub(in crate::shooting) scenario: &'a Scenario,
     /// Unit of length: the longest rod.
     pub length: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
     pub force: f64,
     pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
+    tissue: Option<Tissue<'a>>,
+    /// Whether veins have loads of their own.
+    pub(in crate::shooting) own_loads: bool,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
@@ -76,23 +80,6 @@ pub fn difference(a: DQuat, b: DQuat) -> DVec3 {
     sign * DVec3::new(turn.x, turn.y, turn.z)
 }
 
-/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Derivatives {
-    /// Of r' with respect to the rotation.
-    pub r_theta: DMat3,
-    /// Of r' with respect to n.
-    pub r_n: DMat3,
-    /// Of the rotation rate with respect to the rotation.
-    pub theta_theta: DMat3,
-    /// Of the rotation rate with respect to m.
-    pub theta_m: DMat3,
-    /// Of m' with respect to the rotation.
-    pub m_theta: DMat3,
-    /// Of m' with respect to n.
-    pub m_n: DMat3,
-}
-
 /// Material of a rod at one sigma.
 struct Material {
     compliance: DVec3,
@@ -122,11 +109,15 @@ impl<'a> Equations<'a> {
         let softest: Vec<f64> = (rods.iter())
             .map(|rod| least(&rod.couple_stiffness) / (force * length * length))
             .collect();
+        let tissue = Tissue::new(scenario, length, force);
+        let pull = |gap: usize| {
+            let tissue = tissue.as_ref().map_or(0.0, |tissue| tissue.largest(gap));
+            coupling[gap] + tissue
+        };
         let coupled_rate = (0..rods.len())
             .map(|j| {
-                let of = |gap: Option<usize>| gap.and_then(|gap| coupling.get(gap).copied());
-                let gaps = [of(j.checked_sub(1)), of(Some(j))];
-                let pull: DVec3 = gaps.into_iter().flatten().sum();
+                let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
+                let pull: DVec3 = gaps.filter(|gap| *gap < coupling.len()).map(pull).sum();
                 // Neighbours that move in the opposite direction double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
@@ -141,8 +132,10 @@ impl<'a> Equations<'a> {
             scenario,
             length,
             force,
-            coupling,
             coupled_rate,
+            coupling,
+            tissue,
+            own_loads: scenario.has_own_loads(),
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
@@ -194,7 +187,15 @@ impl<'a> Equations<'a> {
     }
 
     pub fn coupled(&self, g: usize) -> bool {
-        self.coupling[g] != DVec3::ZERO
+        self.coupling[g] != DVec3::ZERO || self.tissue.is_some()
+    }
+
+    /// The linearised loads by the tissue of gap `g`, if there is any.
+    pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<Tangent> {
+        let tissue = self.tissue.as_ref()?;
+        let rods = [g, g + 1].map(|j| RodState::read(y, j));
+        let Tangent(matrix) = tissue.tangent(g, sigma, rods.each_ref());
+        Some(Tangent(matrix * self.part))
     }
 
     /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
@@ -205,9 +206,10 @@ impl<'a> Equations<'a> {
 
     /// The state at the base for given forces and moments: conditions (a) and (c).
     pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
+        let (position, q) = self.scenario.base(j);
         RodState {
-            r: DVec3::ZERO,
-            q: self.scenario.rods[j].base_rotation(),
+            r: position / self.length,
+            q,
             n,
             m,
         }
@@ -274,6 +276,8 @@ impl<'a> Equations<'a> {
     pub fn slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
         let mut energy = 0.0;
         let mut pull = DVec3::ZERO;
+        // Force and moment by the tissue of the gap before the rod.
+        let mut before = [DVec3::ZERO; 2];
         for j in 0..self.rods() {
             let rod = RodState::read(y, j);
             let (law, length) = (self.material(j, sigma), self.lengths[j]);
@@ -282,8 +286,9 @@ impl<'a> Equations<'a> {
             let tangent = length * (frame * (law.rest_strain + law.compliance * n));
             let bend = length * (frame * (law.rest_curvature + law.flexibility * m));
             energy += 0.5 * length * (n.dot(law.compliance * n) + m.dot(law.flexibility * m));
-            energy -= self.part * length * self.gravity.dot(rod.r);
-            let mut load = self.part * length * self.gravity - pull;
+            let gravity = self.gravity + self.own_load(j, sigma);
+            energy -= self.part * length * gravity.dot(rod.r);
+            let mut load = self.part * length * gravity - pull;
             pull = DVec3::ZERO;
             if j + 1 < self.rods() {
                 let gap = DVec3::from_slice(&y[STATE * (j + 1)..]) - rod.r;
@@ -291,12 +296,20 @@ impl<'a> Equations<'a> {
                 energy += 0.5 * gap.dot(pull);
                 load += pull;
             }
+            let [mut force, mut moment] = std::mem::take(&mut before);
+            if let Some(tissue) = self.tissue.as_ref().filter(|_| j + 1 < self.rods()) {
+                let next = RodState::read(y, j + 1);
+                let (own, loads) = tissue.loads(j, sigma, [&rod, &next]);
+                let [here, there] = loads.map(|load| load.map(|it| self.part * it));
+                energy += self.part * own;
+                (force, moment, before) = (force + here[0], moment + here[1], there);
+            }
             let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
             RodState {
                 r: tangent,
                 q,
-                n: -load,
-                m: rod.n.cross(tangent),
+                n: -load - force,
+                m: rod.n.cross(tangent) - moment,
             }
             .write(slopes, j);
         }
@@ -330,13 +343,17 @@ impl<'a> Equations<'a> {
     /// their given position. Then the moment, or for a clamped tip the rotation.
     pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
         let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
-        let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
+        let forces = rods
+            .iter()
+            .enumerate()
+            .map(|(j, rod)| rod.n - self.on_tip(j));
+        let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
                 let first = match (self.tip(), j) {
                     (Tip::Joint, 0) => force - self.part * self.tip_force,
                     (Tip::Joint, _) => rod.r - rods[0].r,
-                    (Tip::Free, _) => rod.n - self.part * self.tip_force,
+                    (Tip::Free, _) => rod.n - self.part * self.tip_force - self.on_tip(j),
                     (Tip::Pinned | Tip::Clamped, _) => rod.r - self.held[j].0,
                 };
                 let second = match self.tip() {
@@ -363,7 +380,10 @@ impl<'a> Equations<'a> {
         let work: f64 = (0..tips)
             .map(|j| self.tip_force.dot(RodState::read(y, j).r))
             .sum();
-        -self.part * work
+        let points = self
+            .on_points(1.0)
+            .map(|(j, force)| force.dot(RodState::read(y, j).r));
+        -self.part * work - points.sum::<f64>()
     }
 }
 

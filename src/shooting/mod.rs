@@ -44,10 +44,12 @@ mod dop853;
 mod equations;
 mod intervals;
 mod newton;
+mod own_loads;
 mod propagate;
 mod solution;
 mod solve;
 mod state;
+mod tissue;
 mod trajectory;
 
 pub use crate::shooting::solution::{

@@ -5,8 +5,9 @@
 use std::ops::Range;
 
 use crate::shooting::dop853::{Integrator, combine};
-use crate::shooting::equations::{Derivatives, Equations};
-use crate::shooting::state::TANGENT;
+use crate::shooting::equations::Equations;
+use crate::shooting::state::{Derivatives, TANGENT};
+use crate::shooting::tissue::Tangent;
 use crate::tableau::{A, B, C, STAGES};
 use glam::DMat3;
 
@@ -15,13 +16,21 @@ pub struct LinearStep {
     width: f64,
     /// Stage by stage, rod by rod.
     derivatives: Vec<Derivatives>,
+    /// Of the tissue, stage by stage, gap by gap; empty if there is none.
+    tissue: Vec<Tangent>,
 }
 
 impl LinearStep {
     /// For the last step of the integrator.
     pub fn of(equations: &Equations, integrator: &Integrator) -> Self {
         let (width, begin) = (integrator.width, integrator.sigma - integrator.width);
+        let gap = |(i, g): (usize, usize)| {
+            let sigma = begin + C[i] * width;
+            equations.tissue_tangent(g, sigma, &integrator.stages[i])
+        };
+        let gaps = (0..STAGES).flat_map(|i| (1..equations.rods()).map(move |j| (i, j - 1)));
         LinearStep {
+            tissue: gaps.map_while(gap).collect(),
             width,
             derivatives: (0..STAGES)
                 .flat_map(|i| {
@@ -70,6 +79,11 @@ impl<const W: usize> Perturbations<W> {
             let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
             let (stage, out) = (self.stage.as_chunks().0, self.slopes[i].as_chunks_mut().0);
             slopes::<W>(equations, derivatives, self.rods.start, stage, out);
+            if !step.tissue.is_empty() {
+                let gaps = equations.rods() - 1;
+                let tissue = &step.tissue[i * gaps..(i + 1) * gaps];
+                add_tissue::<W>(tissue, self.rods.clone(), stage, out);
+            }
         }
         combine(&self.all, step.width, &B, &self.slopes, &mut self.stage);
         std::mem::swap(&mut self.all, &mut self.stage);
@@ -113,6 +127,33 @@ fn slopes<const W: usize>(
                 pull(first + j, next);
             }
             out[6 + k] = force;
+        }
+    }
+}
+
+/// Adds what the tissue contributes to the linearised equations of these rods; rods outside are
+/// fixed.
+fn add_tissue<const W: usize>(
+    tissue: &[Tangent],
+    rods: Range<usize>,
+    rows: &[[f64; W]],
+    slopes: &mut [[f64; W]],
+) {
+    for (g, Tangent(matrix)) in tissue.iter().enumerate() {
+        // Displacements and rotations of both rods, where the rows of their forces and moments are.
+        let place = |k: usize| {
+            let j = g + k / 6;
+            rods.contains(&j)
+                .then(|| TANGENT * (j - rods.start) + k % 6)
+        };
+        for r in 0..12 {
+            let Some(out) = place(r) else { continue };
+            for c in 0..12 {
+                let Some(row) = place(c) else { continue };
+                for w in 0..W {
+                    slopes[out + 6][w] += matrix[(r, c)] * rows[row][w];
+                }
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers that describe a leaf at one sigma.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
 pub const STATE: usize = 13;
@@ -43,4 +43,21 @@ impl RodState {
         self.n.write_to_slice(&mut y[7..]);
         self.m.write_to_slice(&mut y[10..]);
     }
+}
+
+/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Derivatives {
+    /// Of r' with respect to the rotation.
+    pub r_theta: DMat3,
+    /// Of r' with respect to n.
+    pub r_n: DMat3,
+    /// Of the rotation rate with respect to the rotation.
+    pub theta_theta: DMat3,
+    /// Of the rotation rate with respect to m.
+    pub theta_m: DMat3,
+    /// Of m' with respect to the rotation.
+    pub m_theta: DMat3,
+    /// Of m' with respect to n.
+    pub m_n: DMat3,
 }

@@ -239,11 +239,11 @@ fn chosen<'l, 'a, const N: usize>(
 }
 
 /// A direct factorisation of the assembled matrix K + `shift` M.
-pub(in crate::branch) fn factorized<'p>(
-    pattern: &'p DirectSolver,
+pub(in crate::branch) fn factorized(
+    pattern: &DirectSolver,
     system: &System,
     shift: f64,
-) -> Result<Factors<'p>, Stuck> {
+) -> Result<Factors, Stuck> {
     Ok(pattern.factorize(system, shift)?)
 }
 

@@ -271,9 +271,9 @@ impl<'a, const N: usize> Leaves<'a, N> {
 
 /// Puts the bases of all rods where the leaf clamps them, and held tips where it holds them.
 pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
-    leaf.leaf.hold_tips(state);
+    leaf.hold(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
-        state.q[base] = leaf.leaf.base(j);
+        (state.x[base], state.q[base]) = leaf.leaf.base(j);
     }
 }

@@ -66,13 +66,14 @@ pub fn advanced(
         return next;
     }
     let mut increments = times(increments, step);
-    if let Some(held) = &leaf.leaf.held {
-        let tips = increments.iter_mut().filter_map(|rod| rod.last_mut());
-        for (j, tip) in tips.enumerate() {
-            tip[3..].fill(0.0);
-            if held.rotation(j).is_some() {
-                tip[..3].fill(0.0);
-            }
+    for (j, i) in leaf.each(1..leaf.segments() + 1) {
+        let [turns, shifts] = leaf.moves(j, i);
+        let increment = &mut increments[j][i - 1];
+        if !shifts {
+            increment[3..].fill(0.0);
+        }
+        if !turns {
+            increment[..3].fill(0.0);
         }
     }
     system.set_solution(&increments);

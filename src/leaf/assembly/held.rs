@@ -1,10 +1,11 @@
 //! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
-//! or at a pinned or clamped tip.
+//! at a pinned or clamped tip, or by grips.
 
 use super::component;
 use crate::lanes::Four;
 use crate::leaf::chain::{Chain, Increments, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::system::System;
 use crate::rod::UNKNOWNS;
 use glam::DVec3;
 
@@ -12,14 +13,28 @@ use glam::DVec3;
 /// mirror plane: rotations about x and z, the displacement along y.
 const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
 
+/// All components; displacements are the last three.
+const ALL: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
+
+/// The entry on the diagonal of held components: with the masses of nodes within a vein it is a
+/// frequency above all others.
+const HELD: f64 = 1e9;
+
 impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` (from 1) of
     /// rod `j`.
     fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
+        if !self.grips.is_empty() {
+            match self.is_gripped(j, i) {
+                [true, _] => return &ALL,
+                [false, true] => return &ALL[3..],
+                [false, false] => {}
+            }
+        }
         if let Some(held) = self.leaf.held.as_ref().filter(|_| i == self.segments()) {
             match held.clamps {
-                Some(_) => &[0, 1, 2, 3, 4, 5],
-                None => &[3, 4, 5],
+                Some(_) => &ALL,
+                None => &ALL[3..],
             }
         } else if self.leaf.in_plane(j) {
             &ACROSS_THE_PLANE
@@ -33,6 +48,7 @@ impl DiscreteLeaf {
     /// The number (from 0) of the first node that may be held.
     fn first_held(&self) -> usize {
         match (self.leaf.mirrored, &self.leaf.held) {
+            _ if !self.grips.is_empty() => 0,
             (true, _) => 0,
             (false, Some(_)) => self.segments() - 1,
             (false, None) => self.segments(),
@@ -62,7 +78,21 @@ impl DiscreteLeaf {
                         set(chain.off(i - 1, k, c), 0.0);
                     }
                 }
-                set(chain.diagonal(i, c, c), 1.0);
+                let gripped = self.is_gripped(j, i + 1)[1];
+                set(chain.diagonal(i, c, c), if gripped { HELD } else { 1.0 });
+            }
+        }
+    }
+
+    /// Sets the entries of held components between neighbouring rods to zero.
+    pub(super) fn hold_across(&self, system: &mut System) {
+        for (g, i) in self.each(self.first_held()..self.segments()) {
+            if g + 1 < self.rods() {
+                let across = system.across_mut(g, i);
+                for &c in self.held_components(g, i + 1) {
+                    across[c] = [0.0; UNKNOWNS];
+                    across.iter_mut().for_each(|row| row[c] = 0.0);
+                }
             }
         }
     }

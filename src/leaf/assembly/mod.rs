@@ -34,6 +34,14 @@ impl DiscreteLeaf {
         each_group(system.parallel, &mut system.groups, |g, group| {
             let rods = Rods::new(self, state, g);
             run(arch, &mut Assemble::<MATRIX> { rods, group });
+        });
+        let mut total = Sums {
+            energy: self.add_tissue(state, system, MATRIX)
+                + self.add_own_loads(state, system)
+                + self.base_energy(state),
+            turn: 0.0,
+        };
+        each_group(system.parallel, &mut system.groups, |g, group| {
             for j in rods_of(g, self.rods()) {
                 self.clear_held_components(j, &mut group.rhs);
                 if MATRIX {
@@ -41,13 +49,15 @@ impl DiscreteLeaf {
                 }
             }
         });
+        if MATRIX && self.tied() {
+            self.hold_across(system);
+        }
         if moment != DVec3::ZERO {
             let last = &mut system.groups[0].rhs[self.segments() - 1];
             for c in 0..3 {
                 last[c].0[0] += moment[c];
             }
         }
-        let mut total = Sums::default();
         for group in &system.groups {
             total.energy += group.sums.energy;
             total.turn = larger(total.turn, group.sums.turn);
@@ -85,7 +95,7 @@ impl DiscreteLeaf {
             let mut before = excess(j, 0);
             for i in 1..=n {
                 let after = if i < n { excess(j, i) } else { 0.0 };
-                if self.moves(i)[0] {
+                if self.moves(j, i)[0] {
                     let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
                     system.add(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
                 }
@@ -140,16 +150,23 @@ impl DiscreteLeaf {
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
                 if i > 0 {
                     let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
+                    let [turned, held] = self.is_gripped(j, i);
+                    let forces = if held { 0.0 } else { forces };
+                    let moments = if turned { 0.0 } else { moments };
                     largest = larger(largest, larger(forces, moments));
                 }
-                force = self.load(state, j, i + 1).0 - g_x;
-                moment = -g_b;
+                let load = self.load(state, j, i + 1);
+                force = load.force - g_x;
+                moment = load.moment - g_b;
                 largest = larger(largest, component(segment.gap));
             }
             moment += self.tip_moment();
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
             // The holder balances the remaining force on a held tip.
+            let [turned, held] = self.is_gripped(j, n);
             match &self.leaf.held {
+                _ if turned => continue,
+                _ if held => {}
                 Some(held) if held.clamps.is_some() => continue,
                 Some(_) => {}
                 None if self.leaf.joined() => tip += force,
@@ -163,16 +180,30 @@ impl DiscreteLeaf {
         larger(largest, component(tip))
     }
 
+    /// Potential energy of the loads and of the coupling at the bases: none where these are in the
+    /// origin.
+    fn base_energy(&self, state: &State) -> f64 {
+        let apart = |j: usize| state.x[state.base(j)] != DVec3::ZERO;
+        if !(0..self.rods()).any(apart) {
+            return 0.0;
+        }
+        let of = |j: usize| self.load(state, j, 0).energy - self.tissue_load(state, j, 0).energy;
+        (0..self.rods()).map(of).sum()
+    }
+
     /// Potential energy of a state: elastic, of the coupling, and of the loads.
     /// The dead moment on a rod's tip has no potential and is left out.
     pub fn energy(&self, state: &State) -> f64 {
         let n = self.segments();
-        let mut energy = 0.0;
+        let mut energy = self.base_energy(state);
+        for (j, i) in self.each(0..1) {
+            energy += self.tissue_load(state, j, i).energy;
+        }
         for j in 0..self.rods() {
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
                 energy +=
-                    self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).1;
+                    self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).energy;
             }
         }
         energy

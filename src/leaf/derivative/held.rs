@@ -65,8 +65,8 @@ impl DiscreteLeaf {
             forces.on_gaps(j, n)[n - 1] +=
                 segment.gap_increment(section, moved, DVec3::ZERO, turned);
             let (g_x, _, g_b) = segment.gradient(section);
-            let load = self.load(state, j, n).0;
-            forces.energy += (g_x - load).dot(moved) + g_b.dot(turned);
+            let load = self.load(state, j, n);
+            forces.energy += (g_x - load.force).dot(moved) + (g_b - load.moment).dot(turned);
             let [a, b] = [turned.to_array(), moved.to_array()];
             forces.tips.push([a[0], a[1], a[2], b[0], b[1], b[2]]);
         }
@@ -81,6 +81,7 @@ impl DiscreteLeaf {
         for (j, rod) in rate.rods.iter().enumerate() {
             let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
             force += weight * gravity - response.carried[j * n + n - 1];
+            force += self.load_factor * self.own_load_rate(rate, j, n);
         }
         force
     }

@@ -4,13 +4,16 @@
 
 mod forces;
 mod held;
+mod leaves;
 
 pub use crate::leaf::derivative::forces::{Forces, Response};
 use crate::leaf::derivative::held::HeldRate;
+use crate::leaf::derivative::leaves::leaves;
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, State, add};
 use crate::rod::{Blocks, Section, SectionRate, Segment};
+use crate::rotation;
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
 
@@ -23,6 +26,9 @@ pub struct LeafRate<'s> {
     tip_force: DVec3,
     tip_moment: DVec3,
     held: Option<HeldRate>,
+    /// The leaves that differ in the number, with their weights, if they have tissue or loads of
+    /// single veins.
+    leaves: Vec<(f64, Leaf)>,
 }
 
 /// A remaining gap below this part of the initial one counts as zero: the segment's force is
@@ -32,7 +38,8 @@ const CLOSED: f64 = 1e-12;
 /// The derivative of a rod, in the leaf's units.
 struct RodRate<'s> {
     length: f64,
-    angle: f64,
+    /// Of the base: its position, its rotation.
+    base: [DVec3; 2],
     couple_stiffness: [Slope<'s>; 3],
     force_stiffness: [Slope<'s>; 3],
     rest_curvature: [Slope<'s>; 3],
@@ -77,7 +84,7 @@ impl<'s> LeafRate<'s> {
         };
         let rod = |j: usize| RodRate {
             length: sum(&|s| s.rods[j].length) / scale.length,
-            angle: sum(&|s| s.rods[j].angle),
+            base: base_rate(terms, j, scale.length),
             couple_stiffness: [0, 1, 2].map(|k| {
                 Slope::of(terms, 1.0 / scale.stiffness, move |s| {
                     &s.rods[j].couple_stiffness[k]
@@ -107,14 +114,18 @@ impl<'s> LeafRate<'s> {
             tip_force: vector(|s| s.tip_force, scale.force()),
             tip_moment: vector(|s| s.tip_moment, scale.moment()),
             held: HeldRate::new(leaf, terms),
+            leaves: match leaf.has_tissue() || terms.iter().any(|(_, s)| s.has_own_loads()) {
+                true => leaves(leaf, terms),
+                false => Vec::new(),
+            },
         }
     }
 }
 
 impl LeafRate<'_> {
-    /// The rate of rotation of the base of rod `j`.
-    pub fn base_turn(&self, j: usize) -> f64 {
-        self.rods[j].angle
+    /// The rates of displacement and rotation of the base of rod `j`.
+    pub fn of_base(&self, j: usize) -> [DVec3; 2] {
+        self.rods[j].base
     }
 
     /// Whether a dead moment on the tip changes.
@@ -172,10 +183,11 @@ impl DiscreteLeaf {
             if of_all || coupling || rod.length != 0.0 {
                 self.add_load_changes(state, j, rate, &mut forces);
             }
-            if rod.angle != 0.0 {
-                self.add_base_rotation(segments, j, rod.angle, &mut forces);
+            if rod.base != [DVec3::ZERO; 2] {
+                self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
+        self.add_tissue_changes(state, rate, &mut forces);
         if let Some(held) = &rate.held {
             self.add_tip_motion(state, segments, held, &mut forces);
         }
@@ -218,6 +230,12 @@ impl DiscreteLeaf {
         if rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO) {
             forces.on_nodes(j + 1, n);
         }
+        let base = state.x[state.base(j)];
+        forces.energy -= (gravity * (self.load_factor * self.grid.weight(0))).dot(base);
+        if let Some(change) = rate.coupling.get(j) {
+            let stretch = state.x[state.base(j + 1)] - base;
+            forces.energy += 0.5 * self.grid.weight(0) * (*change * stretch).dot(stretch);
+        }
         for i in 1..=n {
             let x = state.x[state.base(j) + i];
             let mut force = gravity * (self.load_factor * self.grid.weight(i));
@@ -241,19 +259,27 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Adds the effect of rotating a base about the normal of the fan.
-    fn add_base_rotation(&self, segments: &[Segment], j: usize, angle: f64, forces: &mut Forces) {
+    /// Adds the effect of displacing and rotating a base.
+    fn add_base_motion(
+        &self,
+        state: &State,
+        segments: &[Segment],
+        j: usize,
+        [shift, turn]: [DVec3; 2],
+        forces: &mut Forces,
+    ) {
         let n = self.segments();
-        let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
+        let section = self.section(j, 0);
         let segment = &segments[j * n];
         let k = at_constant_force(segment, section);
         add(
             &mut forces.on_nodes(j, n)[0],
-            -(k.ab.transpose() * turn),
-            -(k.xa * turn),
+            k.xb.transpose() * shift - k.ab.transpose() * turn,
+            k.xx * shift - k.xa * turn,
         );
-        forces.on_gaps(j, n)[0] += segment.gap_increment(section, DVec3::ZERO, turn, DVec3::ZERO);
-        forces.energy += segment.gradient(section).1.dot(turn);
+        forces.on_gaps(j, n)[0] += segment.gap_increment(section, -shift, turn, DVec3::ZERO);
+        let ((g_x, g_a, _), load) = (segment.gradient(section), self.load(state, j, 0));
+        forces.energy += (g_a - load.moment).dot(turn) - (g_x + load.force).dot(shift);
     }
 
     /// The work of forces on a response to others: by symmetry also that of the
@@ -291,12 +317,13 @@ impl DiscreteLeaf {
             }
             add(&mut nodes[j][i], -g_b, -g_x);
         }
-        // Held components of a tip have no equations.
-        let [turns, shifts] = self.moves(n);
-        for node in nodes.iter_mut().filter_map(|rod| rod.last_mut()) {
-            let held = [turns, turns, turns, shifts, shifts, shifts].map(|moves| !moves);
-            for (force, held) in node.iter_mut().zip(held) {
-                if held {
+        // Held components have no equations.
+        let first = if self.grips.is_empty() { n } else { 1 };
+        for (j, i) in self.each(first..n + 1) {
+            let [turns, shifts] = self.moves(j, i);
+            let moves = [turns, turns, turns, shifts, shifts, shifts];
+            for (force, moves) in nodes[j][i - 1].iter_mut().zip(moves) {
+                if !moves {
                     *force = 0.0;
                 }
             }
@@ -330,6 +357,18 @@ impl DiscreteLeaf {
             }
         }
     }
+}
+
+/// The derivatives of the position and of the rotation of the base of rod `j`.
+fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
+    let (first, turned) = terms[0].1.base(j);
+    let mut rate = [DVec3::ZERO; 2];
+    for (weight, scenario) in terms {
+        let (x, q) = scenario.base(j);
+        rate[0] += *weight * (x - first) / length;
+        rate[1] += *weight * rotation::log(q * turned.conjugate());
+    }
+    rate
 }
 
 /// The derivative of a number of the scenario: relative to the first, so that without changes it

@@ -14,7 +14,7 @@ use super::system::System;
 use crate::memory;
 use condensed::Condensed;
 use sparse::{Sparse, Symbolic};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use unknowns::{Unknowns, entries};
 
 /// Up to so many segments the matrix is factorised vein after vein. Measured with the leaf of Fig. 4:
@@ -25,10 +25,10 @@ const MOST_CONDENSED: usize = 32;
 /// Direct solutions with the matrices of a leaf on one grid: the numbering of its unknowns, and the
 /// symbolic factorisation where one is needed.
 pub struct DirectSolver {
-    unknowns: Unknowns,
+    unknowns: Arc<Unknowns>,
     /// Whether the matrix is factorised vein after vein, if its pivots allow it.
     condenses: bool,
-    symbolic: OnceLock<Result<Symbolic, DirectError>>,
+    symbolic: OnceLock<Result<Arc<Symbolic>, DirectError>>,
     /// Number of border rows, which follow all unknowns.
     border: usize,
 }
@@ -43,14 +43,15 @@ pub struct Bordered {
 }
 
 /// The factors of a leaf's matrix.
-pub struct Factors<'a> {
-    solver: &'a DirectSolver,
-    kind: Kind<'a>,
+pub struct Factors {
+    unknowns: Arc<Unknowns>,
+    border: usize,
+    kind: Kind,
 }
 
-enum Kind<'a> {
+enum Kind {
     Condensed(Condensed),
-    Sparse(Sparse<'a>),
+    Sparse(Sparse),
 }
 
 /// Why a matrix could not be factorised.
@@ -71,21 +72,24 @@ impl DirectSolver {
     /// For this matrix, and others of the same leaf with the same coupling: axes along which it is
     /// zero separate the rods.
     pub fn of_coupling(system: &System) -> Result<Self, DirectError> {
-        DirectSolver::along(system, system.coupled_axes(), 0)
+        DirectSolver::along(system, system.coupled_unknowns(), 0)
     }
 
     /// For the matrix bordered by `rows` dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, DirectError> {
-        DirectSolver::along(system, [system.coupled(); 3], rows)
+        let [turns, shifts] = [system.tied(), system.coupled()];
+        let coupled = [turns, turns, turns, shifts, shifts, shifts];
+        DirectSolver::along(system, coupled, rows)
     }
 
-    /// For rods that are coupled along these axes, with border rows.
-    fn along(system: &System, axes: [bool; 3], border: usize) -> Result<Self, DirectError> {
+    /// For rods of whose nodes these unknowns are coupled, with border rows.
+    fn along(system: &System, coupled: [bool; 6], border: usize) -> Result<Self, DirectError> {
         let (rods, n) = (system.rods(), system.segments);
         let solver = DirectSolver {
-            unknowns: Unknowns::new(system, axes),
+            unknowns: Arc::new(Unknowns::new(system, coupled)),
             condenses: border == 0
-                && axes != [false; 3]
+                && coupled != [false; 6]
+                && !system.tied()
                 && n <= MOST_CONDENSED
                 && memory::factor(rods * (3 * n).pow(2)).is_ok(),
             symbolic: OnceLock::new(),
@@ -97,12 +101,20 @@ impl DirectSolver {
         Ok(solver)
     }
 
-    fn symbolic(&self, system: &System) -> Result<&Symbolic, DirectError> {
-        let symbolic = || Symbolic::new(system, &self.unknowns, self.border);
+    fn symbolic(&self, system: &System) -> Result<&Arc<Symbolic>, DirectError> {
+        let symbolic = || Symbolic::new(system, &self.unknowns, self.border).map(Arc::new);
         self.symbolic
             .get_or_init(symbolic)
             .as_ref()
             .map_err(|&error| error)
+    }
+
+    fn factors(&self, kind: Kind) -> Factors {
+        Factors {
+            unknowns: self.unknowns.clone(),
+            border: self.border,
+            kind,
+        }
     }
 
     /// Number of unknowns, with those of the border.
@@ -145,20 +157,16 @@ impl DirectSolver {
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
     /// `shift` times its mass matrix.
-    pub fn factorize(&self, system: &System, shift: f64) -> Result<Factors<'_>, DirectError> {
+    pub fn factorize(&self, system: &System, shift: f64) -> Result<Factors, DirectError> {
         self.factorize_bordered(system, shift, &[])
     }
 
     /// As [`DirectSolver::factorize`], by the sparse factorisation, whose pivots tell the signs of
     /// eigenvalues closer to zero where veins are stiff.
-    pub fn factorize_sparse(
-        &self,
-        system: &System,
-        shift: f64,
-    ) -> Result<Factors<'_>, DirectError> {
+    pub fn factorize_sparse(&self, system: &System, shift: f64) -> Result<Factors, DirectError> {
         let symbolic = self.symbolic(system)?;
         let kind = Kind::Sparse(symbolic.factorize(system, &self.unknowns, shift, &[])?);
-        Ok(Factors { solver: self, kind })
+        Ok(self.factors(kind))
     }
 
     /// Number of negative eigenvalues of the matrix assembled in `system` plus `shift` times its
@@ -181,7 +189,7 @@ impl DirectSolver {
         system: &System,
         shift: f64,
         border: &[Field],
-    ) -> Result<Factors<'_>, DirectError> {
+    ) -> Result<Factors, DirectError> {
         let condensed = match self.condenses {
             true => Condensed::new(system, shift),
             false => None,
@@ -193,11 +201,11 @@ impl DirectSolver {
                 Kind::Sparse(symbolic.factorize(system, &self.unknowns, shift, border)?)
             }
         };
-        Ok(Factors { solver: self, kind })
+        Ok(self.factors(kind))
     }
 }
 
-impl Factors<'_> {
+impl Factors {
     /// Number of negative eigenvalues, by Sylvester's law of inertia.
     pub fn negative(&self) -> usize {
         match &self.kind {
@@ -209,7 +217,7 @@ impl Factors<'_> {
     /// Solves in place, with unknowns numbered as by [`DirectSolver::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            Kind::Condensed(condensed) => condensed.solve(&self.solver.unknowns, b),
+            Kind::Condensed(condensed) => condensed.solve(&self.unknowns, b),
             Kind::Sparse(sparse) => sparse.solve(b),
         }
     }
@@ -218,7 +226,7 @@ impl Factors<'_> {
     /// vein, and without the last digits of stiff veins: for directions that are orthogonalised.
     pub fn solve_quickly(&mut self, b: &mut [f64]) {
         match &mut self.kind {
-            Kind::Condensed(condensed) => condensed.solve_once(&self.solver.unknowns, b),
+            Kind::Condensed(condensed) => condensed.solve_once(&self.unknowns, b),
             Kind::Sparse(sparse) => sparse.solve(b),
         }
     }
@@ -243,8 +251,8 @@ impl Factors<'_> {
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
     /// the border.
     pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
-        let unknowns = &self.solver.unknowns;
-        let mut b = vec![0.0; self.solver.size()];
+        let unknowns = self.unknowns.clone();
+        let mut b = vec![0.0; unknowns.count + self.border];
         for (j, rod) in rhs.iter().enumerate() {
             for (i, rhs) in rod.iter().enumerate() {
                 unknowns.gather(j, i, rhs, &mut b);

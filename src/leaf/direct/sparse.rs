@@ -14,6 +14,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
+use std::sync::Arc;
 
 /// The symbolic factorisation of a leaf's matrix, bordered or not.
 pub struct Symbolic {
@@ -25,8 +26,8 @@ pub struct Symbolic {
 }
 
 /// L B L^T by Bunch and Kaufman within supernodes.
-pub struct Sparse<'a> {
-    symbolic: &'a Symbolic,
+pub struct Sparse {
+    symbolic: Arc<Symbolic>,
     values: Vec<f64>,
     subdiagonal: Vec<f64>,
     forward: Vec<usize>,
@@ -85,12 +86,12 @@ impl Symbolic {
     /// Factorises the matrix assembled in `system` plus `shift` times the mass matrix, bordered
     /// with a zero corner block.
     pub fn factorize(
-        &self,
+        self: &Arc<Self>,
         system: &System,
         unknowns: &Unknowns,
         shift: f64,
         border: &[Field],
-    ) -> Result<Sparse<'_>, DirectError> {
+    ) -> Result<Sparse, DirectError> {
         let symbolic = self.supernodes();
         let mut values = vec![0.0; self.lower.compute_nnz()];
         let mut places = self.places.iter();
@@ -115,7 +116,7 @@ impl Symbolic {
             )
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let mut factor = Sparse {
-            symbolic: self,
+            symbolic: self.clone(),
             values: vec![0.0; symbolic.len_val()],
             subdiagonal: vec![0.0; self.size],
             forward: vec![0; self.size],
@@ -138,7 +139,7 @@ impl Symbolic {
     }
 }
 
-impl Sparse<'_> {
+impl Sparse {
     fn parts(&self) -> supernodal::SupernodalIntranodeLbltRef<'_, usize, f64> {
         let symbolic = self.symbolic.supernodes();
         let perm = PermRef::new_checked(&self.forward, &self.inverse, self.symbolic.size);

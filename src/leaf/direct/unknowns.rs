@@ -22,14 +22,14 @@ pub struct Unknowns {
     pub segments: usize,
     /// Number of unknowns.
     pub count: usize,
-    /// Axes along which rods are coupled.
-    coupled: [bool; 3],
+    /// Unknowns of a node that are coupled with those of the next rod.
+    coupled: [bool; 6],
 }
 
 impl Unknowns {
     /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
-    /// that are coupled along these axes only.
-    pub fn new(system: &System, coupled: [bool; 3]) -> Self {
+    /// of which these unknowns are coupled only.
+    pub fn new(system: &System, coupled: [bool; 6]) -> Self {
         let (rods, n) = (system.rods(), system.segments);
         let mut order = Order {
             numbers: vec![[0; 6]; rods * n],
@@ -92,13 +92,13 @@ struct Order {
     count: usize,
     segments: usize,
     joined: bool,
-    coupled: [bool; 3],
+    coupled: [bool; 6],
 }
 
 impl Order {
     /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
     /// first, then the line between them. A rod is separated from its neighbours by the
-    /// displacements that are coupled to theirs alone: its other unknowns precede these.
+    /// unknowns that are coupled to theirs alone: its others precede these.
     fn dissect(&mut self, rods: (usize, usize), nodes: (usize, usize)) {
         let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
         let axes = self.coupled.iter().filter(|&&coupled| coupled).count();
@@ -128,7 +128,7 @@ impl Order {
     /// A rod's own unknowns, then those that are coupled.
     fn separate(&mut self, j: usize, nodes: (usize, usize)) {
         let coupled = self.coupled;
-        let is_coupled = |c: usize| c >= 3 && coupled[c - 3];
+        let is_coupled = |c: usize| coupled[c];
         self.bisect(j, nodes, |c| !is_coupled(c));
         (nodes.0..nodes.1).for_each(|i| self.number(j, i, is_coupled));
     }
@@ -188,8 +188,18 @@ pub fn entries(
                 && (unknowns.tip.is_none() || i + 1 < n)
             {
                 let other = unknowns.of(j + 1, i);
-                for c in (0..3).filter(|&c| unknowns.coupled[c]) {
+                for c in (0..3).filter(|&c| unknowns.coupled[3 + c]) {
                     add(here[3 + c], other[3 + c], -spring[c]);
+                }
+            }
+            if let Some(across) = system.across(j, i) {
+                let other = unknowns.of(j + 1, i);
+                for (r, row) in across.iter().enumerate() {
+                    for (c, value) in row.iter().enumerate() {
+                        // The displacement of a joint tip meets itself, in either order.
+                        let both = if here[r] == other[c] { 2.0 } else { 1.0 };
+                        add(here[r], other[c], both * value);
+                    }
                 }
             }
         }

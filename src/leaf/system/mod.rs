@@ -5,6 +5,7 @@
 //! factorised in linear time and preconditions conjugate gradients for K; E is weak compared
 //! with a rod's own stiffness ([`solve`]).
 
+mod across;
 mod coupling;
 mod kernels;
 mod solve;
@@ -16,6 +17,7 @@ use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
 use crate::lanes::{Four, GROUP, widest_arch};
 use crate::largest::larger;
+use crate::rod::NodeBlock;
 use glam::{DMat3, DVec3};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -78,6 +80,8 @@ pub struct System {
     tip: Option<TipFactor>,
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
     gaps: Vec<DVec3>,
+    /// The blocks between neighbouring rods, gap after gap, nodes 1 to n; empty without tissue.
+    across: Vec<NodeBlock>,
     /// Spatial dead moment on the tip of a single rod, as of the last assembly.
     pub(super) moment: DVec3,
 }
@@ -109,8 +113,8 @@ impl System {
     pub fn new(leaf: &DiscreteLeaf) -> Self {
         let (rods, n) = (leaf.rods(), leaf.segments());
         let joined = leaf.tips_move_together();
-        let coupled = leaf.coupled();
-        let gaps = match coupled {
+        let coupled = leaf.coupled() || leaf.tied();
+        let gaps = match leaf.coupled() {
             true => coupling::of_gaps(leaf).collect(),
             false => Vec::new(),
         };
@@ -128,6 +132,7 @@ impl System {
             arch: widest_arch(),
             tip: None,
             gaps,
+            across: vec![Default::default(); if leaf.tied() { (rods - 1) * n } else { 0 }],
             moment: DVec3::ZERO,
         }
     }
@@ -135,7 +140,7 @@ impl System {
     /// Updates the coupling between rods, if there is any, from a leaf that otherwise differs
     /// from that of [`System::new`] only in what is assembled.
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
-        if self.coupled {
+        if !self.gaps.is_empty() {
             self.gaps.clear();
             self.gaps.extend(coupling::of_gaps(leaf));
             for (g, group) in self.groups.iter_mut().enumerate() {
@@ -164,11 +169,6 @@ impl System {
     /// Whether neighbours are coupled, so that conjugate gradients are needed.
     pub fn coupled(&self) -> bool {
         self.coupled
-    }
-
-    /// The axes along which neighbours are coupled.
-    pub(super) fn coupled_axes(&self) -> [bool; 3] {
-        std::array::from_fn(|c| self.gaps.iter().any(|gap| gap[c] != 0.0))
     }
 
     /// Coupling of gap `g` at node `i` (from 0), if there is one.
@@ -248,8 +248,11 @@ impl System {
     }
 
     /// Whether K + shift M is positive definite even without the coupling, which is positive
-    /// semidefinite: then no eigenvalue is negative. Overwrites the matrix.
+    /// semidefinite: then no eigenvalue is negative. Not known with tissue. Overwrites the matrix.
     pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
+        if self.tied() {
+            return false;
+        }
         for group in &mut self.groups {
             for (i, weight) in self.coupling_weights.iter().enumerate() {
                 for c in 0..3 {

@@ -38,8 +38,12 @@ impl Solved {
 }
 
 impl System {
-    /// Factorises B + shift M; false if it is not positive definite.
+    /// Factorises B + shift M; false if it is not positive definite, or tissue ties the rods.
     pub fn factorize(&mut self, shift: f64) -> bool {
+        // Without the tissue, which is not in B + E.
+        if self.tied() {
+            return false;
+        }
         self.factorize_signed(shift, false)
     }
 

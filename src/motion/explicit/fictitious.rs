@@ -42,6 +42,11 @@ pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout, packs: &mu
                     mass += 0.5 * (leaf.leaf.coupling(gap) * coupled).max_element();
                 }
             }
+            for (stiffness, fold, width) in leaf.tissue_at(j, i) {
+                let arm = 0.5 * width;
+                mass += 2.0 * stiffness / (4.0 - ROTATING);
+                inertia += 2.0 * (fold + stiffness * arm * arm) / ROTATING;
+            }
             if i == n {
                 tip += mass;
             }

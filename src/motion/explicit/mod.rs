@@ -18,6 +18,7 @@
 //! which the motion returns. The path does not depend on the times asked for.
 
 mod advance;
+mod applied;
 mod fictitious;
 mod kernel;
 mod packs;
@@ -28,6 +29,7 @@ mod work;
 
 pub use stable::StableStep;
 
+use self::applied::Applied;
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::friction::rates;
 use super::method::Method;
@@ -69,6 +71,8 @@ pub struct Explicit {
     next: [Array; 3],
     packs: Vec<Pack>,
     block: Block,
+    /// What acts on the nodes besides segments, coupling and loads, if anything does.
+    applied: Option<Applied>,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
@@ -117,6 +121,7 @@ impl Explicit {
             next: positions.clone(),
             positions,
             layout,
+            applied: (leaf.tied() || leaf.loads.own != 0.0).then(|| Applied::new(&leaf, layout)),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_weight: (0..count).map(tip_weight).sum(),
@@ -243,6 +248,9 @@ impl Explicit {
         let mut work = 0.0;
         let last = self.leaf.segments();
         let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
+        if let Some(applied) = &mut self.applied {
+            applied.update(&self.leaf, (self.layout, &self.positions), &self.packs);
+        }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
         self.step_packs(&loads, self.law(rest, remember), keep, kick, drift);
@@ -256,6 +264,9 @@ impl Explicit {
             let mut force = loads.tip_force + self.tip_weight * loads.gravity;
             for pack in &self.packs {
                 force -= DVec3::from(pack.totals.last_force);
+            }
+            if let Some(applied) = &self.applied {
+                force += applied.on_tips(self.layout);
             }
             let after = keep * before.0 + force * (kick / mass);
             energy += mass * (0.5 * (before.0 + after)).length_squared();
@@ -308,6 +319,7 @@ impl Explicit {
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
         let (positions, leaf) = (&self.positions, &self.leaf);
+        let applied = self.applied.as_ref().map(Applied::loads);
         let coupled = leaf.coupled();
         let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
             // Those beyond the first and the last rod have no weight. The others of a pack are
@@ -320,6 +332,7 @@ impl Explicit {
                 positions,
                 next,
                 coupling: coupled.then(|| [rods.start.saturating_sub(1), rods.start].map(coupling)),
+                applied,
                 motion: &mut pack.motion,
                 material: &pack.material,
                 past: &mut pack.past,

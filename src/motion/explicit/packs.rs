@@ -105,7 +105,7 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
     };
     if i > 0 || !physics.clamped() {
         let inertia = physics.inertia(leaf, j, i);
-        let [turns, shifts] = leaf.moves(i);
+        let [turns, shifts] = leaf.moves(j, i);
         if turns {
             node.per_inertia = 1.0 / inertia.transverse;
             node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;

@@ -36,10 +36,15 @@ impl StableStep {
     /// For a leaf with these positions and rotations.
     pub fn of(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
         let (strains, mut limit) = fastest_segment(leaf, physics, state);
-        let coupling = coupling(leaf, physics);
-        if coupling > strains {
-            limit = "coupling";
+        let (coupling, tissue) = (coupling(leaf, physics), tissue(leaf, physics, state));
+        if coupling.max(tissue) > strains {
+            limit = if tissue > coupling {
+                "tissue"
+            } else {
+                "coupling"
+            };
         }
+        let coupling = coupling + tissue;
         let (friction, all) = (physics.retardation * strains, strains + coupling);
         if friction * friction > all {
             limit = "internal damping";
@@ -126,10 +131,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
 /// Stiffness of a segment that carries the force of its strain.
 fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffness {
     let section = leaf.section(j, i).condense(f64::INFINITY);
-    let idle = leaf.segment(state, j, i, DVec3::ZERO);
-    let strain = idle.v(&section) - section.rest_strain;
-    let segment = leaf.segment(state, j, i, idle.frame * (strain / section.compliance));
-    let k = segment.hessian(&section);
+    let k = leaf.strained_segment(state, j, i).hessian(&section);
     [
         [k.xx, -k.xx, -k.xa, -k.xb],
         [-k.xx, k.xx, k.xa, k.xb],
@@ -190,6 +192,33 @@ fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
             let sum = DVec3::select(tied, of(gap) + of(gap + 1), DVec3::ZERO);
             largest = largest.max(sum.max_element());
         }
+    }
+    largest
+}
+
+/// Upper bound on the contribution of the tissue to the squared frequency: the largest of any single
+/// strip, half of the masses of a node belonging to either of its two gaps.
+fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
+    let mut largest = 0.0_f64;
+    for (g, i, stiffness) in leaf.tissue_stiffness(state) {
+        let inverse = |rod: usize| {
+            let inertia = physics.inertia(leaf, rod, i);
+            let ends = [0, leaf.rods() - 1].contains(&rod);
+            let share = if ends { 1.0 } else { 0.5 };
+            // Clamped bases do not move.
+            let free = if i == 0 && physics.clamped() {
+                0.0
+            } else {
+                1.0 / share
+            };
+            let turning = inertia.polar().min(inertia.transverse);
+            [free / turning, free / inertia.mass].map(f64::sqrt)
+        };
+        let (a, b) = (inverse(g), inverse(g + 1));
+        let roots = [a[0], a[1], b[0], b[1]];
+        let scaled = |r: usize, c: usize| roots[r / 3] * stiffness[(r, c)] * roots[c / 3];
+        let matrix = SMatrix::<f64, 12, 12>::from_fn(scaled);
+        largest = largest.max(matrix.symmetric_eigenvalues().max());
     }
     largest
 }

@@ -49,12 +49,10 @@ fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
     for (j, i) in leaf.each(0..=leaf.segments()) {
         let k = state.base(j) + i;
-        all[k].0 += leaf.load(state, j, i).0;
+        all[k].0 += leaf.load(state, j, i).force;
         if i < leaf.segments() {
             let section = leaf.section(j, i);
-            let idle = leaf.segment(state, j, i, DVec3::ZERO);
-            let strain = idle.v(section) - section.rest_strain;
-            let segment = leaf.segment(state, j, i, idle.frame * (strain / section.compliance));
+            let segment = leaf.strained_segment(state, j, i);
             let (x, a, b) = segment.gradient(section);
             all[k] = (all[k].0 + x, all[k].1 - a);
             all[k + 1] = (all[k + 1].0 - x, all[k + 1].1 - b);

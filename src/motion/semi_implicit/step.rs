@@ -56,9 +56,10 @@ impl SemiImplicit {
     /// Rotation and displacement of a node from the state to the trial; exactly zero for a held
     /// base or tip.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
-        let [turns, shifts] = match k % (self.leaf.segments() + 1) {
+        let nodes = self.leaf.segments() + 1;
+        let [turns, shifts] = match k % nodes {
             0 => [false; 2],
-            i => self.leaf.moves(i),
+            i => self.leaf.moves(k / nodes, i),
         };
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
         let shift = || self.trial.x[k] - self.state.x[k];
@@ -198,7 +199,7 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.each(1..=n) {
             let k = self.state.base(j) + i;
-            let [turns, shifts] = self.leaf.moves(i);
+            let [turns, shifts] = self.leaf.moves(j, i);
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,

@@ -81,7 +81,7 @@ impl Rod {
         for segment in &segments {
             parts.push(parts[parts.len() - 1] + segment.length() / length);
         }
-        let base = leaf.leaf.base(j) * DVec3::X;
+        let base = leaf.leaf.base(j).1 * DVec3::X;
         Rod {
             angle: base.y.atan2(base.x),
             length,

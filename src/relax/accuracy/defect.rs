@@ -14,10 +14,11 @@
 //! the relative error of the linear equations: about a hundredth on 8 segments.
 
 use crate::largest::larger;
-use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
+use crate::leaf::{DiscreteLeaf, Factorised, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
 use crate::relax::accuracy::jump_response::{Tangents, apply, largest_rotation_and_stress};
 use crate::relax::accuracy::nodal_fields::nodes;
+use crate::relax::accuracy::steps::Steps;
 use crate::relax::transfer::level::Level;
 use crate::rotation;
 use glam::DVec3;
@@ -32,9 +33,9 @@ const COARSER: usize = 2;
 const CONTRACTION: (f64, f64) = (0.64, 0.01);
 const SLOWEST: f64 = 0.2;
 
-/// The part of the integration error that remains with halved steps, or less: with order 8 it
-/// is a 256th.
-const HALVED: f64 = 1.0 / 16.0;
+/// Growth, as an exponent, of perturbations from a node to a midpoint by tissue from which on the
+/// jumps there tell nothing of the errors at the nodes.
+const MOST_GROWTH: f64 = 2.0;
 
 /// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
 /// of that of the positions (dimensionless): as they are in an extrapolated one.
@@ -45,6 +46,7 @@ const FORCES: f64 = 50.0;
 pub struct Linear {
     grid: usize,
     pub system: System,
+    factors: Factorised,
 }
 
 impl Linear {
@@ -80,7 +82,9 @@ impl Estimate {
 /// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
 /// segments of the one before, with `columns` extrapolations. If the error is more than
 /// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
-/// `None` where the linear equations cannot be solved, or where the segments of a single level
+/// `None` where grips hold veins, whose forces jump there, where the linear equations cannot be
+/// solved, where tissue is so stiff that integration
+/// along the veins is unstable, or where the segments of a single level
 /// are not pairs of equal ones. The equations are factorised, if it fits in `spare`, unless
 /// `linear` has them already.
 pub fn estimate(
@@ -96,11 +100,23 @@ pub fn estimate(
         0 => (first.grid.coarsened()?, 0),
         _ => (first.grid.clone(), last.saturating_sub(COARSER).max(1)),
     };
-    if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
-        let system = factorized(&levels[grid], spare.take(), work)?;
-        *linear = Some(Linear { grid, system });
+    let widths = (0..parts.segments()).map(|i| parts.width(i));
+    let unstable = first.growth(0.5 * widths.fold(0.0, larger)) > MOST_GROWTH;
+    if unstable || first.has_grips() {
+        return None;
     }
-    let (level, system) = (&levels[grid], &mut linear.as_mut()?.system);
+    if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
+        let (system, factors) = factorized(&levels[grid], spare.take(), work)?;
+        *linear = Some(Linear {
+            grid,
+            system,
+            factors,
+        });
+    }
+    let level = &levels[grid];
+    let Linear {
+        system, factors, ..
+    } = linear.as_mut()?;
     let (finest, count) = (&levels[last].leaf.grid, parts.segments());
     let (mut known, mut flow) = (nodes(levels, columns, count), Flow::new(first));
     let mut tangents = Tangents::new(level, count);
@@ -112,7 +128,7 @@ pub fn estimate(
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
         let integrated = integrated((first, &parts), &mut flow, &known, steps.count);
-        let Some(response) = tangents.response(system, &integrated.jumps) else {
+        let Some(response) = tangents.response((system, factors), &integrated.jumps) else {
             break;
         };
         let largest = larger(response.largest[0], response.largest[1]);
@@ -154,63 +170,23 @@ pub fn estimate(
     uncorrected
 }
 
-/// The steps of the integration from a node to a midpoint.
-struct Steps {
-    count: usize,
-    /// Whether they are half of those of the round before.
-    halved: bool,
-    /// Bound on the error of the integration.
-    error: f64,
-    /// Whether the leaf is on a single grid.
-    alone: bool,
-}
-
-impl Steps {
-    fn new(count: usize, alone: bool) -> Self {
-        Steps {
-            count,
-            halved: false,
-            error: f64::INFINITY,
-            alone,
-        }
-    }
-
-    /// With the estimated error of a round: after a round with longer steps it includes their
-    /// error, and so bounds that of the halved steps.
-    fn measure(&mut self, largest: f64) {
-        self.error = match (self.halved, self.alone) {
-            (true, true) => HALVED * largest,
-            (true, false) => 0.0,
-            (false, true) => self.error,
-            (false, false) => f64::INFINITY,
-        };
-    }
-
-    /// Halves the steps if the next round, whose error is `expected`, may be the last; on a
-    /// single grid only if their own error is not known to be small. For small tolerances, with
-    /// several grids, the ends of more steps make better stations.
-    fn choose(&mut self, expected: f64, enough: f64) {
-        let unknown = !self.alone || self.error > 0.5 * enough;
-        self.halved = unknown && expected <= enough;
-        if self.halved {
-            self.count *= 2;
-        }
-    }
-}
-
 /// Assembled anew at rest: the equations of the last Newton step have the forces before it,
 /// which differ where rods are rigid.
-fn factorized(level: &Level, spare: Option<System>, work: &mut Work) -> Option<System> {
+fn factorized(
+    level: &Level,
+    spare: Option<System>,
+    work: &mut Work,
+) -> Option<(System, Factorised)> {
     let mut system = System::reused(spare, &level.leaf);
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
     level.leaf.hold_turn(&level.state, &mut system);
-    let regular = match level.leaf.rods() {
-        1 => system.factorize_indefinite(),
-        _ => system.factorize(0.0),
+    let factors = match level.leaf.rods() {
+        1 => Factorised::of_single_rod(&mut system)?,
+        _ => Factorised::new(&mut system, 0.0)?,
     };
-    regular.then_some(system)
+    Some((system, factors))
 }
 
 /// A leaf integrated along its rods.
@@ -249,6 +225,9 @@ fn integrated(
     }
     for (j, known) in known.iter().enumerate() {
         energy -= known.last().map_or(0.0, |tip| leaf.tip_force(j).dot(tip.x));
+        let nodes = parts.sigma()[..n].iter().zip(known);
+        let work = nodes.map(|(&sigma, node)| leaf.force_on_points(j, sigma).dot(node.x));
+        energy -= work.sum::<f64>();
     }
     Integrated {
         slices,

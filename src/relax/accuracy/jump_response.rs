@@ -1,7 +1,9 @@
 //! The first-order response of a leaf to jumps of its fields, and its subtraction.
 
 use crate::largest::larger;
-use crate::leaf::{Field, Jump, RodFields, Solved, State, System, Tangent, shift, turn};
+use crate::leaf::{
+    Factorised, Field, Jump, RodFields, Solved, State, System, Tangent, shift, turn,
+};
 use crate::relax::transfer::level::Level;
 use crate::rotation;
 use glam::DVec3;
@@ -49,12 +51,16 @@ impl<'a> Tangents<'a> {
         }
     }
 
-    /// The response to `jumps`; `system` holds the factorised equations. `None` where these
+    /// The response to `jumps`; `system` holds the equations and `factors` their factors. `None` where these
     /// cannot be solved.
-    pub fn response(&self, system: &mut System, jumps: &[Vec<Jump>]) -> Option<Response> {
+    pub fn response(
+        &self,
+        (system, factors): (&mut System, &mut Factorised),
+        jumps: &[Vec<Jump>],
+    ) -> Option<Response> {
         let leaf = &self.level.leaf;
         leaf.assemble_jumps(&self.behind, jumps, system);
-        let Solved::Yes(_) = system.solve(None, ACCURACY) else {
+        let Solved::Yes(_) = factors.solve(system, ACCURACY) else {
             return None;
         };
         let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);
@@ -126,12 +132,13 @@ impl<'a> Tangents<'a> {
         let moment = second.xb.transpose() * across + second.ab.transpose() * a + second.bb * b;
         let left = leaf.grid.width(i - 1);
         let right = if i < n { leaf.grid.width(i) } else { 0.0 };
-        let load = leaf.load(moved, j, i).0 - leaf.load(state, j, i).0;
+        let [before, after] = [state, moved].map(|state| leaf.load(state, j, i));
+        let part = left / (left + right);
         [
             end,
             b,
-            force - load * (left / (left + right)),
-            moment + 0.5 * b.cross(g_b),
+            force - part * (after.force - before.force),
+            moment + 0.5 * b.cross(g_b) - part * (after.moment - before.moment),
         ]
     }
 }
@@ -166,12 +173,14 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     }
 }
 
-/// The state with its nodes displaced.
+/// The state with its nodes displaced and rotated.
 fn moved(state: &State, response: &Response) -> State {
     let mut moved = state.clone();
     for j in 0..state.rods() {
         for i in 1..=state.segments() {
-            moved.x[state.base(j) + i] += response.at(j, i)[0];
+            let (k, [shift, turn]) = (state.base(j) + i, response.at(j, i));
+            moved.x[k] += shift;
+            moved.q[k] = (rotation::exp(turn) * moved.q[k]).normalize();
         }
     }
     moved

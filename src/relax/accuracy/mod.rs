@@ -5,3 +5,4 @@ pub mod dense_output;
 pub mod jump_response;
 pub mod nodal_fields;
 pub mod richardson;
+pub mod steps;

@@ -2,7 +2,6 @@
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::relax::path::Stage;
-use crate::relax::settle::start::rest_shapes;
 use crate::rotation;
 use glam::DVec3;
 
@@ -28,10 +27,11 @@ enum Tips {
 }
 
 /// What a tip is apart from the common one: on its way its line from the base turns into the
-/// mean direction of all, uniformly, while its distance changes to the mean of all quadratically.
+/// direction of that, for a fan the mean direction of all, uniformly, while its distance changes to the mean of all quadratically.
 /// So does that of a bent vein: a straight one that was compressed in proportion would buckle
 /// at once, to either side.
 struct Offset {
+    base: DVec3,
     from: DVec3,
     /// Rotation into the common direction.
     turn: DVec3,
@@ -41,34 +41,46 @@ struct Offset {
 
 impl Offset {
     /// Of all tips.
-    fn all(tips: &[DVec3]) -> Vec<Offset> {
+    fn all(bases: &[DVec3], tips: &[DVec3]) -> Vec<Offset> {
         let mean = |value: &dyn Fn(DVec3) -> DVec3| {
             tips.iter().map(|tip| value(*tip)).sum::<DVec3>() / tips.len() as f64
         };
         let distance = mean(&|tip| DVec3::splat(tip.length())).x;
         let direction = mean(&|tip| tip.normalize_or_zero()).normalize_or_zero();
-        let of = |from: &DVec3| {
+        let fan = bases.iter().all(|base| *base == DVec3::ZERO);
+        let common = match fan {
+            true => distance * direction,
+            false => mean(&|tip| tip),
+        };
+        let of = |(base, tip): (&DVec3, &DVec3)| {
+            let (from, to) = (*tip - *base, common - *base);
+            let direction = if fan {
+                direction
+            } else {
+                to.normalize_or_zero()
+            };
             let axis = from.normalize_or_zero().cross(direction);
             let angle = axis.length().atan2(from.normalize_or_zero().dot(direction));
             Offset {
-                from: *from,
+                base: *base,
+                from,
                 turn: angle * axis.normalize_or_zero(),
-                to: distance * direction,
+                to,
             }
         };
-        tips.iter().map(of).collect()
+        bases.iter().zip(tips).map(of).collect()
     }
 
     fn at(&self, part: f64) -> DVec3 {
         let turned = |part: f64| rotation::exp(part * self.turn) * self.from;
-        turned(part) + part * part * (self.to - turned(1.0))
+        self.base + turned(part) + part * part * (self.to - turned(1.0))
     }
 }
 
 impl<'a> Loading<'a> {
     /// The natural leaf, and its state.
     pub fn new(whole: &'a DiscreteLeaf) -> (Self, State) {
-        let natural = rest_shapes(whole);
+        let natural = whole.natural();
         let tips = match whole.tips_move_together() {
             true => Tips::Joining(Vec::new()),
             false => Tips::Free,
@@ -88,7 +100,7 @@ impl<'a> Loading<'a> {
     /// The stages in which anything happens.
     pub fn stages(&self) -> impl Iterator<Item = Stage> + use<> {
         let loads = &self.whole.leaf.loads;
-        let loaded = [loads.gravity, loads.tip_force] != [DVec3::ZERO; 2];
+        let loaded = [loads.gravity, loads.tip_force] != [DVec3::ZERO; 2] || loads.own != 0.0;
         let joined = !matches!(self.tips, Tips::Free) || self.whole.coupled();
         let stages = [(loaded, Stage::Loading), (joined, Stage::Joining)];
         stages
@@ -102,7 +114,8 @@ impl<'a> Loading<'a> {
         (self.stage, self.part) = (stage, 0.0);
         if let (Stage::Joining, Tips::Joining(offsets)) = (stage, &mut self.tips) {
             let tips: Vec<DVec3> = state.tips().collect();
-            *offsets = Offset::all(&tips);
+            let bases: Vec<DVec3> = (0..state.rods()).map(|j| state.x[state.base(j)]).collect();
+            *offsets = Offset::all(&bases, &tips);
         }
     }
 

@@ -7,6 +7,7 @@ use crate::memory::TooMuch;
 use crate::refusal::RefusedOption;
 use crate::relax::path::Route;
 use crate::relax::request::method::Method;
+use crate::scenario::Scenario;
 use crate::shooting;
 use glam::DVec3;
 
@@ -136,4 +137,20 @@ pub enum RelaxError {
     /// Too much memory.
     #[error("{0}")]
     Memory(#[from] TooMuch),
+    /// Grips, which this method or question does not take into account.
+    #[error(
+        "[[grip]]: {what} does not take grips along veins into account: relax and map do; leave them out, or hold the tip by [tip]"
+    )]
+    Grips {
+        /// The method or the question.
+        what: &'static str,
+    },
+}
+
+/// Refuses scenarios with grips for what does not take them into account.
+pub fn without_grips(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
+    match scenario.grips.is_empty() {
+        true => Ok(()),
+        false => Err(RelaxError::Grips { what }),
+    }
 }

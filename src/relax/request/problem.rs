@@ -87,10 +87,10 @@ impl<'a> Problem<'a> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // Held tips are moved to their holder by a method of their own.
+        // What is held is moved to its holder by a method of its own.
         self.options.route == Route::Loading
             && !released
-            && self.leaf.held.is_none()
+            && !self.leaf.is_held()
             && self.leaf.loads != Loads::default()
             && self.leaf.loads.tip_moment == DVec3::ZERO
     }
@@ -103,7 +103,7 @@ impl<'a> Problem<'a> {
         );
         settles
             && self.options.route == Route::Loading
-            && self.leaf.held.is_none()
+            && !self.leaf.is_held()
             && self.leaf.loads.tip_moment == DVec3::ZERO
             && !self.out_of_time()
     }
@@ -114,14 +114,14 @@ impl<'a> Problem<'a> {
             return Some(Path::STABLE);
         }
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let moved = self.leaf.held.is_some() || self.leaf.loads.tip_moment != DVec3::ZERO;
+        let moved = self.leaf.is_held() || self.leaf.loads.tip_moment != DVec3::ZERO;
         (released && !moved).then_some(Path::Released)
     }
 
     /// The largest number of corrections.
     pub fn corrections(&self) -> usize {
         let grids = matches!(self.options.method, Method::SemiImplicit(_));
-        let free = self.leaf.held.is_none() && self.segments().is_none();
+        let free = !self.leaf.is_held() && self.segments().is_none();
         match grids && free && self.shape_alone {
             true => CORRECTIONS,
             false => 0,

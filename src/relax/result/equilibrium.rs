@@ -5,6 +5,7 @@ use crate::numbers::power_of_ten;
 use crate::relax::path::Path;
 use crate::relax::request::method::Method;
 use crate::relax::result::margin::Margin;
+use crate::relax::result::reaction::{GripReaction, Reaction};
 use crate::relax::saddle::Saddle;
 use crate::shape;
 use crate::shape::RodShape;
@@ -195,20 +196,6 @@ pub struct Stability {
     pub saddle: Option<Saddle>,
 }
 
-/// The reaction at a held tip: what the leaf exerts on its holder.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Reaction {
-    /// The force.
-    #[serde(rename = "tip_reaction")]
-    pub force: DVec3,
-    /// For a clamp, the moments of the rods about the tip.
-    #[serde(
-        rename = "tip_reaction_moments",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub moments: Option<Vec<DVec3>>,
-}
-
 /// Derivatives of the results of a leaf at rest with respect to a number of its scenario, in
 /// the scenario's units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -311,6 +298,9 @@ pub struct Equilibrium {
     /// The reaction at the tip, if it is held.
     #[serde(flatten)]
     pub reaction: Option<Reaction>,
+    /// What it exerts on every grip.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub grip_reactions: Vec<GripReaction>,
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,

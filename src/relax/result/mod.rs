@@ -3,5 +3,6 @@
 pub mod equilibrium;
 pub mod margin;
 pub mod plausible;
+pub mod reaction;
 pub mod report;
 pub mod stations;

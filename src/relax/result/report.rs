@@ -3,14 +3,12 @@
 use crate::leaf::{Grid, Leaf, RodFields};
 use crate::newton::Stop;
 use crate::relax::accuracy::nodal_fields::with_sign_of;
-use crate::relax::accuracy::richardson::Richardson;
 use crate::relax::nested::NestedEquilibrium;
 use crate::relax::path::{Event, Happening, Path, Stage};
 use crate::relax::request::method::Method;
 use crate::relax::request::problem::Problem;
-use crate::relax::result::equilibrium::{
-    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
-};
+use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::relax::result::reaction::{grip_reactions, reaction};
 use crate::relax::transfer::level::{Level, flat};
 use crate::relax::transfer::strains;
 use crate::scenario::{Scenario, obstacle};
@@ -57,6 +55,7 @@ pub fn equilibrium(
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: reaction(&found.levels, columns),
+        grip_reactions: grip_reactions(&found.levels, columns),
         stability: Stability {
             negative_eigenvalues: found.index,
             neutral_directions: neutral_directions(scenario, &rods),
@@ -188,26 +187,6 @@ fn fields(
     };
     let rods = rods.iter().enumerate().map(rod).collect();
     (grid.sigma().to_vec(), rods, between)
-}
-
-/// The reaction at a held tip, after `columns` extrapolations.
-fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
-    let leaf = &levels[0].leaf.leaf;
-    let held = leaf.held.as_ref()?;
-    let on = |level: &Level| {
-        let (force, moments) = level.leaf.reaction(&level.state);
-        let all = [force].into_iter().chain(moments);
-        let values = all.flat_map(|it| it.to_array()).collect();
-        (level.leaf.segments(), values)
-    };
-    let table: Richardson = levels.iter().map(on).collect();
-    let mut vectors = table.column(columns).chunks(3).map(DVec3::from_slice);
-    let force = vectors.next()? * leaf.scale.force();
-    let moments = vectors.map(|moment| moment * leaf.scale.moment()).collect();
-    Some(Reaction {
-        force,
-        moments: held.clamps.is_some().then_some(moments),
-    })
 }
 
 /// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of

@@ -13,7 +13,8 @@ use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, Leaf, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::result::equilibrium::{Reaction, Sensitivity};
+use crate::relax::result::equilibrium::Sensitivity;
+use crate::relax::result::reaction::Reaction;
 use crate::relax::sensitivity::parameter::Parameter;
 use crate::relax::transfer::level::Level;
 use crate::scenario::Scenario;
@@ -196,7 +197,7 @@ impl Grid<'_> {
                     true => self.reaction(near.as_ref(), change),
                     false => Vec::new(),
                 },
-                self.positions(response),
+                self.positions(rate, response),
             ]
         });
         Some((eigenvalues, changes.collect()))
@@ -220,11 +221,12 @@ impl Grid<'_> {
     }
 
     /// Displacements of the nodes that all grids have, rod after rod.
-    fn positions(&self, response: &Response) -> Vec<DVec3> {
-        let rods = response.nodes.iter();
-        let of = |rod: &Vec<[f64; 6]>| -> Vec<DVec3> {
+    fn positions(&self, rate: &LeafRate, response: &Response) -> Vec<DVec3> {
+        let rods = response.nodes.iter().enumerate();
+        let of = |(j, rod): (usize, &Vec<[f64; 6]>)| -> Vec<DVec3> {
             let nodes = rod.iter().skip(self.stride - 1).step_by(self.stride);
-            [DVec3::ZERO].into_iter().chain(nodes.map(shift)).collect()
+            let [base, _] = rate.of_base(j);
+            [base].into_iter().chain(nodes.map(shift)).collect()
         };
         rods.flat_map(of).collect()
     }

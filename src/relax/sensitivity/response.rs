@@ -160,8 +160,9 @@ pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f
     let mut state = level.state.clone();
     for j in 0..state.rods() {
         let base = state.base(j);
-        let turned = rotation::exp(step * rate.base_turn(j) * DVec3::Z);
-        state.q[base] = (turned * state.q[base]).normalize();
+        let [shift, turn] = rate.of_base(j);
+        state.x[base] += step * shift;
+        state.q[base] = (rotation::exp(step * turn) * state.q[base]).normalize();
     }
     response.advance(&mut state, step);
     state

@@ -5,7 +5,7 @@
 //! start has its tips, and the grips move and rotate uniformly to their final positions, with
 //! the leaf at rest at every step.
 
-use crate::leaf::{DiscreteLeaf, State, System};
+use crate::leaf::{DiscreteLeaf, Gripped, State, System};
 use crate::newton::{Definite, Stop};
 use crate::relax::request::problem::Problem;
 use crate::relax::saddle;
@@ -25,8 +25,8 @@ const ACCURACY: f64 = 1e-2;
 /// Saddles that are left in a step.
 const PUSHES: i32 = 3;
 
-/// Moves the tips from their positions in `state` to those where they are held. Returns the
-/// state there, whether the leaf rests in it, and whether its energy was not convex along
+/// Moves tips and other nodes from their positions in `state` to those where they are held. Returns
+/// the state there, whether the leaf rests in it, and whether its energy was not convex along
 /// the path.
 pub fn move_grips(
     problem: &Problem,
@@ -34,10 +34,13 @@ pub fn move_grips(
     state: State,
     effort: &mut Effort,
 ) -> (State, bool, bool) {
-    let Some(paths) = paths(leaf, &state) else {
-        return (state, false, false);
-    };
-    let steps = paths.iter().map(Path::steps).fold(1.0, f64::max);
+    let paths = paths(leaf, &state).unwrap_or_default();
+    let grips: Vec<GripPath> = (0..leaf.rods())
+        .flat_map(|j| leaf.grips_of(j).map(|held| GripPath::of(*held, &state)))
+        .collect();
+    let of_tips = paths.iter().map(Path::steps);
+    let steps = of_tips.chain(grips.iter().map(GripPath::steps));
+    let steps = steps.fold(1.0, f64::max);
     let keeps_unstable = problem.keeps_unstable();
     let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
     let mut system = System::new(leaf);
@@ -50,11 +53,12 @@ pub fn move_grips(
         for (j, path) in paths.iter().enumerate() {
             path.move_tip(leaf, j, step as f64 / steps, &mut held.state);
         }
+        carry(leaf, &grips, step as f64 / steps, &mut held.state);
         held.near_rest = settle_held(leaf, &mut system, &mut held, keeps_unstable);
     }
     let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
     effort.spent += leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
-    leaf.leaf.hold_tips(&mut state);
+    leaf.hold(&mut state);
     (state, near_rest, moved)
 }
 
@@ -150,5 +154,75 @@ impl Path {
                 state.q[base + i] = (rotation::exp(sigma * turn) * state.q[base + i]).normalize();
             }
         }
+    }
+}
+
+/// The path of a node from where it is to where a grip holds it.
+struct GripPath {
+    held: Gripped,
+    from: DVec3,
+    turn: DVec3,
+}
+
+impl GripPath {
+    fn of(held: Gripped, start: &State) -> Self {
+        let k = start.base(held.rod) + held.node;
+        let turn = |to: DQuat| rotation::log(to * start.q[k].conjugate());
+        GripPath {
+            held,
+            from: start.x[k],
+            turn: held.rotation.map_or(DVec3::ZERO, turn),
+        }
+    }
+
+    /// The number of steps along the path.
+    fn steps(&self) -> f64 {
+        let distance = self.from.distance(self.held.position);
+        (distance / SHIFT).max(self.turn.length() / TURN).ceil()
+    }
+}
+
+/// Carries gripped nodes to the fraction `part` of their paths. The nodes between two of them, or
+/// one and the end of the vein, are displaced in proportion to their distances.
+fn carry(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) {
+    let (n, sigma) = (leaf.segments(), leaf.grid.sigma());
+    for j in 0..leaf.rods() {
+        let (base, mut before) = (state.base(j), (0, DVec3::ZERO));
+        let fixed_tip = leaf.leaf.held.is_some() || leaf.tips_move_together();
+        let of_rod: Vec<&GripPath> = paths.iter().filter(|path| path.held.rod == j).collect();
+        for path in &of_rod {
+            let node = path.held.node;
+            let shift = path.from.lerp(path.held.position, part) - state.x[base + node];
+            between(sigma, [before, (node, shift)], |i, shift| {
+                state.x[base + i] += shift
+            });
+            state.x[base + node] += shift;
+            if let Some(rotation) = path.held.rotation {
+                let left = rotation::exp((part - 1.0) * path.turn);
+                state.q[base + node] = (left * rotation).normalize();
+            }
+            before = (node, shift);
+        }
+        if !of_rod.is_empty() && before.0 < n {
+            let end = if fixed_tip { DVec3::ZERO } else { before.1 };
+            between(sigma, [before, (n, end)], |i, shift| {
+                state.x[base + i] += shift
+            });
+            if !fixed_tip {
+                state.x[base + n] += end;
+            }
+        }
+    }
+}
+
+/// Passes the nodes between two nodes, with their displacements interpolated.
+fn between(
+    sigma: &[f64],
+    [(a, from), (b, to)]: [(usize, DVec3); 2],
+    mut each: impl FnMut(usize, DVec3),
+) {
+    for i in a + 1..b {
+        let part = (sigma[i] - sigma[a]) / (sigma[b] - sigma[a]);
+        each(i, from.lerp(to, part));
     }
 }

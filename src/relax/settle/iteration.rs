@@ -87,7 +87,7 @@ fn settle_upright(
     let mut leaf = DiscreteLeaf::new(problem.leaf, grid);
     let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
     let from_start = matches!(guess, InitialGuess::Start);
-    let grip = leaf.leaf.held.is_some() && from_start;
+    let grip = leaf.leaf.is_held() && from_start;
     let cg_tolerance = match guess {
         InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
         InitialGuess::Coarser(_) => 1e-4,
@@ -102,8 +102,9 @@ fn settle_upright(
         | InitialGuess::Pushed(state) => state,
     };
     let mut moved = false;
-    if grip {
-        (state, near_rest, moved) = move_grips(problem, &leaf, state, effort);
+    match grip {
+        true => (state, near_rest, moved) = move_grips(problem, &leaf, state, effort),
+        false => leaf.hold(&mut state),
     }
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     let dead_moment = leaf.tip_moment() != DVec3::ZERO;
@@ -271,6 +272,9 @@ fn step_reporter(
 /// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
 /// factorisation of the last iteration.
 fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    if system.tied() {
+        return [None; 2];
+    }
     [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
         leaf.assemble_stiffening(state, dropped, system);
         match system.solve(None, EFFECT_ACCURACY) {

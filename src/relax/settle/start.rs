@@ -2,17 +2,33 @@
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rotation;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use std::f64::consts::PI;
 
 /// The initial state of a relaxation: circular arcs that leave the base in the directions of
 /// the fan and meet in a common tip; free rods start from their rest shapes.
 pub fn start(leaf: &DiscreteLeaf) -> State {
-    if leaf.leaf.joined() && leaf.rods() > 1 {
-        arcs(leaf)
-    } else {
-        rest_shapes(leaf)
+    match leaf.leaf.joined() && leaf.rods() > 1 {
+        true if leaf.tied() || !leaf.leaf.is_fan() => closed(leaf),
+        true => arcs(leaf),
+        false => leaf.natural(),
     }
+}
+
+/// The natural leaf with its tips moved to their mean, and every node in proportion to its distance
+/// from the base.
+fn closed(leaf: &DiscreteLeaf) -> State {
+    let mut state = leaf.natural();
+    let tips: DVec3 = state.tips().sum();
+    let mean = tips / leaf.rods() as f64;
+    for j in 0..leaf.rods() {
+        let (base, missing) = (state.base(j), mean - state.tip(j));
+        for (i, &sigma) in leaf.grid.sigma().iter().enumerate() {
+            state.x[base + i] += sigma * missing;
+        }
+        state.x[base + leaf.segments()] = mean;
+    }
+    state
 }
 
 /// Arcs in the plane of the fan, symmetric about the mean base direction. Their chords differ:
@@ -55,25 +71,6 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
         *x.last_mut().expect("a rod has nodes") = tip;
     }
     State::new(leaf.segments(), x, q)
-}
-
-/// The natural leaf, unstrained rods: v = v0, u = u0.
-pub fn rest_shapes(leaf: &DiscreteLeaf) -> State {
-    let (mut xs, mut qs) = (Vec::new(), Vec::new());
-    for j in 0..leaf.rods() {
-        let (mut x, mut q): (DVec3, DQuat) = (DVec3::ZERO, leaf.leaf.base(j));
-        xs.push(x);
-        qs.push(q);
-        for i in 0..leaf.segments() {
-            let section = leaf.section(j, i);
-            let next = (q * rotation::exp(section.rest_curvature * section.ds)).normalize();
-            x += section.ds * (rotation::midpoint(q, next) * section.rest_strain);
-            q = next;
-            xs.push(x);
-            qs.push(q);
-        }
-    }
-    State::new(leaf.segments(), xs, qs)
 }
 
 /// Largest slope of a disturbance, and the number of amplitudes.

@@ -75,17 +75,20 @@ pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DV
             .gradient(leaf.section(j, i))
     };
     let (force, moment) = if i == 0 {
-        (carried(0) + leaf.load(state, j, 0).0, -segment(0).1)
+        let load = leaf.load(state, j, 0);
+        (carried(0) + load.force, load.moment - segment(0).1)
     } else {
         // The part of the nodal load that belongs to the left half-cell.
         let left = leaf.grid.width(i - 1);
         let right = if i < n { leaf.grid.width(i) } else { 0.0 };
-        let mut load = leaf.load(state, j, i).0;
-        if i == n {
-            load -= leaf.tip_force(j);
-        }
-        let force = carried(i - 1) - load * (left / (left + right));
-        (force, segment(i - 1).2)
+        let mut load = leaf.load(state, j, i);
+        load.force -= match i == n {
+            true => leaf.tip_force(j),
+            false => leaf.force_on_points(j, leaf.grid.sigma()[i]),
+        };
+        let before = left / (left + right);
+        let force = carried(i - 1) - before * load.force;
+        (force, segment(i - 1).2 - before * load.moment)
     };
     [force, moment].map(|vector| to_directors * vector)
 }

@@ -16,6 +16,7 @@ use crate::limit::Limit;
 use crate::memory;
 use crate::relax::{
     Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, relax_on_grids,
+    without_grips,
 };
 use crate::scenario::Scenario;
 
@@ -87,6 +88,7 @@ pub fn relax_with_margin(
     if scenario.tip_moment != [0.0; 3] {
         return Err(MarginError::Moment);
     }
+    without_grips(scenario, "the margin")?;
     let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
@@ -291,9 +293,7 @@ fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State),
 }
 
 fn weight(scenario: &Scenario) -> f64 {
-    let lengths: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
-    let [x, y, z] = scenario.gravity;
-    (x * x + y * y + z * z).sqrt() * lengths
+    scenario.total_load().length()
 }
 
 fn largest_push(scenario: &Scenario, weight: f64) -> f64 {

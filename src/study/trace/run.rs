@@ -125,8 +125,7 @@ pub fn traced(
 
 /// The force of all loads of a leaf.
 fn total_load(scenario: &Scenario) -> DVec3 {
-    let length: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
-    length * DVec3::from_array(scenario.gravity) + DVec3::from_array(scenario.tip_force)
+    scenario.total_load() + DVec3::from_array(scenario.tip_force)
 }
 
 /// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how

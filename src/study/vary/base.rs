@@ -204,7 +204,8 @@ impl Base {
             }),
             value,
             unit,
-            linear: keys.is_linear(),
+            // The natural leaf, in which tissue has no force, depends on shapes at rest otherwise.
+            linear: keys.is_linear() && self.scenario().tissue.is_none(),
         }
     }
 

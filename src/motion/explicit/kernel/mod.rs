@@ -112,6 +112,9 @@ pub struct Step<'a> {
     /// Force per displacement and unit of sigma of the coupling to the rod before each, and
     /// after it, if there is any coupling.
     pub coupling: Option<[[f64; 3]; 2]>,
+    /// Moments and forces on the nodes of the whole leaf besides, laid out as positions, if there
+    /// are any.
+    pub applied: Option<&'a [[Array; 3]; 2]>,
     pub motion: &'a mut Motion,
     /// Block by block.
     pub material: &'a [Arc<Material>],

@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::segments::quaternion;
-use super::{BLOCK, Motion, Step, WIDTH};
+use super::{Array, BLOCK, Motion, Step, WIDTH};
 use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
 /// cos and sin(a)/a as series in a^2, for angles of a step (halved). Due to truncation
@@ -22,9 +22,14 @@ impl Step<'_> {
     #[inline(always)]
     pub fn kick_and_drift<S: Simd>(&mut self, simd: S, range: (usize, usize)) -> Lanes<S> {
         // In two loops: the processor overlaps iterations of short ones.
-        let moving = match self.coupling {
-            Some(coupling) => self.translate::<S, true>(simd, range, coupling),
-            None => self.translate::<S, false>(simd, range, [[0.0; 3]; 2]),
+        let none = [[0.0; 3]; 2];
+        let moving = match (self.coupling, self.applied) {
+            (coupling, Some([moments, _])) => {
+                self.add_moments(range, moments);
+                self.translate::<S, true, true>(simd, range, coupling.unwrap_or(none))
+            }
+            (Some(coupling), None) => self.translate::<S, true, false>(simd, range, coupling),
+            (None, None) => self.translate::<S, false, false>(simd, range, none),
         };
         let turning = match self.normalise {
             true => self.rotate::<S, true>(simd, range),
@@ -33,9 +38,20 @@ impl Step<'_> {
         moving + turning
     }
 
+    /// Adds moments on the nodes to those of the segments.
+    fn add_moments(&mut self, (start, nodes): (usize, usize), moments: &[Array; 3]) {
+        let first = self.layout.at(self.layout.rods_of(self.pack).start, start);
+        for (left, moments) in self.block.left.iter_mut().zip(moments) {
+            let moments = &moments[first..first + nodes];
+            for (left, moment) in left[WIDTH..].iter_mut().zip(moments) {
+                *left += 2.0 * moment;
+            }
+        }
+    }
+
     /// Velocities and positions.
     #[inline(always)]
-    fn translate<S: Simd, const COUPLED: bool>(
+    fn translate<S: Simd, const COUPLED: bool, const APPLIED: bool>(
         &mut self,
         simd: S,
         range: (usize, usize),
@@ -57,6 +73,10 @@ impl Step<'_> {
             of_rods(first - stride),
             of_rods(first),
             of_rods(first + stride),
+        );
+        let forces = cut(
+            self.applied.map_or(self.positions, |[_, forces]| forces),
+            (first, nodes),
         );
         let [next_x, next_y, next_z] = &mut self.next;
         let mut next = [
@@ -81,6 +101,9 @@ impl Step<'_> {
                 force = pull.mul_add(Lanes::load(simd, coupled[0], at), force);
                 let pull = (Vectors::load(simd, &after, at) - x) * to_after;
                 force = pull.mul_add(Lanes::load(simd, coupled[1], at), force);
+            }
+            if APPLIED {
+                force = force + Vectors::load(simd, &forces, at);
             }
             let per_mass = Lanes::load(simd, per_mass, at);
             let old = Vectors::load(simd, &v, at);

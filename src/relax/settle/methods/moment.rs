@@ -170,7 +170,7 @@ pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
-    let mut base = leaf.leaf.base(0);
+    let (_, mut base) = leaf.leaf.base(0);
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
     for section in &leaf.sections {
         turn = segment_turn(section, base, leaf.tip_moment(), turn)?;

@@ -1,0 +1,204 @@
+//! Tissue between neighbouring veins: the law of a strip ([`Strip`]) at every node of every gap, in
+//! the sums over the leaf.
+
+use super::discrete::DiscreteLeaf;
+use super::state::State;
+use super::system::System;
+use crate::largest::largest;
+use crate::rod::{Ends, Strip};
+use glam::DVec3;
+use nalgebra::{SMatrix, SVector};
+
+/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
+/// to the lower rod.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NodeLoad {
+    /// Moment.
+    pub moment: DVec3,
+    /// Force.
+    pub force: DVec3,
+    /// Potential energy.
+    pub energy: f64,
+}
+
+impl DiscreteLeaf {
+    /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
+    /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
+    /// joint tip, where they resist rotations.
+    pub(super) fn strips(&self, natural: &State) -> Vec<Strip> {
+        let gaps = 0..self.rods() - 1;
+        let strip = |g: usize, i: usize| {
+            let [stiffness, fold] = self.leaf.tissue(g);
+            let weight = self.grid.weight(i);
+            Strip::natural(weight * stiffness, weight * fold.x, &across(natural, g, i))
+        };
+        gaps.flat_map(|g| (0..=self.segments()).map(move |i| strip(g, i)))
+            .collect()
+    }
+
+    /// Whether tissue ties neighbouring rods.
+    pub fn tied(&self) -> bool {
+        !self.strips.is_empty()
+    }
+
+    /// The exponent by which perturbations of one vein grow over a part `width` of its length where
+    /// the tissue on both sides resists them: it bends, as on a foundation, or stretches.
+    pub fn growth(&self, width: f64) -> f64 {
+        if !self.tied() {
+            return 0.0;
+        }
+        let rate = |j: usize| {
+            let gaps = [j.checked_sub(1), (j + 1 < self.rods()).then_some(j)];
+            let gaps = gaps.into_iter().flatten();
+            let k = 2.0
+                * gaps
+                    .map(|g| self.leaf.tissue(g)[0].max_element())
+                    .sum::<f64>();
+            let section = self.leaf.section(j, 0.5, 1.0);
+            let (length, softest) = (section.ds, section.couple_stiffness.min_element());
+            let bends = (k * length.powi(3) / softest).sqrt().sqrt();
+            let stretches = (k * length * section.compliance.max_element()).sqrt();
+            bends.max(stretches)
+        };
+        width * largest((0..self.rods()).map(rate))
+    }
+
+    /// The strip of node `i` in gap `g`.
+    fn strip(&self, g: usize, i: usize) -> &Strip {
+        &self.strips[g * (self.segments() + 1) + i]
+    }
+
+    /// What the tissue on either side exerts on node `i` of rod `j`.
+    pub(super) fn tissue_load(&self, state: &State, j: usize, i: usize) -> NodeLoad {
+        let mut load = NodeLoad::default();
+        if !self.tied() {
+            return load;
+        }
+        let gaps = [
+            (j.checked_sub(1), 1),
+            ((j + 1 < self.rods()).then_some(j), 0),
+        ];
+        for (gap, end) in gaps {
+            let Some(g) = gap else { continue };
+            let (strip, ends) = (self.strip(g, i), across(state, g, i));
+            let [moment, force] = strip.loads(&ends)[end];
+            load.moment += moment;
+            load.force += force;
+            if end == 0 {
+                load.energy += strip.energy(&ends);
+            }
+        }
+        load
+    }
+
+    /// Energy of the tissue in a state.
+    pub fn tissue_energy(&self, state: &State) -> f64 {
+        let each = self.each_strip();
+        each.map(|(g, i, strip)| strip.energy(&across(state, g, i)))
+            .sum()
+    }
+
+    fn each_strip(&self) -> impl Iterator<Item = (usize, usize, &Strip)> {
+        let nodes = self.segments() + 1;
+        let strips = self.strips.iter().enumerate();
+        strips.map(move |(k, strip)| (k / nodes, k % nodes, strip))
+    }
+
+    /// Adds the tissue to the right-hand side of an assembled system and, if `matrix`, to its matrix,
+    /// where nodes move; returns its energy.
+    pub(super) fn add_tissue(&self, state: &State, system: &mut System, matrix: bool) -> f64 {
+        let mut energy = 0.0;
+        for (g, i, strip) in self.each_strip() {
+            let ends = across(state, g, i);
+            energy += strip.energy(&ends);
+            if i == 0 {
+                continue;
+            }
+            for (rod, load) in [g, g + 1].into_iter().zip(strip.loads(&ends)) {
+                system.add_load(rod, i, load);
+            }
+            if matrix {
+                let hessian = strip.hessian(&ends);
+                for (rod, own) in [g, g + 1].into_iter().zip(&hessian.own) {
+                    system.add_block(rod, i, own);
+                }
+                *system.across_mut(g, i - 1) = hessian.across;
+            }
+        }
+        energy
+    }
+
+    /// Adds the moments and forces of all tissue on all nodes, rod after rod.
+    pub fn add_tissue_loads(&self, state: &State, loads: &mut [[DVec3; 2]]) {
+        for (g, i, strip) in self.each_strip() {
+            let [a, b] = strip.loads(&across(state, g, i));
+            for (rod, [moment, force]) in [(g, a), (g + 1, b)] {
+                let load = &mut loads[state.base(rod) + i];
+                load[0] += moment;
+                load[1] += force;
+            }
+        }
+    }
+
+    /// Gap, node and the second derivatives of the energy of every strip, by the unknowns of both
+    /// nodes.
+    pub fn tissue_stiffness(
+        &self,
+        state: &State,
+    ) -> impl Iterator<Item = (usize, usize, SMatrix<f64, 12, 12>)> {
+        self.each_strip().map(|(g, i, strip)| {
+            let hessian = strip.hessian(&across(state, g, i));
+            let entry = |r: usize, c: usize| match (r / 6, c / 6) {
+                (0, 1) => hessian.across[r][c - 6],
+                (1, 0) => hessian.across[c][r - 6],
+                (a, _) => hessian.own[a][r.min(c) % 6][r.max(c) % 6],
+            };
+            (g, i, SMatrix::from_fn(entry))
+        })
+    }
+
+    /// The largest stiffness against displacements, that against a fold, and the natural width of
+    /// the strips on either side of node `i` of rod `j`.
+    pub fn tissue_at(&self, j: usize, i: usize) -> impl Iterator<Item = (f64, f64, f64)> {
+        let gaps = [j.checked_sub(1), Some(j)].into_iter().flatten();
+        let gaps = gaps.filter(|g| self.tied() && g + 1 < self.rods());
+        gaps.map(move |g| {
+            let strip = self.strip(g, i);
+            (
+                strip.stiffness.max_element(),
+                strip.fold,
+                strip.width.length(),
+            )
+        })
+    }
+
+    /// The changes of energy and loads of the strip of node `i` in gap `g` by a change of it.
+    pub(super) fn tissue_rates(
+        &self,
+        state: &State,
+        (g, i): (usize, usize),
+        change: &Strip,
+    ) -> (f64, [[DVec3; 2]; 2]) {
+        self.strip(g, i).rates(&across(state, g, i), change)
+    }
+
+    /// Second derivatives of the energy of the tissue along a shape, at all nodes but the bases.
+    pub fn tissue_curvature(&self, state: &State, shape: &[super::Increment]) -> f64 {
+        let moving = self.tissue_stiffness(state).filter(|(_, i, _)| *i > 0);
+        let each = moving.map(|(g, i, stiffness)| {
+            let [a, b] = [g, g + 1].map(|rod| &shape[state.base(rod) + i]);
+            let both = SVector::<f64, 12>::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] });
+            both.dot(&(stiffness * both))
+        });
+        each.sum()
+    }
+}
+
+/// The two nodes of a strip.
+fn across(state: &State, g: usize, i: usize) -> Ends {
+    let nodes = [g, g + 1].map(|rod| state.base(rod) + i);
+    Ends {
+        x: nodes.map(|k| state.x[k]),
+        q: nodes.map(|k| state.q[k]),
+    }
+}

@@ -1,0 +1,239 @@
+//! Tissue between two neighbouring veins: the midpoint element laid across, from a node of one to
+//! the node of the other at an equal fraction of their lengths.
+//!
+//! With the geodesic midpoint R of the rotations q0 and q1 of both nodes, the positions x0 and x1
+//! and the same in the natural leaf, in which tissue has no force,
+//!
+//! e = R^T (x1 - x0) - \[natural\],   theta = log(q0^* q1) - \[natural\],
+//! E = 1/2 sum_k k_k e_k^2 + 1/2 c_1 theta_1^2.
+//!
+//! k_1 resists neighbours that slide along each other, k_2 a change of width, k_3 one vein that rises
+//! above the other, c_1 a fold along the veins. Other than a segment a strip may have no stiffness
+//! in some direction, so that its forces are those of its strains.
+
+use super::derivatives::{First, UNKNOWNS, on_nodes};
+use super::element::{Element, Nodes};
+use super::section::{Section, Sections};
+use super::segment::Ends;
+use crate::rotation;
+use glam::DVec3;
+use pulp::Scalar;
+
+/// A block of a matrix of the unknowns (rotation, displacement) of a node, rows first.
+pub type NodeBlock = [[f64; UNKNOWNS]; UNKNOWNS];
+
+/// The tissue that belongs to a node of two neighbouring veins; also its derivative with respect
+/// to a parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Strip {
+    /// k: force per displacement along the veins, across, and normal to the leaf.
+    pub stiffness: DVec3,
+    /// c_1: moment per radian of a fold along the veins.
+    pub fold: f64,
+    /// R^T (x1 - x0) in the natural leaf.
+    pub width: DVec3,
+    /// log(q0^* q1) in the natural leaf.
+    pub turn: DVec3,
+}
+
+/// The second derivatives of the energy of a strip.
+pub struct StripHessian {
+    /// The blocks of the two nodes, upper triangles.
+    pub own: [NodeBlock; 2],
+    /// The block between the first and the second.
+    pub across: NodeBlock,
+}
+
+impl Strip {
+    /// A strip that is without force between these ends.
+    pub fn natural(stiffness: DVec3, fold: f64, ends: &Ends) -> Strip {
+        let middle = rotation::midpoint(ends.q[0], ends.q[1]);
+        Strip {
+            stiffness,
+            fold,
+            width: middle.inverse() * (ends.x[1] - ends.x[0]),
+            turn: rotation::log(ends.q[0].conjugate() * ends.q[1]),
+        }
+    }
+
+    /// The difference from another strip.
+    pub fn minus(&self, other: &Strip) -> Strip {
+        Strip {
+            stiffness: self.stiffness - other.stiffness,
+            fold: self.fold - other.fold,
+            width: self.width - other.width,
+            turn: self.turn - other.turn,
+        }
+    }
+
+    /// Adds `times` another strip.
+    pub fn add(&mut self, times: f64, other: &Strip) {
+        self.stiffness += times * other.stiffness;
+        self.fold += times * other.fold;
+        self.width += times * other.width;
+        self.turn += times * other.turn;
+    }
+
+    fn element(&self, ends: &Ends) -> (Element<Scalar>, Sections<Scalar>) {
+        let sections = Sections::from(&Section {
+            ds: 1.0,
+            couple_stiffness: self.fold * DVec3::X,
+            rest_curvature: self.turn,
+            rest_strain: self.width,
+            compliance: DVec3::ZERO,
+            condensing: self.stiffness,
+        });
+        (Element::strained(&sections, &Nodes::from(ends)), sections)
+    }
+
+    /// The strains e and theta_1 between these ends.
+    fn strains(&self, element: &Element<Scalar>) -> (DVec3, f64) {
+        let [w, u] = [element.w, element.u].map(DVec3::from);
+        (w - self.width, u.x - self.turn.x)
+    }
+
+    /// Its energy.
+    pub fn energy(&self, ends: &Ends) -> f64 {
+        let (e, theta) = self.strains(&self.element(ends).0);
+        0.5 * ((self.stiffness * e).dot(e) + self.fold * theta * theta)
+    }
+
+    /// Moment and force that it exerts on either node.
+    pub fn loads(&self, ends: &Ends) -> [[DVec3; 2]; 2] {
+        let (element, sections) = self.element(ends);
+        on_ends(element.gradient(&sections))
+    }
+
+    /// The change of its energy and of its [`loads`](Strip::loads) by a change of the strip.
+    pub fn rates(&self, ends: &Ends, rate: &Strip) -> (f64, [[DVec3; 2]; 2]) {
+        let (mut element, sections) = self.element(ends);
+        let (e, theta) = self.strains(&element);
+        let energy = (0.5 * rate.stiffness * e - self.stiffness * rate.width).dot(e)
+            + (0.5 * rate.fold * theta - self.fold * rate.turn.x) * theta;
+        element.nu = (rate.stiffness * e - self.stiffness * rate.width).into();
+        element.m = ((rate.fold * theta - self.fold * rate.turn.x) * DVec3::X).into();
+        (energy, on_ends(element.gradient(&sections)))
+    }
+
+    /// The second derivatives of its energy.
+    pub fn hessian(&self, ends: &Ends) -> StripHessian {
+        let (element, sections) = self.element(ends);
+        let hessian = element.second_strained(&sections).by_nodes();
+        StripHessian {
+            own: hessian.own.map(|block| block.map(|row| row.map(f64::from))),
+            across: hessian.across.map(|row| row.map(f64::from)),
+        }
+    }
+}
+
+/// Moment and force on both nodes, minus the derivatives of an energy.
+fn on_ends(first: First<Scalar>) -> [[DVec3; 2]; 2] {
+    on_nodes(first).map(|node| {
+        let [a, b, c, d, e, f] = node.map(f64::from);
+        [-DVec3::new(a, b, c), -DVec3::new(d, e, f)]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+
+    /// A strip far from its natural state, and its ends.
+    fn strained() -> (Strip, Ends) {
+        let ends = |scale: f64| Ends {
+            x: [
+                DVec3::new(0.1, -0.2, 0.3) * scale,
+                DVec3::new(0.15, 0.1, 0.25),
+            ],
+            q: [
+                DQuat::from_scaled_axis(scale * DVec3::new(0.4, -0.3, 0.8)),
+                DQuat::from_scaled_axis(DVec3::new(-0.2, 0.5, 0.6) * scale),
+            ],
+        };
+        let strip = Strip::natural(DVec3::new(20.0, 40.0, 0.0), 0.5, &ends(0.3));
+        (strip, ends(1.0))
+    }
+
+    /// The ends with one of the 12 unknowns changed.
+    fn moved(ends: &Ends, k: usize, by: f64) -> Ends {
+        let (mut ends, change) = (*ends, by * DVec3::AXES[k % 3]);
+        match k % 6 / 3 {
+            0 => ends.q[k / 6] = rotation::exp(change) * ends.q[k / 6],
+            _ => ends.x[k / 6] += change,
+        }
+        ends
+    }
+
+    /// The derivative of a function of a number by central differences of order 4.
+    fn slope(f: impl Fn(f64) -> f64) -> f64 {
+        let central = |h: f64| (f(h) - f(-h)) / (2.0 * h);
+        (4.0 * central(1e-3) - central(2e-3)) / 3.0
+    }
+
+    fn flat(loads: [[DVec3; 2]; 2]) -> Vec<f64> {
+        loads
+            .as_flattened()
+            .iter()
+            .flat_map(|v| v.to_array())
+            .collect()
+    }
+
+    #[test]
+    fn loads_are_the_derivatives_of_the_energy_and_vanish_in_the_natural_leaf() {
+        let (strip, ends) = strained();
+        let loads = flat(strip.loads(&ends));
+        for k in 0..12 {
+            let slope = slope(|h| strip.energy(&moved(&ends, k, h)));
+            assert!((loads[k] + slope).abs() < 1e-9, "{k}: {} {slope}", loads[k]);
+        }
+        let rest = Strip::natural(strip.stiffness, strip.fold, &ends);
+        assert!(
+            flat(rest.loads(&ends))
+                .iter()
+                .all(|load| load.abs() < 1e-14)
+        );
+    }
+
+    /// In spatial increments the derivatives of moments are unsymmetric by half of their moment.
+    #[test]
+    fn the_hessian_is_the_symmetric_part_of_the_derivative_of_the_loads() {
+        let (strip, ends) = strained();
+        let hessian = strip.hessian(&ends);
+        let by = |r: usize, k: usize| slope(|h| -flat(strip.loads(&moved(&ends, k, h)))[r]);
+        for (r, k) in (0..12).flat_map(|r| (r..12).map(move |k| (r, k))) {
+            let found = match (r / 6, k / 6) {
+                (a, b) if a == b => hessian.own[a][r % 6][k % 6],
+                _ => hessian.across[r % 6][k % 6],
+            };
+            let expected = 0.5 * (by(r, k) + by(k, r));
+            assert!(
+                (found - expected).abs() < 1e-8,
+                "{r} {k}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn rates_are_derivatives_by_the_strip() {
+        let (strip, ends) = strained();
+        let rate = Strip {
+            stiffness: DVec3::new(1.0, -2.0, 3.0),
+            fold: 0.7,
+            width: DVec3::new(0.3, 0.1, -0.2),
+            turn: DVec3::new(0.2, -0.1, 0.4),
+        };
+        let changed = |h: f64| Strip {
+            stiffness: strip.stiffness + h * rate.stiffness,
+            fold: strip.fold + h * rate.fold,
+            width: strip.width + h * rate.width,
+            turn: strip.turn + h * rate.turn,
+        };
+        let (energy, loads) = strip.rates(&ends, &rate);
+        assert!((energy - slope(|h| changed(h).energy(&ends))).abs() < 1e-9);
+        for (k, load) in flat(loads).into_iter().enumerate() {
+            let expected = slope(|h| flat(changed(h).loads(&ends))[k]);
+            assert!((load - expected).abs() < 1e-9, "{k}: {load} {expected}");
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Loads that veins have of their own: weights, loads along them, and on points.
+
+use glam::DVec3;
+
+use crate::shooting::equations::Equations;
+use crate::shooting::state::{RodState, STATE};
+
+/// Fractions of the length closer to each other than this are the same.
+const SAME_PLACE: f64 = 1e-11;
+
+impl Equations<'_> {
+    /// Load of rod `j` alone, per length: its weight besides the common one, and what is
+    /// distributed along it.
+    pub(in crate::shooting) fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+        if !self.own_loads {
+            return DVec3::ZERO;
+        }
+        let s = self.scenario;
+        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+        let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+        });
+        (weight + along) * (self.length / self.force)
+    }
+
+    /// Passes the loads on points at `sigma`, by which forces jump, on the way to the tip; false if
+    /// there are none.
+    pub fn pass_points(&self, sigma: f64, y: &mut [f64]) -> bool {
+        let mut any = false;
+        for (j, force) in self.on_points(sigma) {
+            let mut rod = RodState::read(y, j);
+            rod.n -= force;
+            y[STATE * self.rods()] -= force.dot(rod.r);
+            rod.write(y, j);
+            any = true;
+        }
+        any
+    }
+
+    /// Rods and forces of the loads on points at `sigma`.
+    pub(in crate::shooting) fn on_points(
+        &self,
+        sigma: f64,
+    ) -> impl Iterator<Item = (usize, DVec3)> {
+        let points = self
+            .scenario
+            .points
+            .iter()
+            .filter(move |point| (point.at - sigma).abs() < SAME_PLACE);
+        let unit = self.part / self.force;
+        points.map(move |point| {
+            (
+                point.vein,
+                unit * DVec3::from_array(self.scenario.force_on(point)),
+            )
+        })
+    }
+
+    /// The force on the tip of rod `j` by loads on points.
+    pub(in crate::shooting) fn on_tip(&self, j: usize) -> DVec3 {
+        let forces = self.on_points(1.0).filter(|(rod, _)| *rod == j);
+        forces.map(|(_, force)| force).sum()
+    }
+}
