@@ -6,6 +6,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyTuple};
 
+/// A force, and the moment beside it if there is one.
+pub type ForceAndMoment<'py> = (Bound<'py, PyAny>, Option<Bound<'py, PyAny>>);
+
 /// A numpy array, or the exception that prevented it.
 pub type Array<'py> = PyResult<Bound<'py, PyAny>>;
 

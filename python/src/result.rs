@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
+use leafdyn::relax::{Equilibrium, GripReaction, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
 use leafdyn_program::files::{self, Document, FileError, Kind, Written};
 use pyo3::exceptions::{PyKeyError, PyOSError};
@@ -11,7 +11,7 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrays::{Array, array, curves, flat, nodes, vectors};
+use crate::arrays::{Array, ForceAndMoment, array, curves, flat, nodes, vectors};
 use crate::run::on_pool;
 
 /// Any result that can be written to files.
@@ -235,6 +235,16 @@ impl Leaf {
             force,
             vectors(py, reaction.moments.as_deref().unwrap_or_default())?,
         ]))
+    }
+
+    /// Of every grip the force that its holder feels, and the moment if it is clamped.
+    fn grip_reactions<'py>(&self, py: Python<'py>) -> PyResult<Vec<ForceAndMoment<'py>>> {
+        let reaction = |grip: &GripReaction| {
+            let force = array(py, flat([grip.force]), &[3])?;
+            let moment = grip.moment.map(|moment| array(py, flat([moment]), &[3]));
+            Ok((force, moment.transpose()?))
+        };
+        self.found.grip_reactions.iter().map(reaction).collect()
     }
 
     fn stations<'py>(&self, py: Python<'py>) -> Array<'py> {

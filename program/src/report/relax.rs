@@ -8,8 +8,9 @@ use crate::report::numbers::{
 };
 use crate::report::table::{Lines, labelled};
 use crate::report::words::{shooting, verdict};
+use glam::DVec3;
 use leafdyn::largest::largest;
-use leafdyn::relax::{Equilibrium, Event, Mode, Outcome, Path, Reaction, Sensitivity};
+use leafdyn::relax::{Equilibrium, Event, Mode, Outcome, Path, Sensitivity};
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
@@ -39,11 +40,18 @@ impl Reported for Equilibrium {
             }
             lines.push(("energy", as_accurate(self, energy, energy)));
         }
+        let moments =
+            |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
-            let error = reaction_error(self, reaction);
-            let force = reaction.force.to_array().map(|it| known(it, error));
-            let force = force.join(", ");
+            let force = felt(self, reaction.force, moments(&reaction.moments));
             lines.push(("reaction", format!("({force}) on the holder of the tip")));
+        }
+        for (number, grip) in self.grip_reactions.iter().enumerate() {
+            let force = felt(self, grip.force, grip.moment.map_or(0.0, DVec3::length));
+            lines.push((
+                "grip",
+                format!("({force}) on the holder of grip {}", number + 1),
+            ));
         }
         lines.extend(waves(self).map(|waves| ("waves", waves)));
         lines.push(("error", error(self)));
@@ -118,17 +126,17 @@ const WITHOUT_ERROR: f64 = 1e-10;
 /// of positions relative to its length: of 48 leaves 14 times at most.
 const OF_FORCES: f64 = 20.0;
 
-/// The error of the force on a holder. Where that is small, as on a ring that closes by itself,
-/// the forces that bend the leaf and those of clamps tell how accurate it is.
-fn reaction_error(equilibrium: &Equilibrium, reaction: &Reaction) -> f64 {
+/// The force on a holder, which may feel a moment as well, to its known digits. Where it is small, as
+/// on a ring that closes by itself, the forces that bend the leaf and those of clamps tell how
+/// accurate it is.
+fn felt(equilibrium: &Equilibrium, force: DVec3, moment: f64) -> String {
     let longest = equilibrium.shape.longest();
-    let moments = reaction.moments.iter().flatten();
-    let moment = largest(moments.map(|moment| moment.length()));
     let energy = equilibrium.energy.unwrap_or_default().abs();
-    let force = largest([reaction.force.length(), moment / longest, energy / longest]);
+    let most = largest([force.length(), moment / longest, energy / longest]);
     let error = equilibrium.accuracy.error_estimate;
     let relative = error.map_or(WITHOUT_ERROR, |error| error / longest);
-    OF_FORCES * relative.max(ROUNDING) * force
+    let error = OF_FORCES * relative.max(ROUNDING) * most;
+    force.to_array().map(|it| known(it, error)).join(", ")
 }
 
 fn error(equilibrium: &Equilibrium) -> String {

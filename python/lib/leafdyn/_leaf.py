@@ -122,6 +122,11 @@ class Equilibrium(Viewed):
         return None if self._reaction is None else self._reaction[1]
 
     @cached_property
+    def grip_reactions(self) -> list[tuple[Array, Array | None]]:
+        """Of every grip the force that its holder feels, shape (3,), and the moment about its middle if it is clamped."""
+        return self._core.grip_reactions()
+
+    @cached_property
     def stations(self) -> Array:
         """Fractions of the length, base to tip, shape (K + 1,)."""
         return self._core.stations()
