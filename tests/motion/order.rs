@@ -6,6 +6,7 @@
 //! waves too fast for the coarsest steps are hardly there.
 
 use leafdyn::internals::leaf::State;
+use leafdyn::scenario::Tissue;
 use leafdyn_testing::motion::{
     BOTH, DAMPINGS, Scheme, apart, at, curling, distance, limit, method, numbers, ramp, rest,
     three_veins, twisted_rod,
@@ -76,6 +77,26 @@ fn of_a_rod_and_a_leaf_in_space_and_a_rod_that_changes_its_rest_shape() {
     rod.dynamics.external_damping = 1.5;
     rod.dynamics.internal_damping = 0.01;
     assert_order("changing rod", &rod, 0.7, equal(0.01));
+}
+
+/// With tissue between veins that begin apart, and loads of single ones.
+#[test]
+fn of_a_leaf_with_tissue() {
+    let mut leaf = three_veins();
+    leaf.dynamics.tip_force = ramp(2.0, [-8.0, 16.0, 26.0]);
+    leaf.coupling = vec![[0.0; 3]; 2];
+    leaf.tissue = Some(vec![
+        Tissue {
+            stiffness: [20.0, 40.0, 30.0],
+            fold: 0.5,
+        };
+        2
+    ]);
+    for (rod, y) in leaf.rods.iter_mut().zip([-0.1, 0.0, 0.1]) {
+        rod.base = [0.0, y, 0.02];
+        rod.elevation = y;
+    }
+    assert_order("tied leaf", &leaf, 0.3, equal(0.0));
 }
 
 /// Where a leaf is after intervals of very different lengths, each of which

@@ -5,4 +5,5 @@ mod error;
 mod kinks;
 mod singular;
 mod soft;
+mod tissue;
 mod work;

@@ -64,6 +64,42 @@ fn coupling(draw: &mut Draw, number: usize, rods: usize) -> Part {
     }
 }
 
+/// Bases apart, tissue between the veins, and loads of single ones.
+fn apart(draw: &mut Draw, number: usize, rods: usize) -> Part {
+    if number.is_multiple_of(2) {
+        return (String::new(), "");
+    }
+    let base: Vec<_> = (0..rods).map(|j| [0.0, 0.1 * j as f64, 0.05]).collect();
+    let tissue = match rods {
+        1 => String::new(),
+        _ => format!(
+            "tissue = {{ along = 20.0, across = {:?}, normal = 15.0, fold = 0.4 }}",
+            draw.list(rods - 1, 5.0, 40.0)
+        ),
+    };
+    let text = format!(
+        r#"
+        {tissue}
+        leaf.base = {base:?}
+        leaf.elevation = {:?}
+        load.g = [0.0, 0.1, -0.3]
+        load.point = [{{ vein = {rods}, at = 0.5, force = [0.1, -0.2, 0.3] }}, {{ vein = 1, at = 1.0, force = [0.0, 0.1, 0.0], mass = 0.2 }}]
+        load.distributed = {{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.2], [0.1, 0.0, 0.0]] }}
+        "#,
+        draw.list(rods, -0.3, 0.3),
+    );
+    let keys = match rods {
+        1 => {
+            "leaf.base[0][1] leaf.elevation[0] load.g[2] load.point[0].force[0] load.point[1].mass"
+        }
+        _ => {
+            "leaf.base[1][1] leaf.base[0][2] leaf.elevation[0] load.g[2] load.point[0].force[2] \
+             tissue.along tissue.across[0] tissue.normal tissue.fold"
+        }
+    };
+    (text, keys)
+}
+
 /// A joint tip that is held, pinned or clamped.
 fn held_tip(draw: &mut Draw, number: usize, rods: usize) -> Part {
     match number % 6 {
@@ -92,14 +128,16 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         true => held_tip(&mut draw, number, rods),
         false => (String::new(), ""),
     };
+    let (apart, apart_keys) = apart(&mut draw, number, rods);
     let all = "rest.twist[0] rest.bend_2[0] rest.bend_3[0] rest.stretch load.gravity[0] \
                load.gravity[2] load.tip_force[1] leaf.length[0] leaf.fan[0] dynamics.density";
-    let keys = [all, its_keys, coupling_keys, tip_keys];
+    let keys = [all, its_keys, coupling_keys, tip_keys, apart_keys];
     let text = format!(
         r#"
         name = "leaf{number}"
         {tip}
         {coupling}
+        {apart}
         leaf.rods = {rods}
         leaf.joined = {joined}
         leaf.length = {:?}

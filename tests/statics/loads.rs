@@ -1,0 +1,96 @@
+//! Loads of single veins and points, and weights of their masses.
+
+use leafdyn_testing::*;
+
+const ROD: &str = r#"
+    name = "rod"
+    leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.4, axial = inf, shear_2 = inf, shear_3 = inf }
+"#;
+
+/// A force in the middle bends the half before it as one at the tip of a vein of half the length;
+/// the other half stays straight.
+#[test]
+fn a_force_in_the_middle_bends_the_half_before_it_alone() {
+    let force = "force = [0.3, 1.0, -4.0]";
+    let loaded = format!("{ROD}\n[[load.point]]\nvein = 1\nat = 0.5\n{force}");
+    let whole = settle(&parse(&loaded), 1e-11);
+    let half = ROD.replace("length = 1.0", "length = 0.5");
+    let half = format!("{half}\nload.tip_{force}");
+    let half = settle(&parse(&half), 1e-11);
+    let end = half.shape.rods[0].nodes.last().unwrap();
+    let tip = end.position + 0.5 * (end.rotation * DVec3::X);
+    assert!(whole.tips[0].distance(tip) < 1e-10);
+    // The force is that just before the point.
+    let shape = &whole.shape;
+    let middle = shape
+        .stations
+        .iter()
+        .position(|sigma| *sigma == 0.5)
+        .unwrap();
+    let (force, _) = in_lab(&shape.rods[0].nodes[middle]);
+    assert!(force.distance(DVec3::new(0.3, 1.0, -4.0)) < 1e-8, "{force}");
+}
+
+/// The weight of a mass, a list of weights, and a load along the vein are the same load.
+#[test]
+fn the_same_weight_may_be_stated_in_four_ways() {
+    let ways = [
+        "load.gravity = [0.2, 0.0, -3.0]",
+        "load.gravity = [[0.2, 0.0, -3.0]]",
+        "load.g = [0.4, 0.0, -6.0]\ndynamics.density = 0.5",
+        "load.distributed = { at = [0.0, 1.0], value = [[0.2, 0.0, -3.0], [0.2, 0.0, -3.0]] }",
+    ];
+    let leaves = ways.map(|way| settle(&parse(&format!("{ROD}\n{way}")), 1e-10));
+    for leaf in &leaves[1..] {
+        let bars = [leaf, &leaves[0]].map(|it| it.accuracy.error_estimate.unwrap());
+        assert!(distance(leaf, &leaves[0]) <= bars[0] + bars[1]);
+        close(
+            "energy",
+            leaf.energy.unwrap(),
+            leaves[0].energy.unwrap(),
+            1e-9,
+        );
+        assert_eq!(leaf.stable(), Some(true));
+    }
+}
+
+/// Veins that nothing ties together rest as each would alone.
+#[test]
+fn each_vein_has_its_own_weight() {
+    let both = r#"
+        name = "both"
+        leaf = { rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false, base = [[0.0, 0.0, 0.0], [0.1, 2.0, 0.3]] }
+        stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.4, axial = inf, shear_2 = inf, shear_3 = inf }
+        load.gravity = [[0.0, 0.0, -2.0], [0.0, 1.0, 0.5]]
+    "#;
+    let both = settle(&parse(both), 1e-10);
+    for (vein, weight, base) in [
+        (0, "[0.0, 0.0, -2.0]", DVec3::ZERO),
+        (1, "[0.0, 1.0, 0.5]", DVec3::new(0.1, 2.0, 0.3)),
+    ] {
+        let alone = settle(&parse(&format!("{ROD}\nload.gravity = {weight}")), 1e-10);
+        assert!(both.tips[vein].distance(alone.tips[0] + base) < 3e-10);
+    }
+}
+
+/// Wherever it is along the vein, the estimated error is a bound, also where the leaf is integrated
+/// across the point.
+#[test]
+fn forces_on_points_anywhere_are_within_the_bars() {
+    for at in [0.07, 0.29, 0.36, 0.58, 0.77, 0.93] {
+        let text = format!("{ROD}\n[[load.point]]\nvein = 1\nat = {at}\nforce = [0.3, 1.0, -2.0]");
+        let scenario = parse(&text);
+        let best = settle(&scenario, 1e-11);
+        for tolerance in [1e-3, 1e-5, 1e-7] {
+            let leaf = leafdyn_testing::relaxed(&scenario, &with_modes(0, to(tolerance)));
+            let bar = leaf.accuracy.error_estimate.unwrap();
+            assert!(bar <= tolerance);
+            let off = distance(&leaf, &best);
+            assert!(
+                off <= bar + 1e-11,
+                "{at}, {tolerance}: {off:.1e}, {bar:.1e}"
+            );
+        }
+    }
+}
