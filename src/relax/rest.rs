@@ -42,8 +42,9 @@ pub(crate) fn relax_on_grids(
         explicit::check(&leaf)?;
     }
     let method = options.method;
-    // Four segments are too few to be divided among panels.
-    let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
+    // Four segments are too few to be divided among panels, and for the layers of tissue.
+    let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
+    let least = least(method, tolerance, few);
     let first = check_segments(&leaf, method.segments(), least)?;
     let half = reducible(method).then(|| leaf.half()).flatten();
     let problem = Problem {
