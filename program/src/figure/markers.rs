@@ -61,14 +61,20 @@ pub fn tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
-/// Draws the markers of a leaf: points of a second solution, the clamp and all tips,
+/// Draws the markers of a leaf: points of a second solution, the clamps and all tips,
 /// small if there are many.
 pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
         dot(page, place(point), radius);
     }
-    clamp_marker(page, place(DVec3::ZERO));
+    let mut bases: Vec<DVec3> = Vec::new();
+    for base in veins.bases() {
+        if !bases.contains(&base) {
+            clamp_marker(page, place(base));
+            bases.push(base);
+        }
+    }
     if let [(tip, _)] = veins.tips.as_slice() {
         return tip_marker(page, place(*tip));
     }

@@ -44,7 +44,7 @@ pub struct Veins {
     pub count: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
-    /// Corners of the bounding box; the clamp is at the origin.
+    /// Corners of the bounding box.
     pub low: DVec3,
     pub high: DVec3,
     /// The largest rod length, in the scenario's units.
@@ -55,6 +55,12 @@ impl Veins {
     pub fn of(equilibrium: &Equilibrium) -> Self {
         let shape = &equilibrium.shape;
         Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
+    }
+
+    /// Where the veins that are drawn begin.
+    pub fn bases(&self) -> impl Iterator<Item = DVec3> {
+        let first = |vein: &Vein| vein.pieces.first().map_or(DVec3::ZERO, |piece| piece[0]);
+        self.veins.iter().map(first)
     }
 
     /// The veins of a moving leaf at one instant.
