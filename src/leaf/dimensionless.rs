@@ -50,6 +50,20 @@ impl Held {
     }
 }
 
+/// A node that a grip holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gripped {
+    /// Number of the grip.
+    pub grip: usize,
+    /// Rod and node.
+    pub rod: usize,
+    pub node: usize,
+    /// Where it is held.
+    pub position: DVec3,
+    /// In which rotation, if that is held.
+    pub rotation: Option<DQuat>,
+}
+
 /// Dead loads.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loads {

@@ -1,11 +1,9 @@
 //! The discretised leaf: its segments, loads and coupling.
 
-use super::dimensionless::{Leaf, Loads};
+use super::dimensionless::{Gripped, Leaf, Loads};
 use super::grid::Grid;
-use super::holds::Gripped;
-use super::loads::{RodLoad, RodLoads, group_loads};
+use super::loads::{NodeLoad, RodLoad, RodLoads, group_loads};
 use super::state::State;
-use super::tissue::NodeLoad;
 use crate::lanes::{GROUP, Vectors};
 use crate::largest::largest;
 use crate::rod::{Section, Segment, Strip};

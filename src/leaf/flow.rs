@@ -192,8 +192,9 @@ impl<'a> Flow<'a> {
             let [stiffness, fold] = leaf.tissue(g);
             let strip = Strip::natural(stiffness, fold.x, &ends(left.0, right.0));
             let ends = ends(left.1, right.1);
-            slopes[g / GROUP][13].0[g % GROUP] += strip.energy(&ends);
-            for (j, [mut moment, mut force]) in [g, g + 1].into_iter().zip(strip.loads(&ends)) {
+            let (energy, loads) = strip.energy_and_loads(&ends);
+            slopes[g / GROUP][13].0[g % GROUP] += energy;
+            for (j, [mut moment, mut force]) in [g, g + 1].into_iter().zip(loads) {
                 if leaf.in_plane(j) {
                     // The image of its neighbour pulls it back into the plane.
                     (moment.x, moment.z, force.y) = (0.0, 0.0, 0.0);

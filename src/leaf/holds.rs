@@ -1,23 +1,10 @@
 //! Nodes that are held: tips by their holder, and others by grips along their veins.
 
+use super::dimensionless::Gripped;
 use super::discrete::DiscreteLeaf;
 use super::state::State;
 use crate::scenario::{Grip, Hold};
-use glam::{DQuat, DVec3};
-
-/// A node that a grip holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gripped {
-    /// Number of the grip.
-    pub grip: usize,
-    /// Rod and node.
-    pub rod: usize,
-    pub node: usize,
-    /// Where it is held.
-    pub position: DVec3,
-    /// In which rotation, if that is held.
-    pub rotation: Option<DQuat>,
-}
+use glam::DVec3;
 
 impl DiscreteLeaf {
     /// The nodes that grips hold, where they are in the `natural` leaf and moved by their

@@ -17,6 +17,18 @@ pub struct RodLoad {
     pub image: DVec3,
 }
 
+/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
+/// to the lower rod.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NodeLoad {
+    /// Moment.
+    pub moment: DVec3,
+    /// Force.
+    pub force: DVec3,
+    /// Potential energy.
+    pub energy: f64,
+}
+
 /// Loads on a group of rods, component by component, in the order of the fields of [`RodLoad`].
 pub type GroupLoads = [[Four; 3]; 5];
 

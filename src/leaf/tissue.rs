@@ -2,24 +2,13 @@
 //! the sums over the leaf.
 
 use super::discrete::DiscreteLeaf;
+use super::loads::NodeLoad;
 use super::state::State;
 use super::system::System;
 use crate::largest::largest;
 use crate::rod::{Ends, Strip};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
-
-/// Moment, force and energy of what acts on a node besides its segments; the energy of a gap belongs
-/// to the lower rod.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct NodeLoad {
-    /// Moment.
-    pub moment: DVec3,
-    /// Force.
-    pub force: DVec3,
-    /// Potential energy.
-    pub energy: f64,
-}
 
 impl DiscreteLeaf {
     /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
@@ -81,21 +70,15 @@ impl DiscreteLeaf {
         for (gap, end) in gaps {
             let Some(g) = gap else { continue };
             let (strip, ends) = (self.strip(g, i), across(state, g, i));
-            let [moment, force] = strip.loads(&ends)[end];
+            let (energy, loads) = strip.energy_and_loads(&ends);
+            let [moment, force] = loads[end];
             load.moment += moment;
             load.force += force;
             if end == 0 {
-                load.energy += strip.energy(&ends);
+                load.energy += energy;
             }
         }
         load
-    }
-
-    /// Energy of the tissue in a state.
-    pub fn tissue_energy(&self, state: &State) -> f64 {
-        let each = self.each_strip();
-        each.map(|(g, i, strip)| strip.energy(&across(state, g, i)))
-            .sum()
     }
 
     fn each_strip(&self) -> impl Iterator<Item = (usize, usize, &Strip)> {
@@ -110,11 +93,12 @@ impl DiscreteLeaf {
         let mut energy = 0.0;
         for (g, i, strip) in self.each_strip() {
             let ends = across(state, g, i);
-            energy += strip.energy(&ends);
+            let (own, loads) = strip.energy_and_loads(&ends);
+            energy += own;
             if i == 0 {
                 continue;
             }
-            for (rod, load) in [g, g + 1].into_iter().zip(strip.loads(&ends)) {
+            for (rod, load) in [g, g + 1].into_iter().zip(loads) {
                 system.add_load(rod, i, load);
             }
             if matrix {
@@ -131,7 +115,7 @@ impl DiscreteLeaf {
     /// Adds the moments and forces of all tissue on all nodes, rod after rod.
     pub fn add_tissue_loads(&self, state: &State, loads: &mut [[DVec3; 2]]) {
         for (g, i, strip) in self.each_strip() {
-            let [a, b] = strip.loads(&across(state, g, i));
+            let (_, [a, b]) = strip.energy_and_loads(&across(state, g, i));
             for (rod, [moment, force]) in [(g, a), (g + 1, b)] {
                 let load = &mut loads[state.base(rod) + i];
                 load[0] += moment;

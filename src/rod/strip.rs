@@ -92,19 +92,15 @@ impl Strip {
         (w - self.width, u.x - self.turn.x)
     }
 
-    /// Its energy.
-    pub fn energy(&self, ends: &Ends) -> f64 {
-        let (e, theta) = self.strains(&self.element(ends).0);
-        0.5 * ((self.stiffness * e).dot(e) + self.fold * theta * theta)
-    }
-
-    /// Moment and force that it exerts on either node.
-    pub fn loads(&self, ends: &Ends) -> [[DVec3; 2]; 2] {
+    /// Its energy, and the moment and force that it exerts on either node.
+    pub fn energy_and_loads(&self, ends: &Ends) -> (f64, [[DVec3; 2]; 2]) {
         let (element, sections) = self.element(ends);
-        on_ends(element.gradient(&sections))
+        let (e, theta) = self.strains(&element);
+        let energy = 0.5 * ((self.stiffness * e).dot(e) + self.fold * theta * theta);
+        (energy, on_ends(element.gradient(&sections)))
     }
 
-    /// The change of its energy and of its [`loads`](Strip::loads) by a change of the strip.
+    /// The change of its energy and of its loads by a change of the strip.
     pub fn rates(&self, ends: &Ends, rate: &Strip) -> (f64, [[DVec3; 2]; 2]) {
         let (mut element, sections) = self.element(ends);
         let (e, theta) = self.strains(&element);
@@ -155,6 +151,14 @@ mod tests {
         (strip, ends(1.0))
     }
 
+    fn energy(strip: &Strip, ends: &Ends) -> f64 {
+        strip.energy_and_loads(ends).0
+    }
+
+    fn loads(strip: &Strip, ends: &Ends) -> [[DVec3; 2]; 2] {
+        strip.energy_and_loads(ends).1
+    }
+
     /// The ends with one of the 12 unknowns changed.
     fn moved(ends: &Ends, k: usize, by: f64) -> Ends {
         let (mut ends, change) = (*ends, by * DVec3::AXES[k % 3]);
@@ -182,14 +186,14 @@ mod tests {
     #[test]
     fn loads_are_the_derivatives_of_the_energy_and_vanish_in_the_natural_leaf() {
         let (strip, ends) = strained();
-        let loads = flat(strip.loads(&ends));
+        let found = flat(loads(&strip, &ends));
         for k in 0..12 {
-            let slope = slope(|h| strip.energy(&moved(&ends, k, h)));
-            assert!((loads[k] + slope).abs() < 1e-9, "{k}: {} {slope}", loads[k]);
+            let slope = slope(|h| energy(&strip, &moved(&ends, k, h)));
+            assert!((found[k] + slope).abs() < 1e-9, "{k}: {} {slope}", found[k]);
         }
         let rest = Strip::natural(strip.stiffness, strip.fold, &ends);
         assert!(
-            flat(rest.loads(&ends))
+            flat(loads(&rest, &ends))
                 .iter()
                 .all(|load| load.abs() < 1e-14)
         );
@@ -200,7 +204,7 @@ mod tests {
     fn the_hessian_is_the_symmetric_part_of_the_derivative_of_the_loads() {
         let (strip, ends) = strained();
         let hessian = strip.hessian(&ends);
-        let by = |r: usize, k: usize| slope(|h| -flat(strip.loads(&moved(&ends, k, h)))[r]);
+        let by = |r: usize, k: usize| slope(|h| -flat(loads(&strip, &moved(&ends, k, h)))[r]);
         for (r, k) in (0..12).flat_map(|r| (r..12).map(move |k| (r, k))) {
             let found = match (r / 6, k / 6) {
                 (a, b) if a == b => hessian.own[a][r % 6][k % 6],
@@ -229,10 +233,10 @@ mod tests {
             width: strip.width + h * rate.width,
             turn: strip.turn + h * rate.turn,
         };
-        let (energy, loads) = strip.rates(&ends, &rate);
-        assert!((energy - slope(|h| changed(h).energy(&ends))).abs() < 1e-9);
-        for (k, load) in flat(loads).into_iter().enumerate() {
-            let expected = slope(|h| flat(changed(h).loads(&ends))[k]);
+        let (by_energy, by_loads) = strip.rates(&ends, &rate);
+        assert!((by_energy - slope(|h| energy(&changed(h), &ends))).abs() < 1e-9);
+        for (k, load) in flat(by_loads).into_iter().enumerate() {
+            let expected = slope(|h| flat(loads(&changed(h), &ends))[k]);
             assert!((load - expected).abs() < 1e-9, "{k}: {load} {expected}");
         }
     }
