@@ -18,6 +18,8 @@ const STEP: f64 = 1.0 / 16.0;
 #[derive(Clone, Debug)]
 pub struct Natural<'a> {
     scenario: &'a Scenario,
+    /// Whether the rest lengths have grown.
+    grown: bool,
     /// Of every vein the fractions of its length where a step ends, with the states there.
     veins: Vec<Vec<(f64, Vein)>>,
 }
@@ -26,12 +28,15 @@ pub struct Natural<'a> {
 type Vein = (DVec3, DQuat);
 
 impl<'a> Natural<'a> {
-    /// Of this scenario.
+    /// The leaf in which the tissue of this scenario is without force: its veins have grown, or not
+    /// yet.
     pub fn new(scenario: &'a Scenario) -> Self {
-        let veins = (0..scenario.rods.len()).map(|j| vein(scenario, j));
+        let grown = scenario.tissue_grown;
+        let veins = (0..scenario.rods.len()).map(|j| vein(scenario, j, grown));
         Natural {
             veins: veins.collect(),
             scenario,
+            grown,
         }
     }
 
@@ -42,13 +47,13 @@ impl<'a> Natural<'a> {
         let (from, state) = vein[before];
         match sigma == from {
             true => state,
-            false => step(&self.scenario.rods[j], from, sigma - from, state),
+            false => step(&self.scenario.rods[j], self.grown, from, sigma - from, state),
         }
     }
 }
 
 /// The steps along vein `j`, which end at every kink of its rest shape.
-fn vein(scenario: &Scenario, j: usize) -> Vec<(f64, Vein)> {
+fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, Vein)> {
     let rod = &scenario.rods[j];
     let shape = rod.rest_curvature.iter().chain([&rod.rest_stretch]);
     let mut kinks: Vec<f64> = shape.clone().flat_map(|p| p.kinks()).copied().collect();
@@ -61,7 +66,7 @@ fn vein(scenario: &Scenario, j: usize) -> Vec<(f64, Vein)> {
         let count = ((end - from) / longest).ceil();
         let width = (end - from) / count;
         for k in 0..count as usize {
-            state = step(rod, from, width, state);
+            state = step(rod, grown, from, width, state);
             from = if k + 1 == count as usize {
                 end
             } else {
@@ -74,7 +79,7 @@ fn vein(scenario: &Scenario, j: usize) -> Vec<(f64, Vein)> {
 }
 
 /// A step of a vein from `sigma` by `width`.
-fn step(rod: &Rod, sigma: f64, width: f64, (x, q): Vein) -> Vein {
+fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): Vein) -> Vein {
     let mut slopes = [(DVec3::ZERO, DQuat::from_array([0.0; 4])); STAGES];
     let combine = |slopes: &[Vein], weights: &[f64]| {
         let mut sum = (x, q);
@@ -91,7 +96,7 @@ fn step(rod: &Rod, sigma: f64, width: f64, (x, q): Vein) -> Vein {
         let q = q.normalize();
         let spin = 0.5 * rod.length * u;
         slopes[i] = (
-            q * DVec3::X * (rod.length * rod.rest_stretch.at(at)),
+            q * DVec3::X * (rod.length * if grown { rod.rest_stretch.at(at) } else { 1.0 }),
             q * DQuat::from_xyzw(spin.x, spin.y, spin.z, 0.0),
         );
     }
@@ -131,7 +136,7 @@ mod tests {
         for (from, to) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.61)] {
             let (mut state, width) = (natural.at(1, from), (to - from) / 100.0);
             for k in 0..100 {
-                state = step(&scenario.rods[1], from + k as f64 * width, width, state);
+                state = step(&scenario.rods[1], true, from + k as f64 * width, width, state);
             }
             let (x, q) = natural.at(1, to);
             assert!((x - state.0).length() < 1e-13);

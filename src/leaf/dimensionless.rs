@@ -234,10 +234,9 @@ impl Leaf {
     /// Position and rotation of the base of rod `j` (paper, section 2.4 (a) and (c)).
     pub fn base(&self, j: usize) -> (DVec3, DQuat) {
         let (rod, length) = (self.rod(j), self.scale.length);
-        let fan = rotation::exp(rod.angle * DVec3::Z);
-        let rotation = match rod.elevation == 0.0 {
-            true => fan,
-            false => fan * DQuat::from_rotation_y(-rod.elevation),
+        let rotation = match rod.elevation == 0.0 && rod.roll == 0.0 {
+            true => rotation::exp(rod.angle * DVec3::Z),
+            false => rod.base_rotation(),
         };
         (rod.base_position() / length, rotation)
     }
@@ -293,15 +292,16 @@ impl Leaf {
         self.scenario.tissue.is_some()
     }
 
-    /// Stiffness k of the tissue in gap `g` per displacement, and c_1 (in the first component) per
-    /// radian, both per unit of sigma.
-    pub fn tissue(&self, g: usize) -> [DVec3; 2] {
+    /// Stiffness k of the tissue in gap `g` at `sigma` per displacement, and c_1 (in the first
+    /// component) per radian, both per unit of sigma.
+    pub fn tissue(&self, g: usize, sigma: f64) -> [DVec3; 2] {
         let Some(tissue) = &self.scenario.tissue else {
             return [DVec3::ZERO; 2];
         };
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
-        let k = DVec3::from_array(tissue[g].stiffness) * self.scale.length.powi(2);
-        [k, tissue[g].fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
+        let [along, across, normal, fold] = tissue[g].profiles().map(|of| of.at(sigma));
+        let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
+        [k, fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
     }
 
     fn rod(&self, j: usize) -> &Rod {

@@ -80,7 +80,10 @@ impl DiscreteLeaf {
             let natural = discrete.natural();
             discrete.grips = discrete.gripped(&natural);
             if leaf.has_tissue() {
-                discrete.strips = discrete.strips(&natural);
+                discrete.strips = match leaf.scenario().tissue_grown {
+                    true => discrete.strips(&natural),
+                    false => discrete.strips(&discrete.unstrained(false)),
+                };
             }
         }
         discrete
@@ -88,6 +91,11 @@ impl DiscreteLeaf {
 
     /// The natural leaf, unstrained rods: v = v0, u = u0, each from its base.
     pub fn natural(&self) -> State {
+        self.unstrained(true)
+    }
+
+    /// The same, or before the rods have `grown`.
+    fn unstrained(&self, grown: bool) -> State {
         let (mut xs, mut qs) = (Vec::new(), Vec::new());
         for j in 0..self.rods() {
             let (mut x, mut q) = self.leaf.base(j);
@@ -96,7 +104,8 @@ impl DiscreteLeaf {
             for i in 0..self.segments() {
                 let section = self.section(j, i);
                 let next = (q * rotation::exp(section.rest_curvature * section.ds)).normalize();
-                x += section.ds * (rotation::midpoint(q, next) * section.rest_strain);
+                let strain = if grown { section.rest_strain } else { DVec3::X };
+                x += section.ds * (rotation::midpoint(q, next) * strain);
                 q = next;
                 xs.push(x);
                 qs.push(q);

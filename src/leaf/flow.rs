@@ -189,7 +189,7 @@ impl<'a> Flow<'a> {
         let mut left = (at_rest(0), here(0));
         for g in 0..leaf.rods() - 1 {
             let right = (at_rest(g + 1), here(g + 1));
-            let [stiffness, fold] = leaf.tissue(g);
+            let [stiffness, fold] = leaf.tissue(g, sigma);
             let strip = Strip::natural(stiffness, fold.x, &ends(left.0, right.0));
             let ends = ends(left.1, right.1);
             let (energy, loads) = strip.energy_and_loads(&ends);

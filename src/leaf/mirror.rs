@@ -70,6 +70,7 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
         && a.base == mirrored(b.base)
         && a.angle == -b.angle
         && a.elevation == b.elevation
+        && a.roll == -b.roll
         && a.couple_stiffness == b.couple_stiffness
         && a.force_stiffness == b.force_stiffness
         && a.rest_stretch == b.rest_stretch

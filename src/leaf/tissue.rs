@@ -17,7 +17,7 @@ impl DiscreteLeaf {
     pub(super) fn strips(&self, natural: &State) -> Vec<Strip> {
         let gaps = 0..self.rods() - 1;
         let strip = |g: usize, i: usize| {
-            let [stiffness, fold] = self.leaf.tissue(g);
+            let [stiffness, fold] = self.leaf.tissue(g, self.grid.sigma()[i]);
             let weight = self.grid.weight(i);
             Strip::natural(weight * stiffness, weight * fold.x, &across(natural, g, i))
         };
@@ -31,7 +31,7 @@ impl DiscreteLeaf {
     }
 
     /// The exponent by which perturbations of one vein grow over a part `width` of its length where
-    /// the tissue on both sides resists them: it bends, as on a foundation, or stretches.
+    /// the tissue on both sides resists them, in its middle: it bends, as on a foundation, or stretches.
     pub fn growth(&self, width: f64) -> f64 {
         if !self.tied() {
             return 0.0;
@@ -41,7 +41,7 @@ impl DiscreteLeaf {
             let gaps = gaps.into_iter().flatten();
             let k = 2.0
                 * gaps
-                    .map(|g| self.leaf.tissue(g)[0].max_element())
+                    .map(|g| self.leaf.tissue(g, 0.5)[0].max_element())
                     .sum::<f64>();
             let section = self.leaf.section(j, 0.5, 1.0);
             let (length, softest) = (section.ds, section.couple_stiffness.min_element());

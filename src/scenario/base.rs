@@ -2,20 +2,23 @@
 
 use glam::{DQuat, DVec3};
 
-use super::{Profile, Rod, Scenario, ascending};
+use super::{Profile, Rod, Scenario, Tissue, ascending};
 
 /// Places that differ by less are the same: no segment may be so short.
 const ROUNDING: f64 = 1e-12;
 
 impl Rod {
     /// The rotation of the directors at the base: by the fan's angle about e3, after the elevation
-    /// about -e2, so that d1 = (cos e cos phi, cos e sin phi, sin e).
+    /// about -e2, so that d1 = (cos e cos phi, cos e sin phi, sin e), after the roll about e1.
     pub fn base_rotation(&self) -> DQuat {
-        let fan = DQuat::from_rotation_z(self.angle);
-        match self.elevation == 0.0 {
-            true => fan,
-            false => fan * DQuat::from_rotation_y(-self.elevation),
+        let mut rotation = DQuat::from_rotation_z(self.angle);
+        if self.elevation != 0.0 {
+            rotation *= DQuat::from_rotation_y(-self.elevation);
         }
+        if self.roll != 0.0 {
+            rotation *= DQuat::from_rotation_x(self.roll);
+        }
+        rotation
     }
 
     /// Where it begins.
@@ -40,6 +43,7 @@ impl Scenario {
         let profiles = self.rods.iter().flat_map(Rod::profiles);
         let profiles = profiles
             .chain(masses.map(|(_, mass)| mass))
+            .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
             .chain(self.distributed.iter().flatten().flatten())
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
@@ -63,6 +67,7 @@ mod tests {
             base: [0.1, -0.2, 0.3],
             angle,
             elevation,
+            roll: 0.0,
             couple_stiffness: [1.0; 3].map(Profile::Constant),
             force_stiffness: [1.0; 3].map(Profile::Constant),
             rest_curvature: [0.0; 3].map(Profile::Constant),

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::dynamics::{OUTPUTS, round_inertia};
+use super::blade::{Blade, BladeProperty, Parts, blade};
 use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
 use super::item::Item;
@@ -56,12 +57,15 @@ impl Entries {
             force: self.given(Key::UnitForce).map(unit).transpose()?,
         };
         let rods = self.item(Key::Rods)?.whole(MOST_RODS)?;
-        let sections = material::sections(self, rods)?;
-        let rods = veins(self, rods, sections.as_deref())?;
-        let joined = self.item(Key::Joined)?.switch()?;
+        let made = Made::from(self, rods)?;
+        let rods = veins(self, rods, &made)?;
+        let joined = joined(self, made.blade())?;
         let coupling = coupling(self, rods.len() - 1)?;
         let base_held = grip::of_bases(self)?;
-        let tissue = tissue(self, rods.len() - 1)?;
+        let tissue = match &made {
+            Made::Blade(_, parts) => (rods.len() > 1).then(|| parts.tissue()),
+            _ => tissue(self, rods.len() - 1)?,
+        };
         let (gravity, own_gravity) = loads::gravity(self, rods.len())?;
         let g = loads::g(self)?;
         let distributed = loads::distributed(self, rods.len())?;
@@ -76,16 +80,18 @@ impl Entries {
         let wind = wind(self, rods.len())?;
         let tolerance = tolerance(self.item(Key::Tolerance)?)?;
         let loads = [gravity, tip_force, tip_moment];
-        let dynamics = dynamics(self, &rods, sections.as_deref(), loads)?;
+        let dynamics = dynamics(self, &rods, &made, loads)?;
         let scenario = Scenario {
             name,
             units,
             rods,
-            radii: sections.map(Radii::of).unwrap_or_default(),
+            radii: made.radii(),
+            blade: made.blade().cloned(),
             base_held,
             joined,
             coupling,
             tissue,
+            tissue_grown: self.item(Key::TissueGrown)?.switch()?,
             gravity,
             own_gravity,
             g,
@@ -128,37 +134,113 @@ fn unit(item: Item) -> Result<String> {
     Ok(unit.trim().to_string())
 }
 
-fn veins(entries: &Entries, rods: usize, sections: Option<&[Arc<Section>]>) -> Result<Vec<Rod>> {
-    let length = entries.item(Key::Length)?.one_each(rods)?;
-    let angle = angles(entries.item(Key::Fan)?, rods)?;
-    let base = entries.item(Key::Base)?.vectors(rods)?;
-    let elevation = entries.item(Key::Elevation)?.one_each(rods)?;
-    let quantity = |key| entries.item(key)?.quantity(rods);
-    let triple = |[first, second, third]: [Key; 3]| -> Result<[Vec<Profile>; 3]> {
-        Ok([quantity(first)?, quantity(second)?, quantity(third)?])
-    };
-    let stretch = quantity(Key::RestStretch)?;
-    let (couple, force) = match sections {
-        Some(sections) => {
-            let of = |kind: fn(usize) -> Property| {
-                [0, 1, 2].map(|axis| material::profiles(sections, kind(axis)))
-            };
-            (of(Property::Couple), of(Property::Force))
+/// What the stiffnesses of the veins follow from.
+enum Made {
+    /// Numbers.
+    Stiffnesses,
+    Sections(Vec<Arc<Section>>),
+    Blade(Arc<Blade>, Parts),
+}
+
+impl Made {
+    fn from(entries: &Entries, rods: usize) -> Result<Made> {
+        if let Some(blade) = blade(entries, rods)? {
+            let parts = blade.parts();
+            return Ok(Made::Blade(Arc::new(blade), parts));
         }
-        None => (triple(Key::COUPLE)?, triple(Key::FORCE)?),
+        Ok(match material::sections(entries, rods)? {
+            Some(sections) => Made::Sections(sections),
+            None => Made::Stiffnesses,
+        })
+    }
+
+    fn blade(&self) -> Option<&Arc<Blade>> {
+        match self {
+            Made::Blade(blade, _) => Some(blade),
+            _ => None,
+        }
+    }
+
+    fn radii(&self) -> Radii {
+        match self {
+            Made::Sections(sections) => Radii::of(sections.clone()),
+            _ => Radii::default(),
+        }
+    }
+
+    /// What sections or a blade determine of all veins; `None` if numbers are given.
+    fn profiles(&self, property: Property) -> Option<Vec<Profile>> {
+        match self {
+            Made::Stiffnesses => None,
+            Made::Sections(sections) => Some(material::profiles(sections, property)),
+            Made::Blade(_, parts) => Some(parts.profiles(property.into())),
+        }
+    }
+}
+
+/// Whether the tips are joined: those of a blade are if it ends in a point.
+fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> Result<bool> {
+    let item = entries.item(Key::Joined)?;
+    let Some(blade) = blade else {
+        return item.switch();
     };
-    let rest = triple(Key::REST)?;
+    if !entries.is_given(Key::Joined) {
+        return Ok(blade.is_pointed());
+    }
+    let joined = item.switch()?;
+    item.ensure(
+        !joined || blade.is_pointed(),
+        "the blade has a width at its tip (blade.width): let it end at 0, or leave this out",
+    )?;
+    Ok(joined)
+}
+
+fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
+    let quantity = |key| entries.item(key)?.quantity(rods);
+    let triple = |keys: [Key; 3], of: fn(usize) -> Property| -> Result<[Vec<Profile>; 3]> {
+        let one = |axis: usize| match made.profiles(of(axis)) {
+            Some(profiles) => Ok(profiles),
+            None => quantity(keys[axis]),
+        };
+        Ok([one(0)?, one(1)?, one(2)?])
+    };
+    let (length, base, directions, sideways) = match made {
+        Made::Blade(blade, parts) => (
+            parts.lengths(),
+            parts.bases(),
+            parts.directions(blade.elevation),
+            parts.profiles(BladeProperty::RestBend),
+        ),
+        _ => {
+            let angle = angles(entries.item(Key::Fan)?, rods)?.into_iter();
+            let each = angle.zip(entries.item(Key::Elevation)?.one_each(rods)?);
+            (
+                entries.item(Key::Length)?.one_each(rods)?,
+                entries.item(Key::Base)?.vectors(rods)?,
+                each.map(|(angle, elevation)| [angle, elevation, 0.0]).collect(),
+                quantity(Key::RestBend3)?,
+            )
+        }
+    };
+    let couple = triple(Key::COUPLE, Property::Couple)?;
+    let force = triple(Key::FORCE, Property::Force)?;
+    let rest = [quantity(Key::RestTwist)?, quantity(Key::RestBend2)?, sideways];
+    let stretch = quantity(Key::RestStretch)?;
     let pick = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)
-        .map(|rod| Rod {
-            length: length[rod],
-            base: base[rod],
-            angle: angle[rod],
-            elevation: elevation[rod],
-            couple_stiffness: pick(&couple, rod),
-            force_stiffness: pick(&force, rod),
-            rest_curvature: pick(&rest, rod),
-            rest_stretch: stretch[rod].clone(),
+        .map(|rod| {
+            let [angle, elevation, roll] = directions[rod];
+            Rod {
+                length: length[rod],
+                base: base[rod],
+                angle,
+                elevation,
+                roll,
+                couple_stiffness: pick(&couple, rod),
+                force_stiffness: pick(&force, rod),
+                rest_curvature: pick(&rest, rod),
+                rest_stretch: stretch[rod].clone(),
+            }
         })
         .collect())
 }
@@ -216,19 +298,23 @@ fn tolerance(item: Item) -> Result<f64> {
 fn dynamics(
     entries: &Entries,
     rods: &[Rod],
-    sections: Option<&[Arc<Section>]>,
+    made: &Made,
     loads: [[f64; 3]; 3],
 ) -> Result<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
-    let sections = sections.filter(|_| entries.is_given(Key::MassDensity));
-    let of_sections = |property| sections.map(|all| material::profiles(all, property));
+    let mass = [Key::MassDensity, Key::BladeMassDensity];
+    let mass = mass.into_iter().find(|key| entries.is_given(*key));
+    let of_mass = |property| mass.and_then(|_| made.profiles(property));
     let density = match entries.given(Key::Density) {
         Some(item) => {
-            let why = "section.mass_density is given, too: leave one of them out";
-            item.ensure(sections.is_none(), why)?;
+            if let Some(key) = mass {
+                let path = key.path();
+                let why = format_args!("{path} is given, too: leave one of them out");
+                return Err(item.refuse(why));
+            }
             Some(item.quantity(rods.len())?)
         }
-        None => of_sections(Property::Density),
+        None => of_mass(Property::Density),
     };
     let preset = match density {
         Some(density) => Dynamics::of_density(rods, density),
@@ -242,7 +328,7 @@ fn dynamics(
     };
     let duration = number(Key::Duration, preset.duration)?;
     let section = rotary_inertia(entries, &preset.density)?;
-    let section = section.or_else(|| of_sections(Property::RotaryInertia));
+    let section = section.or_else(|| of_mass(Property::RotaryInertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = entries.item(Key::InternalDamping)?.number()?;
     let output_interval = match entries.given(Key::OutputInterval) {

@@ -13,6 +13,8 @@ pub(crate) enum Form {
     PerRod(Range),
     /// A number for all rods, a list with one for each, or a profile along the rods.
     Quantity(Range),
+    /// A number, or a profile along the leaf.
+    Outline(Range),
     /// A number for all gaps between neighbouring rods, or a list.
     PerGap(Range),
     /// x, y, z.
@@ -60,6 +62,7 @@ impl Form {
             Form::Number(range)
             | Form::PerRod(range)
             | Form::Quantity(range)
+            | Form::Outline(range)
             | Form::PerGap(range) => range,
             _ => Range::Finite,
         }

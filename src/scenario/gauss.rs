@@ -1,7 +1,7 @@
 //! A rule of quadrature.
 
 /// Abscissae and weights of the Gauss-Legendre rule of five points on (0, 1).
-pub(super) const GAUSS: [(f64, f64); 5] = [
+pub(in crate::scenario) const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
     (0.5, 0.284_444_444_444_444_44),

@@ -88,8 +88,9 @@ impl Entries {
         };
         // Stiffnesses are required unless sections are given.
         let needed = |other: &Key| match other.parts().0 {
+            _ if has("blade") && other.follows_from_blade() => false,
             "" | "leaf" => true,
-            "stiffness" => !has("section"),
+            "stiffness" => !has("section") && !has("blade"),
             _ => false,
         };
         let others = Key::all().filter(|other| *other != key && !self.is_given(*other));
@@ -276,6 +277,15 @@ impl<'e> Item<'e> {
         }
         let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
         lists.map(|list| list.linear(&at)).collect()
+    }
+
+    /// Knots and the numbers there, of a profile that is not one per rod.
+    pub(super) fn knots(&self) -> Result<(Vec<f64>, Vec<f64>)> {
+        let [at, value] = self.pair("value", PROFILE_IS)?;
+        let at = at.increasing(true)?;
+        let list = value.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let value = list.map(|item| item.number()).collect::<Result<_>>()?;
+        Ok((at, value))
     }
 
     /// A profile that has these values at the knots `at`.

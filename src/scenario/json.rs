@@ -18,7 +18,7 @@ struct Sections<'a> {
     rotary_inertia: bool,
 }
 
-/// All entries with their values, including defaults, but not those that `[section]` gives: a JSON object from which
+/// All entries with their values, including defaults, but not those that `[section]` or `[blade]` gives: a JSON object from which
 /// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
 /// `"inf"`.
 impl Serialize for Scenario {
@@ -79,13 +79,20 @@ impl Scenario {
 
     /// The value of a key; `None` if other keys determine it.
     fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
+        if self.blade.is_some() && key.follows_from_blade() {
+            return None;
+        }
         match key.parts().0 {
+            "blade" => return self.of_blade(key),
             "section" => return sections?.written(key),
             "stiffness" if sections.is_some() => return None,
             "tip" => return self.of_tip(key),
             "tissue" => return self.of_tissue(key),
             "wind" => return self.of_wind(key),
             "dynamics" => return self.of_dynamics(key, sections),
+            _ if key == Key::Elevation && self.blade.is_some() => {
+                return Some(number(self.blade.as_ref()?.elevation));
+            }
             _ => {}
         }
         type Triple = fn(&Rod) -> &[Profile; 3];
@@ -130,9 +137,37 @@ impl Scenario {
     }
 
     fn of_tissue(&self, key: Key) -> Option<Value> {
+        let tissue = self.tissue.as_ref()?;
+        if key == Key::TissueGrown {
+            return Some(json!(self.tissue_grown));
+        }
         let which = Key::TISSUE.iter().position(|one| *one == key)?;
-        let of = |gap: &Tissue| *gap.stiffness.get(which).unwrap_or(&gap.fold);
-        Some(number_or_list(self.tissue.as_ref()?.iter().map(of)))
+        let of = |gap: &Tissue| gap.profiles()[which].at(0.0);
+        Some(number_or_list(tissue.iter().map(of)))
+    }
+
+    fn of_blade(&self, key: Key) -> Option<Value> {
+        let blade = self.blade.as_ref()?;
+        let materials = blade.materials.iter();
+        let (at, value) = blade.points();
+        Some(match key {
+            Key::BladeLength => number(blade.length()),
+            Key::BladeWidth if blade.is_even() => number(value[0]),
+            Key::BladeWidth => json!({ "at": at, "value": value }),
+            Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
+            Key::BladeYoung => quantity(materials.map(|of| &of.young)),
+            Key::YoungAcross => optional(materials.map(|of| of.young_across.as_ref()))?,
+            Key::ShearModulus => optional(materials.map(|of| of.shear_modulus.as_ref()))?,
+            Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
+            Key::BladeMassDensity => optional(materials.map(|of| of.mass_density.as_ref()))?,
+            Key::Edges => json!(blade.edges),
+            _ => number(blade.least_width()),
+        })
+    }
+
+    /// Whether the blade has a mass.
+    fn has_blade_mass(&self) -> bool {
+        self.blade.as_ref().is_some_and(|blade| blade.has_mass())
     }
 
     fn of_wind(&self, key: Key) -> Option<Value> {
@@ -161,6 +196,7 @@ impl Scenario {
     fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
+            Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
             Key::Density if sections.is_some_and(|it| it.density) => return None,
             Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
             Key::Density => quantity(dynamics.density.iter()),
@@ -302,6 +338,12 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
         false => profiles.iter().map(|profile| values(profile)).collect(),
     };
     json!({ "at": at, "value": value })
+}
+
+/// A quantity of all rods; `None` if it is left out.
+fn optional<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
+    let profiles: Option<Vec<&Profile>> = profiles.collect();
+    Some(quantity(profiles?.into_iter()))
 }
 
 /// A quantity in time; `None` if it is always the one at rest.

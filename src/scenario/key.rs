@@ -88,6 +88,26 @@ keys! {
     Poisson "section.poisson": Quantity(Finite), [0, 0, 0], Default("0.3");
     /// mass per volume.
     MassDensity "section.mass_density": Quantity(Positive), [-4, 1, 2], Derived;
+    /// length of a blade, from its base to its tip.
+    BladeLength "blade.length": Number(Positive), [1, 0, 0], Required("25.0");
+    /// width of a blade at fractions of its length.
+    BladeWidth "blade.width": Outline(NotNegative), [1, 0, 0], Required("{ at = [0.0, 0.3, 1.0], value = [1.2, 2.0, 0.0] }");
+    /// thickness of a blade.
+    BladeThickness "blade.thickness": Quantity(Positive), [1, 0, 0], Required("0.03");
+    /// E, Young's modulus along the veins of a blade.
+    BladeYoung "blade.young": Quantity(Positive), [-2, 1, 0], Required("3000.0");
+    /// E', Young's modulus across them; left out: the same.
+    YoungAcross "blade.young_across": Quantity(Positive), [-2, 1, 0], Derived;
+    /// G, shear modulus of a blade; left out: E/(2 (1 + nu)).
+    ShearModulus "blade.shear_modulus": Quantity(Positive), [-2, 1, 0], Derived;
+    /// nu, Poisson's ratio of a blade.
+    BladePoisson "blade.poisson": Quantity(Finite), [0, 0, 0], Default("0.3");
+    /// mass per volume of a blade.
+    BladeMassDensity "blade.mass_density": Quantity(Positive), [-4, 1, 2], Derived;
+    /// whether the outermost veins of a blade are its margins.
+    Edges "blade.edges": Switch, [0, 0, 0], Default("true");
+    /// least width of a blade from which stiffnesses follow, a fraction of the largest.
+    LeastWidth "blade.least_width": Number(Positive), [0, 0, 0], Default("0.1");
     /// u0_1, twist at rest; positive turns d2 towards d3 on the way to the tip.
     RestTwist "rest.twist": Quantity(Finite), [-1, 0, 0], Default("0.0");
     /// u0_2, curvature at rest about d2; positive bends the rod down, towards -d3.
@@ -110,6 +130,8 @@ keys! {
     TissueNormal "tissue.normal": PerGap(NotNegative), [-2, 1, 0], Default("0.0");
     /// tissue that folds along the rods: moment per angle and length of leaf.
     TissueFold "tissue.fold": PerGap(NotNegative), [0, 1, 0], Default("0.0");
+    /// whether tissue grows with the rods: else `rest.stretch` strains it.
+    TissueGrown "tissue.grown": Switch, [0, 0, 0], Default("true");
     /// force per length of rod, one for all or one each.
     Gravity "load.gravity": VectorPerRod, [-1, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// acceleration of gravity, which pulls the mass of the rods and of points.
@@ -238,7 +260,16 @@ impl Key {
 
     /// Whether the quantities of the leaf are proportional to its numbers.
     pub(crate) fn is_linear(self) -> bool {
-        self.parts().0 != "section"
+        !matches!(self.parts().0, "section" | "blade")
+    }
+
+    /// Whether a blade determines its value.
+    pub(super) fn follows_from_blade(self) -> bool {
+        match self {
+            Key::Length | Key::Fan | Key::Base | Key::RestBend3 => true,
+            _ if Key::TISSUE.contains(&self) => true,
+            _ => matches!(self.parts().0, "stiffness" | "section"),
+        }
     }
 
     /// Its table, empty at the top, and its name within that.
@@ -312,7 +343,7 @@ mod tests {
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 14);
+        assert_eq!(Key::tables().len(), 15);
         assert_eq!(Key::allowed_in("load")[..2], ["gravity", "g"]);
         assert!(Key::allowed_in("load").contains(&"point"));
         assert!(!Key::allowed_in("").contains(&"load.point"));

@@ -8,11 +8,11 @@ use super::bounds::{
 use super::entries::Entries;
 use super::error::Result;
 use super::form::Form;
-use super::item::Item;
+use super::item::{Item, MAGNITUDES};
 use super::key::Key;
 use super::load_limits;
 use super::material;
-use super::{Profile, Rod, Scale, Scenario, longest};
+use super::{Dynamics, Profile, Rod, Scale, Scenario, Tissue, longest};
 
 /// Longest to shortest rod.
 const LENGTHS: Limit = most("L_max/L", 1e3, SHORT);
@@ -77,6 +77,7 @@ const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
 pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
+    magnitudes(entries, scenario)?;
     rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
         (Key::TipForce, scenario.tip_force, TIP_FORCE),
@@ -93,10 +94,49 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     load_limits::check(entries, scenario)
 }
 
+/// Refuses stiffnesses and masses that are too large or too small, where they follow from a size.
+fn magnitudes(entries: &Entries, scenario: &Scenario) -> Result<()> {
+    let Some(size) = material::size(entries) else {
+        return Ok(());
+    };
+    let Dynamics {
+        density,
+        rotary_inertia,
+        ..
+    } = &scenario.dynamics;
+    let tissue = scenario.tissue.iter().flatten().flat_map(Tissue::profiles);
+    for (rod, it) in scenario.rods.iter().enumerate() {
+        let stiffness = it.couple_stiffness.iter().chain(&it.force_stiffness);
+        for profile in stiffness.chain([&density[rod], &rotary_inertia[rod]]) {
+            is_moderate(size.entry(rod), profile)?;
+        }
+    }
+    let mut tissue = tissue.filter(|_| scenario.blade.is_some());
+    tissue.try_for_each(|profile| is_moderate(size, profile))
+}
+
+fn is_moderate(item: Item, profile: &Profile) -> Result<()> {
+    for value in [profile.min(), profile.max_abs()] {
+        item.ensure(
+            MAGNITUDES.contains(&value),
+            format_args!(
+                "gives a stiffness or mass of {value:.3e}, which must lie between \
+                 1e-50 and 1e50: choose other units"
+            ),
+        )?;
+    }
+    Ok(())
+}
+
 fn rods(entries: &Entries, rods: &[Rod]) -> Result<()> {
-    let check = |key, index, limit: &Limit, value| match entries.given(key) {
-        Some(item) => limit.check(item.entry(index), value),
-        None => Ok(()),
+    // The outline of a blade determines lengths and shapes.
+    let outline = |key: Key| match key.follows_from_blade() {
+        true => entries.given(Key::BladeWidth),
+        false => None,
+    };
+    let check = |key, index, limit: &Limit, value| {
+        let item = entries.given(key).or_else(|| outline(key));
+        item.map_or(Ok(()), |item| limit.check(item.entry(index), value))
     };
     let longest = longest(rods);
     for (index, rod) in rods.iter().enumerate() {
@@ -167,8 +207,9 @@ fn dynamics(entries: &Entries, scenario: &Scenario) -> Result<()> {
 
 /// Masses that follow from sections.
 fn masses(entries: &Entries, scenario: &Scenario) -> Result<()> {
-    let (Some(size), Some(density)) = (material::size(entries), entries.given(Key::MassDensity))
-    else {
+    let mass = [Key::MassDensity, Key::BladeMassDensity];
+    let mass = mass.into_iter().find_map(|key| entries.given(key));
+    let (Some(size), Some(density)) = (material::size(entries), mass) else {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.time());

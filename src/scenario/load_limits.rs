@@ -61,10 +61,10 @@ fn tissue(entries: &Entries, scenario: &Scenario) -> Result<()> {
             length: one.length.max(other.length),
             stiffness: one.stiffness.min(other.stiffness),
         };
-        let [along, across, normal] = tissue.stiffness;
-        let stiffnesses = [along, across, normal, tissue.fold];
-        for (key, stiffness) in Key::TISSUE.into_iter().zip(stiffnesses) {
-            if let Some(item) = entries.given(key) {
+        for (key, profile) in Key::TISSUE.into_iter().zip(tissue.profiles()) {
+            let blade = || entries.given(Key::BladeThickness);
+            let stiffness = profile.max_abs();
+            if let Some(item) = entries.given(key).or_else(blade) {
                 let limit = if key == Key::TissueFold {
                     &FOLD
                 } else {

@@ -126,11 +126,12 @@ pub(super) fn gravity(entries: &Entries, rods: usize) -> Result<([f64; 3], Vec<[
 pub(super) fn g(entries: &Entries) -> Result<[f64; 3]> {
     let item = entries.item(Key::G)?;
     let g = item.vector()?;
-    let has_mass = entries.is_given(Key::Density) || entries.is_given(Key::MassDensity);
+    let masses = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
+    let has_mass = masses.into_iter().any(|key| entries.is_given(key));
     item.ensure(
         has_mass || g == [0.0; 3],
         "is an acceleration and needs the mass that it pulls: give dynamics.density, or \
-         mass_density in [section]; a force per length is load.gravity",
+         mass_density in [section] or [blade]; a force per length is load.gravity",
     )?;
     Ok(g)
 }

@@ -5,15 +5,15 @@ use std::sync::Arc;
 use super::Profile;
 use super::entries::Entries;
 use super::error::Result;
-use super::item::{Item, MAGNITUDES};
+use super::item::Item;
 use super::key::Key;
 use super::outline::Outline;
 use super::section::{Hollow, Property, Section};
 
-/// The entry with the size of the sections.
+/// The entry with the size of the sections, or of the blade.
 pub(super) fn size(entries: &Entries) -> Option<Item<'_>> {
-    let given = |key| entries.given(key);
-    given(Key::Diameter).or_else(|| given(Key::Thickness))
+    let sizes = [Key::Diameter, Key::Thickness, Key::BladeThickness];
+    sizes.into_iter().find_map(|key| entries.given(key))
 }
 
 /// A property of all rods.
@@ -61,13 +61,12 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
             )),
         });
     }
-    check(entries, entries.item(sides[1])?, &sections)?;
+    check(entries, &sections)?;
     Ok(Some(sections))
 }
 
-/// Refuses stiffnesses and masses that are too large or too small, and flat sections of
-/// auxetic materials, for which Cowper's formula has no meaning.
-fn check(entries: &Entries, size: Item, sections: &[Arc<Section>]) -> Result<()> {
+/// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
+fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
     for (rod, section) in sections.iter().enumerate() {
         entries.item(Key::Poisson)?.entry(rod).ensure(
             section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
@@ -75,25 +74,6 @@ fn check(entries: &Entries, size: Item, sections: &[Arc<Section>]) -> Result<()>
              so flat a section with a negative ratio: choose a larger one, or give the \
              stiffnesses in place of a section",
         )?;
-    }
-    let stiffness = [Property::Couple, Property::Force];
-    let stiffness = stiffness.into_iter().flat_map(|of| (0..3).map(of));
-    let masses = [Property::Density, Property::RotaryInertia];
-    let masses = masses
-        .into_iter()
-        .filter(|_| entries.is_given(Key::MassDensity));
-    for property in stiffness.chain(masses) {
-        for (rod, profile) in profiles(sections, property).into_iter().enumerate() {
-            for value in [profile.min(), profile.max_abs()] {
-                size.entry(rod).ensure(
-                    MAGNITUDES.contains(&value),
-                    format_args!(
-                        "gives a stiffness or mass of {value:.3e}, which must lie between \
-                         1e-50 and 1e50: choose other units"
-                    ),
-                )?;
-            }
-        }
     }
     Ok(())
 }
@@ -160,7 +140,7 @@ fn hollow(
     Ok(Some(profiles.into_iter().map(of).collect()))
 }
 
-fn poisson(item: Item, rods: usize) -> Result<Vec<Profile>> {
+pub(super) fn poisson(item: Item, rods: usize) -> Result<Vec<Profile>> {
     let poisson = item.quantity(rods)?;
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();

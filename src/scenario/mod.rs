@@ -4,6 +4,7 @@
 //! stiffnesses are positive, angles finite.
 
 mod base;
+mod blade;
 mod bounds;
 mod check;
 mod dynamics;
@@ -39,6 +40,7 @@ mod values;
 mod vectors;
 mod wind;
 
+pub use blade::{Blade, BladePart, BladeProperty};
 pub use dynamics::{Dynamics, Start};
 pub use entries::Entries;
 pub use error::{Place, ScenarioError};
@@ -63,6 +65,8 @@ pub use toml::{Table, Value};
 pub use turning::Turning;
 pub use wind::Wind;
 
+use std::sync::Arc;
+
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +79,8 @@ pub struct Scenario {
     pub rods: Vec<Rod>,
     /// Radii of the veins where sections are given: for pictures.
     pub radii: Radii,
+    /// The blade that the veins and the tissue follow from, if it is given in place of them.
+    pub blade: Option<Arc<Blade>>,
     /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
     pub base_held: Hold,
     /// Whether all tips share one point.
@@ -85,6 +91,9 @@ pub struct Scenario {
     pub coupling: Vec<[f64; 3]>,
     /// Tissue in each gap, N - 1 entries; `None` if there is none.
     pub tissue: Option<Vec<Tissue>>,
+    /// Whether the tissue has grown with the veins, or is that of veins whose rest length has not:
+    /// [`Rod::rest_stretch`] then strains it.
+    pub tissue_grown: bool,
     /// Gravity, force per unit reference length, on every vein; [`Scenario::weight`] has all of it.
     pub gravity: [f64; 3],
     /// What the veins have besides, N entries; empty if they do not differ.
@@ -159,6 +168,9 @@ pub struct Rod {
     pub angle: f64,
     /// Angle of d1(0) above this plane, in radians.
     pub elevation: f64,
+    /// Angle by which the section at the base is turned about d1, in radians; not zero for veins of a
+    /// blade that rises as a whole.
+    pub roll: f64,
     /// A1, A2, A3 of eq. (5): moment times length.
     pub couple_stiffness: [Profile; 3],
     /// H1, H2, H3 of eq. (6): a force; infinite means rigid.

@@ -97,7 +97,7 @@ impl Part {
             Form::Text | Form::Switch if index.is_some() => Err("has no entries".into()),
             Form::Vector if index > Some(2) => Err(COMPONENTS.into()),
             Form::VectorPerRod if self.indices[1] > Some(2) => Err(COMPONENTS.into()),
-            Form::Quantity(_) | Form::VectorQuantity => Ok(()),
+            Form::Quantity(_) | Form::Outline(_) | Form::VectorQuantity => Ok(()),
             Form::VectorInTime | Form::VectorOrInTime | Form::FactorInTime => Ok(()),
             _ if self.list.is_some() => Err(format!("{path} has no lists within")),
             _ => Ok(()),

@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
+use super::blade::{BladePart, BladeProperty};
 use super::gauss::GAUSS;
 use super::section::{Property, Section};
 
+/// Parts of the length of a blade over which an integral is a sum.
+const PANELS: usize = 32;
+
 /// A quantity along a rod: constant, linear between knots given at fractions
-/// sigma = s/L of the rod's length, or determined by its section.
+/// sigma = s/L of the rod's length, or determined by its section or the blade.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// The same value everywhere; may be infinite where the quantity allows it.
@@ -24,6 +28,15 @@ pub enum Profile {
         section: Arc<Section>,
         /// The property.
         property: Property,
+        /// A factor of the property.
+        factor: f64,
+    },
+    /// What follows from the outline and the material of a blade.
+    Blade {
+        /// The vein, or the tissue between two.
+        part: Arc<BladePart>,
+        /// The property.
+        property: BladeProperty,
         /// A factor of the property.
         factor: f64,
     },
@@ -49,6 +62,11 @@ impl Profile {
                 property,
                 factor,
             } => factor * section.at(*property, sigma),
+            Profile::Blade {
+                part,
+                property,
+                factor,
+            } => factor * part.at(*property, sigma),
         }
     }
 
@@ -62,10 +80,9 @@ impl Profile {
                 let part = |w: &[f64]| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1]));
                 knots.windows(2).map(part).sum()
             }
-            Profile::Section { section, .. } => {
-                let inside = section.kinks().iter().copied();
-                let inside = inside.filter(|&knot| knot < sigma);
-                let knots: Vec<f64> = [0.0].into_iter().chain(inside).chain([sigma]).collect();
+            Profile::Section { .. } | Profile::Blade { .. } => {
+                let inside = self.kinks().iter().copied().chain(self.panels());
+                let inside = inside.filter(|&knot| knot < sigma).chain([0.0, sigma]);
                 let part = |w: &[f64]| -> f64 {
                     let width = w[1] - w[0];
                     let points = GAUSS.iter();
@@ -73,9 +90,18 @@ impl Profile {
                         .map(|(x, weight)| width * weight * self.at(w[0] + x * width))
                         .sum()
                 };
-                knots.windows(2).map(part).sum()
+                ascending(inside).windows(2).map(part).sum()
             }
         }
+    }
+
+    /// Fractions at which an integral is divided, besides kinks.
+    fn panels(&self) -> impl Iterator<Item = f64> + use<> {
+        let count = match self {
+            Profile::Blade { .. } => PANELS,
+            _ => 1,
+        };
+        (1..count).map(move |k| k as f64 / count as f64)
     }
 
     /// Fractions strictly inside (0, 1) where the slope may jump.
@@ -84,6 +110,7 @@ impl Profile {
             Profile::Constant(_) => &[],
             Profile::Linear { at, .. } => &at[1..at.len() - 1],
             Profile::Section { section, .. } => section.kinks(),
+            Profile::Blade { part, .. } => part.kinks(),
         }
     }
 
@@ -114,6 +141,15 @@ impl Profile {
                 property: *property,
                 factor: factor * own,
             },
+            Profile::Blade {
+                part,
+                property,
+                factor: own,
+            } => Profile::Blade {
+                part: part.clone(),
+                property: *property,
+                factor: factor * own,
+            },
         }
     }
 
@@ -126,6 +162,14 @@ impl Profile {
                 factor,
             } => {
                 let values = section.extremes(*property).map(|value| factor * value);
+                values.into_iter().fold(start, with)
+            }
+            Profile::Blade {
+                part,
+                property,
+                factor,
+            } => {
+                let values = part.extremes(*property).map(|value| factor * value);
                 values.into_iter().fold(start, with)
             }
             Profile::Constant(value) => with(start, *value),

@@ -65,6 +65,9 @@ fn entry(key: Key) -> Value {
             );
             json!({ "anyOf": [number(range), list(number(range)), profile] })
         }
+        Form::Outline(range) => {
+            json!({ "anyOf": [number(range), knots("value", list(number(range)))] })
+        }
         Form::Vector => vector(),
         Form::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
         Form::VectorQuantity => {

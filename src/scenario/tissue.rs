@@ -3,17 +3,35 @@
 use super::entries::Entries;
 use super::error::Result;
 use super::key::Key;
+use super::Profile;
 
 /// Tissue that fills the gap between two neighbouring veins and turns with them. It is without
 /// force in the natural leaf: every vein in its rest shape from its base, each for itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tissue {
     /// k1, k2 and k3, force per displacement and length of leaf, along the directors between both
     /// veins: against neighbours that slide along each other, against a change of the width, and
     /// against one vein that rises above the other.
-    pub stiffness: [f64; 3],
+    pub stiffness: [Profile; 3],
     /// c1, moment per angle and length of leaf, against a fold along the veins.
-    pub fold: f64,
+    pub fold: Profile,
+}
+
+impl Default for Tissue {
+    fn default() -> Self {
+        Tissue {
+            stiffness: [0.0; 3].map(Profile::Constant),
+            fold: Profile::Constant(0.0),
+        }
+    }
+}
+
+impl Tissue {
+    /// k1, k2, k3 and c1.
+    pub(crate) fn profiles(&self) -> [&Profile; 4] {
+        let [along, across, normal] = &self.stiffness;
+        [along, across, normal, &self.fold]
+    }
 }
 
 /// Reads `[tissue]` of a leaf with so many gaps; `None` if no gap has any.
@@ -27,8 +45,8 @@ pub(super) fn tissue(entries: &Entries, gaps: usize) -> Result<Option<Vec<Tissue
         item.ensure(gaps > 0, why)?;
         for (gap, stiffness) in tissue.iter_mut().zip(item.one_each(gaps)?) {
             match which {
-                3 => gap.fold = stiffness,
-                axis => gap.stiffness[axis] = stiffness,
+                3 => gap.fold = Profile::Constant(stiffness),
+                axis => gap.stiffness[axis] = Profile::Constant(stiffness),
             }
         }
     }

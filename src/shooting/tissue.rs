@@ -3,7 +3,7 @@
 //! natural leaf with the element of the relaxation.
 
 use crate::natural::Natural;
-use crate::scenario::Scenario;
+use crate::scenario::{Profile, Scenario};
 use crate::shooting::state::RodState;
 use glam::{DQuat, DVec3};
 use nalgebra::{SMatrix, SVector};
@@ -23,11 +23,12 @@ pub struct Tangent(pub SMatrix<f64, BOTH, BOTH>);
 /// The tissue of a leaf, dimensionless.
 #[derive(Clone, Debug)]
 pub struct Tissue<'a> {
+    gaps: &'a [crate::scenario::Tissue],
     natural: Natural<'a>,
     /// Unit of length.
     length: f64,
-    /// k and c_1 of every gap, per unit of sigma.
-    gaps: Vec<([f64; 3], f64)>,
+    /// Of every gap the factors that make k and c_1 those per unit of sigma.
+    factors: Vec<[f64; 4]>,
 }
 
 /// A number with its derivatives.
@@ -38,22 +39,31 @@ impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
 impl<'a> Tissue<'a> {
     /// Of a scenario with these units of length and force; `None` if it has none.
     pub fn new(scenario: &'a Scenario, length: f64, force: f64) -> Option<Self> {
-        let tissue = scenario.tissue.as_ref()?;
-        let gap = |(g, tissue): (usize, &crate::scenario::Tissue)| {
-            let mean = 0.5 * (scenario.rods[g].length + scenario.rods[g + 1].length) / length;
-            let k = tissue.stiffness.map(|k| k * mean * length * length / force);
-            (k, tissue.fold * mean / force)
-        };
+        let gaps = scenario.tissue.as_ref()?;
+        let factors = scenario.rods.windows(2).map(|rods| {
+            let mean = 0.5 * (rods[0].length + rods[1].length) / length;
+            let k = mean * length * length / force;
+            [k, k, k, mean / force]
+        });
         Some(Tissue {
             natural: Natural::new(scenario),
             length,
-            gaps: tissue.iter().enumerate().map(gap).collect(),
+            gaps,
+            factors: factors.collect(),
         })
+    }
+
+    /// k and c_1 of gap `g` at `sigma`, per unit of sigma.
+    fn stiffness(&self, g: usize, sigma: f64) -> [f64; 4] {
+        let (of, factors) = (self.gaps[g].profiles(), self.factors[g]);
+        [0, 1, 2, 3].map(|which| of[which].at(sigma) * factors[which])
     }
 
     /// The largest stiffness of gap `g`.
     pub fn largest(&self, g: usize) -> f64 {
-        self.gaps[g].0.into_iter().fold(0.0, f64::max)
+        let [along, across, normal, _] = self.gaps[g].profiles();
+        let most = [along, across, normal].map(Profile::max_abs);
+        most.into_iter().fold(0.0, f64::max) * self.factors[g][0]
     }
 
     /// The strains of the natural leaf in gap `g` at `sigma`.
@@ -66,7 +76,8 @@ impl<'a> Tissue<'a> {
     /// The energy of gap `g` and its loads on both rods.
     pub fn loads(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> (f64, [Load; 2]) {
         let (rest, rods) = (self.at_rest(g, sigma), rods.map(|rod| (rod.r, rod.q)));
-        let energy = |z| self.energy(g, &rest, &z, &rods);
+        let k = self.stiffness(g, sigma);
+        let energy = |z| energy(&k, &rest, &z, &rods);
         let (energy, slopes) = gradient(energy, &SVector::<f64, BOTH>::zeros());
         let vector = |k: usize| -DVec3::from_slice(&slopes.as_slice()[k..k + 3]);
         (energy, [0, 6].map(|k| [vector(k), vector(k + 3)]))
@@ -75,7 +86,8 @@ impl<'a> Tissue<'a> {
     /// The linearised loads of gap `g`.
     pub fn tangent(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> Tangent {
         let (rest, rods) = (self.at_rest(g, sigma), rods.map(|rod| (rod.r, rod.q)));
-        let energy = |z| self.energy(g, &rest, &z, &rods);
+        let k = self.stiffness(g, sigma);
+        let energy = |z| energy(&k, &rest, &z, &rods);
         let (_, slopes, mut second) = hessian(energy, &SVector::<f64, BOTH>::zeros());
         // A rotation by theta and then by a is one by a + theta + a x theta/2.
         for first in [3, 9] {
@@ -87,22 +99,20 @@ impl<'a> Tissue<'a> {
         }
         Tangent(second)
     }
+}
 
-    fn energy<D: Number>(
-        &self,
-        g: usize,
-        rest: &[f64; 4],
-        z: &SVector<D, BOTH>,
-        rods: &[(DVec3, DQuat); 2],
-    ) -> D {
-        let (k, c) = self.gaps[g];
-        let strains = strains(z, rods);
-        let stiffness = [k[0], k[1], k[2], c];
-        (0..4).fold(D::zero(), |sum, i| {
-            let strain = strains[i] - rest[i];
-            sum + strain * strain * (0.5 * stiffness[i])
-        })
-    }
+/// The energy of a gap with the stiffnesses `k`, whose strains at rest are `rest`.
+fn energy<D: Number>(
+    k: &[f64; 4],
+    rest: &[f64; 4],
+    z: &SVector<D, BOTH>,
+    rods: &[(DVec3, DQuat); 2],
+) -> D {
+    let strains = strains(z, rods);
+    (0..4).fold(D::zero(), |sum, i| {
+        let strain = strains[i] - rest[i];
+        sum + strain * strain * (0.5 * k[i])
+    })
 }
 
 /// R^T (r_1 - r_0), R being the mean rotation, and the rotation between both about its first axis.

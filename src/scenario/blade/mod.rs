@@ -1,0 +1,252 @@
+//! A leaf from its outline, thickness and moduli: the table `[blade]`.
+//!
+//! A blade of the length L and the width W(x) has N veins, of which vein j lies along
+//! y = eta_j W(x)/2 in the natural leaf. Its strip, vein and tissue together, has the width h = W/N
+//! and the thickness t; with a gap of the width w between two veins,
+//!
+//! | | |
+//! | --- | --- |
+//! | torsion | A1 = G h t^3/3 |
+//! | bending | A2 = E h t^3/12, A3 = E t h^3/12 |
+//! | stretch and shear | H1 = E h t, H2 = H3 = 5/6 G h t |
+//! | tissue | k1 = G t/w, k2 = E' t/w, k3 = 5/6 G t/w, c1 = E' t^3/(12 w) |
+//!
+//! E is Young's modulus along the veins, E' the one across. A blade of constant width bends as
+//! E W t^3/12 and twists as G W t^3/3, whatever N is, and in its plane as E t W^3/12, if shear
+//! is stiff: for veins in the middle of equal strips whatever N is; if the outermost veins are the
+//! margins, the stiffness in its plane is larger by the part 2/(N - 1) + 1/N^2.
+
+mod read;
+mod spline;
+mod vein;
+
+use super::Profile;
+use super::tissue::Tissue;
+use glam::{DQuat, DVec3};
+pub(super) use read::blade;
+use std::sync::Arc;
+pub use vein::{BladePart, BladeProperty};
+use vein::{Outline, Vein};
+
+/// Thickness and material of a vein with its tissue.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Material {
+    pub thickness: Profile,
+    pub young: Profile,
+    /// Left out: as along the veins.
+    pub young_across: Option<Profile>,
+    /// Left out: that of an isotropic material.
+    pub shear_modulus: Option<Profile>,
+    pub poisson: Profile,
+    /// Mass per volume.
+    pub mass_density: Option<Profile>,
+}
+
+/// Thickness and moduli at one place.
+struct Local {
+    t: f64,
+    young: f64,
+    across: f64,
+    shear: f64,
+}
+
+impl Material {
+    fn at(&self, sigma: f64) -> Local {
+        let young = self.young.at(sigma);
+        let across = self.young_across.as_ref();
+        let shear = self.shear_modulus.as_ref();
+        Local {
+            t: self.thickness.at(sigma),
+            young,
+            across: across.map_or(young, |it| it.at(sigma)),
+            shear: shear.map_or_else(
+                || young / (2.0 * (1.0 + self.poisson.at(sigma))),
+                |it| it.at(sigma),
+            ),
+        }
+    }
+
+    fn profiles(&self) -> impl Iterator<Item = &Profile> {
+        let given = [&self.thickness, &self.young, &self.poisson];
+        let others = [&self.young_across, &self.shear_modulus, &self.mass_density];
+        given.into_iter().chain(others.into_iter().flatten())
+    }
+
+    fn kinks(&self) -> impl Iterator<Item = f64> {
+        self.profiles().flat_map(Profile::kinks).copied()
+    }
+}
+
+/// A blade, from which the veins of a leaf and the tissue between them follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blade {
+    outline: Arc<Outline>,
+    /// Whether the outermost veins are the margins.
+    pub edges: bool,
+    /// The angle by which it rises from the x-y plane as a whole, in radians.
+    pub elevation: f64,
+    pub(super) materials: Vec<Material>,
+}
+
+impl Blade {
+    /// The length, from the base to the tip.
+    pub fn length(&self) -> f64 {
+        self.outline.length
+    }
+
+    /// The width at the fraction `x` of the length.
+    pub fn width(&self, x: f64) -> f64 {
+        self.outline.width.at(x)[0]
+    }
+
+    /// The width at the fraction `x` of the length from which stiffnesses follow: nowhere less than
+    /// a part of the largest one.
+    pub fn bearing_width(&self, x: f64) -> f64 {
+        self.outline.bearing_width(x)
+    }
+
+    /// Whether the width is less than the least bearing width somewhere.
+    pub fn narrows(&self) -> bool {
+        self.outline.narrows
+    }
+
+    /// The least bearing width, as a fraction of the largest width.
+    pub fn least_width(&self) -> f64 {
+        self.outline.least
+    }
+
+    /// Whether all veins meet at the tip.
+    pub fn is_pointed(&self) -> bool {
+        let (_, widths) = self.points();
+        widths.last() == Some(&0.0)
+    }
+
+    /// Whether its width is the same everywhere.
+    pub(super) fn is_even(&self) -> bool {
+        let (_, widths) = self.points();
+        widths.iter().all(|width| *width == widths[0])
+    }
+
+    /// Whether it has a mass.
+    pub fn has_mass(&self) -> bool {
+        self.materials.iter().all(|of| of.mass_density.is_some())
+    }
+
+    /// The places of the points of the outline, as fractions of the length, and the widths there.
+    pub(super) fn points(&self) -> (&[f64], &[f64]) {
+        (self.outline.width.knots(), self.outline.width.values())
+    }
+
+    /// The place of vein `j`, as a fraction of the half width, and how far neighbours are apart.
+    fn eta(&self, j: usize) -> (f64, f64) {
+        let count = self.materials.len();
+        let gaps = if self.edges { count.max(2) - 1 } else { count };
+        let eta = (2.0 * j as f64 + 1.0 - count as f64) / gaps as f64;
+        (eta, 2.0 / gaps as f64)
+    }
+
+    /// The veins and the tissue between them.
+    pub(super) fn parts(&self) -> Parts {
+        let count = self.materials.len();
+        let etas: Vec<f64> = (0..count).map(|j| self.eta(j).0).collect();
+        let (_, apart) = self.eta(0);
+        let alike = |one: usize, other: usize| self.materials[one] == self.materials[other];
+        let vein = |j: usize| {
+            let material = self.materials[j].clone();
+            Arc::new(Vein::new(&self.outline, etas[j].abs(), count, material))
+        };
+        let veins = with_images(count, alike, vein);
+        let gaps_alike = |g: usize, image: usize| alike(g, image + 1) && alike(g + 1, image);
+        let gap = |g: usize| BladePart::gap(&veins[g], &veins[g + 1], apart);
+        Parts {
+            gaps: with_images(count - 1, gaps_alike, gap),
+            parts: with_images(count, alike, |j| BladePart::vein(veins[j].clone())),
+            half_width: 0.5 * self.width(0.0),
+            veins,
+            etas,
+        }
+    }
+}
+
+/// So many values, of which one that is `alike` to its image, counted from the other end, is the
+/// same.
+fn with_images<T>(
+    count: usize,
+    alike: impl Fn(usize, usize) -> bool,
+    make: impl Fn(usize) -> Arc<T>,
+) -> Vec<Arc<T>> {
+    let mut all: Vec<Arc<T>> = Vec::with_capacity(count);
+    for j in 0..count {
+        let image = count - 1 - j;
+        let same = image < j && alike(j, image);
+        all.push(if same { all[image].clone() } else { make(j) });
+    }
+    all
+}
+
+/// What follows from a blade: its veins, and the tissue between them.
+pub(super) struct Parts {
+    /// The places of the veins, as fractions of the half width.
+    etas: Vec<f64>,
+    half_width: f64,
+    veins: Vec<Arc<Vein>>,
+    parts: Vec<Arc<BladePart>>,
+    gaps: Vec<Arc<BladePart>>,
+}
+
+impl Parts {
+    /// A property of every vein, along it.
+    pub(super) fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
+        let each = self.etas.iter().zip(&self.parts);
+        each.map(|(eta, part)| part.profile(property, *eta < 0.0))
+            .collect()
+    }
+
+    /// The lengths of the veins.
+    pub(super) fn lengths(&self) -> Vec<f64> {
+        self.veins.iter().map(|vein| vein.length).collect()
+    }
+
+    /// Where the veins begin.
+    pub(super) fn bases(&self) -> Vec<[f64; 3]> {
+        let y = self.etas.iter().map(|eta| eta * self.half_width);
+        y.map(|y| [0.0, y, 0.0]).collect()
+    }
+
+    /// The angle of each vein at its base in the x-y plane, its elevation above that, and the turn
+    /// of its section about d1, if the whole blade is turned by `elevation` about -e2.
+    pub(super) fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
+        let each = self.etas.iter().zip(&self.veins);
+        each.map(|(eta, vein)| {
+            let angle = if *eta < 0.0 { -vein.angle() } else { vein.angle() };
+            tilted(angle, elevation)
+        })
+        .collect()
+    }
+
+    /// The tissue in every gap.
+    pub(super) fn tissue(&self) -> Vec<Tissue> {
+        let gap = |part: &Arc<BladePart>| {
+            let of = |which| part.profile(BladeProperty::Tissue(which), false);
+            Tissue {
+                stiffness: [of(0), of(1), of(2)],
+                fold: of(3),
+            }
+        };
+        self.gaps.iter().map(gap).collect()
+    }
+}
+
+/// A direction at `angle` in a plane that is turned about -e2 by `elevation`: its own angle and
+/// elevation, and the turn about it that brings d2 into the plane.
+fn tilted(angle: f64, elevation: f64) -> [f64; 3] {
+    if elevation == 0.0 {
+        return [angle, 0.0, 0.0];
+    }
+    let plane = DQuat::from_rotation_y(-elevation) * DQuat::from_rotation_z(angle);
+    let tangent = plane * DVec3::X;
+    let (own, up) = (tangent.y.atan2(tangent.x), tangent.z.asin());
+    let upright = DQuat::from_rotation_z(own) * DQuat::from_rotation_y(-up);
+    let across = upright.inverse() * (plane * DVec3::Y);
+    [own, up, across.z.atan2(across.y)]
+}

@@ -1,0 +1,316 @@
+//! The veins of a blade, and the tissue between two, as profiles along them.
+
+use super::{Local, Material};
+use super::spline::{Spline, quintic};
+use crate::scenario::gauss::GAUSS;
+use crate::scenario::{Profile, Property, ascending};
+use std::sync::Arc;
+
+/// Panels between which the place along the blade is interpolated, over a vein's length: x(s) is
+/// then right to rounding.
+const PANELS: usize = 64;
+
+/// The factor of transverse shear of a plate (E. Reissner, 1945).
+const SHEAR_FACTOR: f64 = 5.0 / 6.0;
+
+/// What follows from a blade for its veins, and for the tissue between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BladeProperty {
+    /// A1, A2 and A3, by index.
+    Couple(usize),
+    /// H1, H2 and H3, by index.
+    Force(usize),
+    /// u0_3.
+    RestBend,
+    /// Mass per length.
+    Density,
+    /// Moment of inertia per length: the mean of those about d2 and d3.
+    RotaryInertia,
+    /// Of tissue: k1, k2, k3 and c1, by index.
+    Tissue(usize),
+}
+
+impl From<Property> for BladeProperty {
+    fn from(property: Property) -> Self {
+        match property {
+            Property::Couple(axis) => BladeProperty::Couple(axis),
+            Property::Force(axis) => BladeProperty::Force(axis),
+            Property::Density => BladeProperty::Density,
+            Property::RotaryInertia => BladeProperty::RotaryInertia,
+        }
+    }
+}
+
+/// Most properties that something has.
+const MOST: usize = 9;
+
+impl BladeProperty {
+    /// Its number among those of a vein, or of tissue.
+    fn number(self) -> usize {
+        match self {
+            BladeProperty::Couple(axis) => axis,
+            BladeProperty::Force(axis) => 3 + axis,
+            BladeProperty::RestBend => 6,
+            BladeProperty::Density => 7,
+            BladeProperty::RotaryInertia => 8,
+            BladeProperty::Tissue(which) => which,
+        }
+    }
+}
+
+/// The outline of a blade: its width over the distance from the base.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// The length.
+    pub length: f64,
+    /// The width at fractions of the length.
+    pub width: Spline,
+    /// The least width from which stiffnesses are computed, as a fraction of the largest.
+    pub least: f64,
+    /// The largest width.
+    pub largest: f64,
+    /// Whether the width falls below the least one.
+    pub narrows: bool,
+}
+
+impl Outline {
+    /// The width at the fraction `x` of the length from which stiffnesses are computed: it
+    /// is nowhere less than the least width, and smooth. It differs from a width w by the part
+    /// (least/w)^4/4.
+    pub fn bearing_width(&self, x: f64) -> f64 {
+        let [width, ..] = self.width.at(x);
+        match self.narrows {
+            true => {
+                let least = self.least * self.largest;
+                (width.powi(4) + least.powi(4)).sqrt().sqrt()
+            }
+            false => width,
+        }
+    }
+}
+
+/// A vein of a blade, along y = eta W(x)/2.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vein {
+    outline: Arc<Outline>,
+    /// Its place, a fraction of the half width; not negative: its mirror image is the same vein.
+    eta: f64,
+    /// Its strip is the width of the blade over this.
+    count: f64,
+    material: Material,
+    /// Its length.
+    pub length: f64,
+    /// x and its first and second derivative by sigma, at the ends of equal panels.
+    places: Vec<[f64; 3]>,
+}
+
+impl Vein {
+    pub fn new(outline: &Arc<Outline>, eta: f64, count: usize, material: Material) -> Vein {
+        let (outline, count) = (outline.clone(), count as f64);
+        let mut vein = Vein {
+            outline,
+            eta,
+            count,
+            material,
+            length: 0.0,
+            places: Vec::new(),
+        };
+        vein.measure();
+        vein
+    }
+
+    /// The derivatives y' and y'' of y = eta W/2 by the distance from the base, at the fraction x
+    /// of the length.
+    fn slopes(&self, x: f64) -> [f64; 2] {
+        let Outline { length, width, .. } = &*self.outline;
+        let [_, slope, second] = width.at(x);
+        let half = 0.5 * self.eta;
+        [half * slope / length, half * second / (length * length)]
+    }
+
+    /// The angle at its base.
+    pub fn angle(&self) -> f64 {
+        self.slopes(0.0)[0].atan()
+    }
+
+    /// Arc length over the fraction `x` of the blade's length.
+    fn stretch(&self, x: f64) -> f64 {
+        self.outline.length * self.slopes(x)[0].hypot(1.0)
+    }
+
+    /// The arc length between two fractions, between which the outline is smooth.
+    fn arc(&self, from: f64, to: f64) -> f64 {
+        let width = to - from;
+        GAUSS
+            .iter()
+            .map(|(x, weight)| width * weight * self.stretch(from + x * width))
+            .sum()
+    }
+
+    /// Finds its length, and x at equal distances along it.
+    fn measure(&mut self) {
+        let even = (0..=PANELS).map(|k| k as f64 / PANELS as f64);
+        let edges = ascending(even.chain(self.outline.width.knots().iter().copied()));
+        let mut reached = vec![0.0];
+        for pair in edges.windows(2) {
+            let before = reached[reached.len() - 1];
+            reached.push(before + self.arc(pair[0], pair[1]));
+        }
+        self.length = reached[reached.len() - 1];
+        let place = |k: usize| {
+            let wanted = self.length * k as f64 / PANELS as f64;
+            let panel = reached.partition_point(|&s| s < wanted).max(1) - 1;
+            let mut x = edges[panel];
+            // Newton's method, which converges quadratically; a panel is nearly straight.
+            for _ in 0..6 {
+                let missing = wanted - reached[panel] - self.arc(edges[panel], x);
+                x = (x + missing / self.stretch(x)).clamp(0.0, 1.0);
+            }
+            let [slope, second] = self.slopes(x);
+            // dx/ds = (1 + y'^2)^(-1/2) and its derivative, by sigma.
+            let speed = self.length / (self.outline.length * slope.hypot(1.0));
+            let change = -slope * second / (1.0 + slope * slope) * self.outline.length;
+            [x, speed, speed * speed * change]
+        };
+        let mut places: Vec<_> = (0..=PANELS).map(place).collect();
+        (places[0][0], places[PANELS][0]) = (0.0, 1.0);
+        self.places = places;
+    }
+
+    /// The fraction x of the blade's length at the fraction sigma of its own.
+    fn place(&self, sigma: f64) -> f64 {
+        let scaled = sigma * PANELS as f64;
+        let k = (scaled as usize).min(PANELS - 1);
+        let (t, h) = (scaled - k as f64, 1.0 / PANELS as f64);
+        let end = |[x, slope, second]: [f64; 3]| [x, h * slope, h * h * second];
+        let [x, ..] = quintic(t, end(self.places[k]), end(self.places[k + 1]));
+        x.clamp(0.0, 1.0)
+    }
+}
+
+impl Vein {
+    /// The properties of a vein at a fraction of its length, by their numbers.
+    fn properties(&self, sigma: f64) -> [f64; MOST] {
+        let x = self.place(sigma);
+        let h = self.outline.bearing_width(x) / self.count;
+        let Local { t, young, shear, .. } = self.material.at(sigma);
+        let mass_density = self.material.mass_density.as_ref();
+        let density = mass_density.map_or(0.0, |it| it.at(sigma));
+        let [slope, second] = self.slopes(x);
+        let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
+        let across = SHEAR_FACTOR * shear * h * t;
+        [
+            shear * flat / 3.0,
+            young * flat / 12.0,
+            young * upright / 12.0,
+            young * h * t,
+            across,
+            across,
+            second / slope.hypot(1.0).powi(3),
+            density * h * t,
+            0.5 * density * (flat + upright) / 12.0,
+        ]
+    }
+}
+
+/// What a profile of a blade follows from.
+#[derive(Clone, Debug, PartialEq)]
+enum Source {
+    /// A vein.
+    Vein(Arc<Vein>),
+    /// The tissue between two veins, whose width is that of the blade times a factor.
+    Gap([Arc<Vein>; 2], f64),
+}
+
+/// A vein of a blade, or the tissue between two: what profiles along it are evaluated from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BladePart {
+    source: Source,
+    kinks: Vec<f64>,
+    /// The least and largest value of every property.
+    extremes: [[f64; 2]; MOST],
+}
+
+impl BladePart {
+    pub(super) fn vein(vein: Arc<Vein>) -> Arc<BladePart> {
+        BladePart::new(Source::Vein(vein))
+    }
+
+    /// The tissue between two veins, `apart` being the difference of their fractions of the half
+    /// width.
+    pub(super) fn gap(one: &Arc<Vein>, other: &Arc<Vein>, apart: f64) -> Arc<BladePart> {
+        // Its mirror image is the same.
+        let (near, far) = if one.eta <= other.eta { (one, other) } else { (other, one) };
+        BladePart::new(Source::Gap([near.clone(), far.clone()], 0.5 * apart))
+    }
+
+    fn new(source: Source) -> Arc<BladePart> {
+        let kinks = match &source {
+            Source::Vein(vein) => ascending(vein.material.kinks()),
+            Source::Gap([one, other], _) => {
+                ascending(one.material.kinks().chain(other.material.kinks()))
+            }
+        };
+        let mut part = BladePart {
+            source,
+            kinks,
+            extremes: [[f64::INFINITY, f64::NEG_INFINITY]; MOST],
+        };
+        let even = (0..=2 * PANELS).map(|k| k as f64 / (2 * PANELS) as f64);
+        for sigma in even.chain(part.kinks.clone()) {
+            for (value, [least, most]) in part.properties(sigma).into_iter().zip(&mut part.extremes)
+            {
+                (*least, *most) = (least.min(value), most.max(value));
+            }
+        }
+        part.into()
+    }
+
+    fn properties(&self, sigma: f64) -> [f64; MOST] {
+        match &self.source {
+            Source::Vein(vein) => vein.properties(sigma),
+            Source::Gap([one, other], factor) => {
+                let x = 0.5 * (one.place(sigma) + other.place(sigma));
+                let w = factor * one.outline.bearing_width(x);
+                let [a, b] = [one, other].map(|vein| vein.material.at(sigma));
+                let mean = |of: fn(&Local) -> f64| 0.5 * (of(&a) + of(&b));
+                let (t, across) = (mean(|it| it.t), mean(|it| it.across));
+                let along = mean(|it| it.shear) * t / w;
+                let fold = across * t.powi(3) / (12.0 * w);
+                let mut all = [0.0; MOST];
+                all[..4].copy_from_slice(&[along, across * t / w, SHEAR_FACTOR * along, fold]);
+                all
+            }
+        }
+    }
+
+    /// A property at a fraction of the length.
+    pub fn at(&self, property: BladeProperty, sigma: f64) -> f64 {
+        self.properties(sigma)[property.number()]
+    }
+
+    /// Fractions inside (0, 1) where the slope of a property may jump.
+    pub fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    /// The least and the largest value of a property.
+    pub(in crate::scenario) fn extremes(&self, property: BladeProperty) -> [f64; 2] {
+        self.extremes[property.number()]
+    }
+
+    /// A property along it; of a vein on the other side of the midrib if `image`.
+    pub(super) fn profile(self: &Arc<BladePart>, property: BladeProperty, image: bool) -> Profile {
+        let turns = image && property == BladeProperty::RestBend;
+        let [least, most] = self.extremes(property);
+        let factor = if turns { -1.0 } else { 1.0 };
+        match least == most {
+            true => Profile::Constant(factor * least),
+            false => Profile::Blade {
+                part: self.clone(),
+                property,
+                factor,
+            },
+        }
+    }
+}
