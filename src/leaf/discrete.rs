@@ -121,7 +121,7 @@ impl DiscreteLeaf {
             .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
     }
 
-    /// The same leaf with no compliance below `floor`.
+    /// The same leaf with no compliance below `floor`, and no tissue stiffer than its inverse.
     pub fn softened(&self, floor: f64) -> Self {
         let mut soft = self.clone();
         let n = self.segments();
@@ -130,13 +130,18 @@ impl DiscreteLeaf {
             section.compliance = section.compliance.max(DVec3::splat(floor));
             section.condensing = section.condensing.min(DVec3::splat(1.0 / floor));
         }
+        for (k, strip) in soft.strips.iter_mut().enumerate() {
+            let stiffest = self.grid.weight(k % (n + 1)) / floor;
+            strip.stiffness = strip.stiffness.min(DVec3::splat(stiffest));
+        }
         soft
     }
 
-    /// Sets the force of every segment to that of its strain, and in rigid directions to zero;
+    /// Sets the force of every segment, and of the tissue, to that of its strain, and in rigid directions to zero;
     /// returns the largest strain in these, as a length.
     pub fn strain_forces(&self, state: &mut State) -> f64 {
         let (n, mut violation) = (self.segments(), 0.0_f64);
+        state.tissue.clear();
         for (j, i) in self.each(0..n) {
             let section = self.section(j, i);
             let rigid = section.compliance.cmpeq(DVec3::ZERO);

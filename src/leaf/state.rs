@@ -15,6 +15,9 @@ pub struct State {
     pub q: Vec<DQuat>,
     /// Spatial force of each segment, N n.
     pub n: Vec<DVec3>,
+    /// Spatial force of the tissue per unit of sigma at each node, gap after gap, (N - 1) (n + 1);
+    /// empty: that of its strains.
+    pub tissue: Vec<DVec3>,
     segments: usize,
 }
 
@@ -58,6 +61,7 @@ impl State {
             x,
             q,
             n: vec![DVec3::ZERO; rods * segments],
+            tissue: Vec::new(),
             segments,
         }
     }

@@ -3,7 +3,7 @@
 
 use super::discrete::DiscreteLeaf;
 use super::loads::NodeLoad;
-use super::state::State;
+use super::state::{State, shift, turn};
 use super::system::System;
 use crate::largest::largest;
 use crate::rod::{Ends, Strip};
@@ -93,16 +93,20 @@ impl DiscreteLeaf {
         let mut energy = 0.0;
         for (g, i, strip) in self.each_strip() {
             let ends = across(state, g, i);
-            let (own, loads) = strip.energy_and_loads(&ends);
+            let (own, mut loads) = strip.energy_and_loads(&ends);
             energy += own;
             if i == 0 {
                 continue;
+            }
+            let force = self.tissue_force(state, (g, i), strip, &ends);
+            if !state.tissue.is_empty() {
+                loads = strip.condensed_loads(&ends, force);
             }
             for (rod, load) in [g, g + 1].into_iter().zip(loads) {
                 system.add_load(rod, i, load);
             }
             if matrix {
-                let hessian = strip.hessian(&ends);
+                let hessian = strip.condensed_hessian(&ends, force);
                 for (rod, own) in [g, g + 1].into_iter().zip(&hessian.own) {
                     system.add_block(rod, i, own);
                 }
@@ -110,6 +114,44 @@ impl DiscreteLeaf {
             }
         }
         energy
+    }
+
+    /// The spatial force that a strip carries in a state.
+    fn tissue_force(
+        &self,
+        state: &State,
+        (g, i): (usize, usize),
+        strip: &Strip,
+        ends: &Ends,
+    ) -> DVec3 {
+        match state.tissue.get(g * (self.segments() + 1) + i) {
+            Some(force) => self.grid.weight(i) * *force,
+            None => strip.force(ends),
+        }
+    }
+
+    /// Writes the forces that the tissue carries after `step` times the increments in `solution`.
+    pub(super) fn advance_tissue(
+        &self,
+        state: &State,
+        solution: &System,
+        step: f64,
+        next: &mut State,
+    ) {
+        next.tissue.resize(self.strips.len(), DVec3::ZERO);
+        for (k, (g, i, strip)) in self.each_strip().enumerate() {
+            let ends = across(state, g, i);
+            let force = self.tissue_force(state, (g, i), strip, &ends);
+            let change = match i {
+                0 => DVec3::ZERO,
+                _ => {
+                    let [a, b] = [g, g + 1].map(|rod| solution.increment(rod, i));
+                    let dx = shift(&b) - shift(&a);
+                    strip.force_increment(&ends, force, dx, [turn(&a), turn(&b)])
+                }
+            };
+            next.tissue[k] = (force + step * change) / self.grid.weight(i);
+        }
     }
 
     /// Adds the moments and forces of all tissue on all nodes, rod after rod.

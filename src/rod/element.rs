@@ -134,7 +134,7 @@ impl<S: Simd> Element<S> {
     /// Converts derivatives with respect to R^T dx and to the rotation mu of the midpoint to
     /// nodal derivatives, adding the bending moment `m`.
     #[inline(always)]
-    fn pull_back(&self, nu: Vectors<S>, g_mu: Vectors<S>, m: Vectors<S>) -> First<S> {
+    pub(super) fn pull_back(&self, nu: Vectors<S>, g_mu: Vectors<S>, m: Vectors<S>) -> First<S> {
         let g_mu = g_mu.scale(Lanes::splat(nu.x.simd, 0.5));
         let g_delta = self.relative.tau.cross(g_mu) + self.relative.derivative(m);
         [

@@ -8,13 +8,16 @@
 //! E = 1/2 sum_k k_k e_k^2 + 1/2 c_1 theta_1^2.
 //!
 //! k_1 resists neighbours that slide along each other, k_2 a change of width, k_3 one vein that rises
-//! above the other, c_1 a fold along the veins. Other than a segment a strip may have no stiffness
-//! in some direction, so that its forces are those of its strains.
+//! above the other, c_1 a fold along the veins. As a segment a strip carries a spatial
+//! force as a further unknown, which is condensed out ([`Element`]), so that Newton's method
+//! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
+//! direction, in which it then carries no force.
 
 use super::derivatives::{First, UNKNOWNS, on_nodes};
 use super::element::{Element, Nodes};
 use super::section::{Section, Sections};
 use super::segment::Ends;
+use crate::lanes::Vectors;
 use crate::rotation;
 use glam::DVec3;
 use pulp::Scalar;
@@ -74,6 +77,7 @@ impl Strip {
         self.turn += times * other.turn;
     }
 
+    /// Between these ends, carrying the force of its strains.
     fn element(&self, ends: &Ends) -> (Element<Scalar>, Sections<Scalar>) {
         let sections = Sections::from(&Section {
             ds: 1.0,
@@ -84,6 +88,54 @@ impl Strip {
             condensing: self.stiffness,
         });
         (Element::strained(&sections, &Nodes::from(ends)), sections)
+    }
+
+    /// Between these ends, carrying the spatial `force`. In directions without stiffness it carries
+    /// none.
+    fn carrying(&self, ends: &Ends, force: DVec3) -> (Element<Scalar>, Sections<Scalar>) {
+        let (mut element, sections) = self.element(ends);
+        let dx = DVec3::from(element.w);
+        let stiff = self.stiffness.cmpgt(DVec3::ZERO);
+        let carried = DVec3::from(Vectors::from(force).onto(element.frame));
+        let nu = DVec3::select(stiff, carried, DVec3::ZERO);
+        let w = DVec3::select(stiff, self.width + nu / self.stiffness, dx);
+        (element.nu, element.w, element.gap) = (nu.into(), w.into(), (dx - w).into());
+        (element, sections)
+    }
+
+    /// The spatial force of its strains between these ends.
+    pub fn force(&self, ends: &Ends) -> DVec3 {
+        let (element, _) = self.element(ends);
+        element.nu.along(element.frame).into()
+    }
+
+    /// The right-hand side for [`Strip::hessian`] if it carries this spatial force, which is condensed
+    /// out: a moment and a force on either node.
+    pub fn condensed_loads(&self, ends: &Ends, force: DVec3) -> [[DVec3; 2]; 2] {
+        let (element, _) = self.carrying(ends, force);
+        let Element { nu, w, gap, .. } = element;
+        let correction = Vectors::from(self.stiffness) * gap;
+        let g_mu = nu.cross(w + gap) - w.cross(correction);
+        on_ends(element.pull_back(nu + correction, g_mu, element.m))
+    }
+
+    /// The change of the spatial force that it carries for the displacement `dx` of the second node
+    /// against the first and the spatial rotations `turns` of both.
+    pub fn force_increment(
+        &self,
+        ends: &Ends,
+        force: DVec3,
+        dx: DVec3,
+        turns: [DVec3; 2],
+    ) -> DVec3 {
+        let (element, _) = self.carrying(ends, force);
+        let onto = |v: DVec3| DVec3::from(Vectors::from(v).onto(element.frame));
+        let [alpha, beta] = turns.map(onto);
+        let [nu, w, gap, tau] = [element.nu, element.w, element.gap, element.relative.tau];
+        let [nu, w, gap, tau] = [nu, w, gap, tau].map(DVec3::from);
+        let mu = 0.5 * (alpha + beta + (beta - alpha).cross(tau));
+        let change = self.stiffness * (onto(dx) + gap + w.cross(mu)) - nu.cross(mu);
+        Vectors::from(change).along(element.frame).into()
     }
 
     /// The strains e and theta_1 between these ends.
@@ -113,7 +165,14 @@ impl Strip {
 
     /// The second derivatives of its energy.
     pub fn hessian(&self, ends: &Ends) -> StripHessian {
-        let (element, sections) = self.element(ends);
+        let force = self.force(ends);
+        self.condensed_hessian(ends, force)
+    }
+
+    /// Second derivatives if it carries this spatial force, which is condensed out: those of its
+    /// energy where the force is that of its strains.
+    pub fn condensed_hessian(&self, ends: &Ends, force: DVec3) -> StripHessian {
+        let (element, sections) = self.carrying(ends, force);
         let hessian = element.second_strained(&sections).by_nodes();
         StripHessian {
             own: hessian.own.map(|block| block.map(|row| row.map(f64::from))),

@@ -108,6 +108,9 @@ impl DiscreteLeaf {
     /// rod, nodes 1 to n), written over `next`.
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         next.clone_from(state);
+        if self.tied() {
+            self.advance_tissue(state, solution, step, next);
+        }
         let (n, arch) = (self.segments(), solution.arch);
         let (nodes, forces) = (GROUP * (n + 1), GROUP * n);
         let advance = |(g, ((x, q), n)): (usize, ((&mut [_], &mut [_]), &mut [_]))| {

@@ -282,6 +282,12 @@ impl System {
         self.gather(|group| &group.solution)
     }
 
+    /// The last solution at node `i` (from 1) of rod `j`.
+    pub fn increment(&self, j: usize, i: usize) -> Increment {
+        let (group, lane) = group_and_lane(j);
+        of_lane(&self.groups[group].solution[i - 1], lane)
+    }
+
     /// Replaces the last solution.
     pub fn set_solution(&mut self, increments: &Field) {
         self.scatter(increments, |group| &mut group.solution);

@@ -209,6 +209,13 @@ impl<'w> Walk<'w> {
                 .sum();
             self.next.n[k] = last.n[k] + change;
         }
+        let tied = others().all(|((_, state), _)| state.tissue.len() == last.tissue.len());
+        self.next.tissue.clone_from(&last.tissue);
+        for (k, force) in self.next.tissue.iter_mut().enumerate().filter(|_| tied) {
+            for ((_, state), weight) in others() {
+                *force += weight * (state.tissue[k] - last.tissue[k]);
+            }
+        }
         for j in 0..last.rods() {
             let base = last.base(j);
             (self.next.x[base], self.next.q[base]) = (last.x[base], last.q[base]);

@@ -124,6 +124,14 @@ impl Panel {
                 to.n[first + i] = middle.value(|i| from.n[base + i]);
             }
         }
+        if !to.tissue.is_empty() {
+            for g in 0..from.tissue.len() / (from.segments() + 1) {
+                let (base, first) = (from.base(g), to.base(g) + self.first(to));
+                for (k, node) in nodes.iter().enumerate() {
+                    to.tissue[first + k] = node.value(|i| from.tissue[base + i]);
+                }
+            }
+        }
     }
 
     /// Adds `weight` times the change from the state on the `fine` grid to that on
@@ -156,6 +164,21 @@ impl Panel {
             let first = j * to.segments() + self.first(to);
             for (i, middle) in middles.iter().enumerate() {
                 to.n[first + i] += middle.value(|i| changes[i - start]);
+            }
+        }
+        if [coarse, fine, to].iter().any(|state| state.tissue.is_empty()) {
+            return;
+        }
+        for g in 0..coarse.tissue.len() / (coarse.segments() + 1) {
+            let change = |i: usize| {
+                let (a, b) = (coarse.base(g) + i, fine.base(g) + stride * i);
+                weight * (coarse.tissue[a] - fine.tissue[b])
+            };
+            let changes: Vec<_> = (start..=start + count).map(change).collect();
+            let first = to.base(g) + self.first(to);
+            let skipped = usize::from(self.first > 0);
+            for (k, node) in nodes.iter().enumerate().skip(skipped) {
+                to.tissue[first + k] += node.value(|i| changes[i - start]);
             }
         }
     }

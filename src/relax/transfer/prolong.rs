@@ -58,7 +58,21 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     }
     let mut fine = State::new(2 * n, x, q);
     fine.n = forces;
+    fine.tissue = (state.tissue.chunks(n + 1)).flat_map(halved).collect();
     fine
+}
+
+/// Values at nodes, and between them: cubic, at the ends quadratic.
+fn halved(at: &[DVec3]) -> Vec<DVec3> {
+    let n = at.len() - 1;
+    let between = |i: usize| match i {
+        _ if n < 3 => 0.5 * (at[i] + at[i + 1]),
+        0 => 0.375 * at[0] + 0.75 * at[1] - 0.125 * at[2],
+        _ if i + 1 == n => 0.375 * at[n] + 0.75 * at[n - 1] - 0.125 * at[n - 2],
+        _ => 0.5625 * (at[i] + at[i + 1]) - 0.0625 * (at[i - 1] + at[i + 2]),
+    };
+    let pairs = (0..n).flat_map(|i| [at[i], between(i)]);
+    pairs.chain([at[n]]).collect()
 }
 
 /// The state on any other grid, interpolated: positions and quaternions by polynomials through
@@ -116,6 +130,9 @@ pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
     }
     let mut other = State::new(grid.segments(), x, q);
     other.n = forces;
+    let gaps = state.tissue.chunks(n + 1);
+    let nodes = gaps.flat_map(|gap| stencils.iter().map(|stencil| stencil.value(|i| gap[i])));
+    other.tissue = nodes.collect();
     // Ends are exact.
     for j in 0..leaf.rods() {
         let (from, to) = (state.base(j), other.base(j));
@@ -136,5 +153,7 @@ pub fn restrict(fine: &State) -> State {
     }
     let mut coarse = State::new(fine.segments() / 2, x, q);
     coarse.n = fine.n.chunks(2).map(|n| 0.5 * (n[0] + n[1])).collect();
+    let gaps = fine.tissue.chunks(fine.segments() + 1);
+    coarse.tissue = gaps.flat_map(|gap| gap.iter().step_by(2)).copied().collect();
     coarse
 }
