@@ -28,10 +28,8 @@ pub struct Natural<'a> {
 type Vein = (DVec3, DQuat);
 
 impl<'a> Natural<'a> {
-    /// The leaf in which the tissue of this scenario is without force: its veins have grown, or not
-    /// yet.
-    pub fn new(scenario: &'a Scenario) -> Self {
-        let grown = scenario.tissue_grown;
+    /// Of this scenario, whose veins have `grown`, or not yet.
+    pub fn new(scenario: &'a Scenario, grown: bool) -> Self {
         let veins = (0..scenario.rods.len()).map(|j| vein(scenario, j, grown));
         Natural {
             veins: veins.collect(),
@@ -119,7 +117,7 @@ mod tests {
             rest = { twist = [1.2, 0.5], bend_2 = { at = [0.0, 0.3, 1.0], value = [[0.7, 0.7, 0.7], [0.0, 4.0, -2.0]] }, bend_3 = -0.4, stretch = 1.1 }
         "#;
         let scenario = Scenario::from_toml(text).unwrap();
-        let natural = Natural::new(&scenario);
+        let natural = Natural::new(&scenario, true);
         let (x, q) = natural.at(0, 0.77);
         let (u, s) = (DVec3::new(1.2, 0.7, -0.4), 0.77 * 2.0);
         let (_, base) = scenario.base(0);

@@ -25,6 +25,8 @@ pub struct DiscreteLeaf {
     pub grid: Grid,
     /// Sections of all segments, rod after rod.
     pub sections: Vec<Section>,
+    /// Their rest curvatures, whatever [`DiscreteLeaf::set_rest`] sets.
+    rest_curvatures: Vec<DVec3>,
     /// Coupling of each gap, per unit of sigma; the last may be the one between
     /// a rod and its image.
     coupling: Vec<DVec3>,
@@ -44,10 +46,11 @@ impl DiscreteLeaf {
     /// Discretises `leaf` on `grid`.
     pub fn new(leaf: &Leaf, grid: Grid) -> Self {
         let n = grid.segments();
-        let sections = (0..leaf.rods())
+        let mut sections: Vec<Section> = (0..leaf.rods())
             .flat_map(|j| (0..n).map(move |i| (j, i)))
             .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
             .collect();
+        leaf.fit_rest_shapes(&grid, &mut sections);
         DiscreteLeaf::with_sections(leaf, grid, sections)
     }
 
@@ -66,6 +69,7 @@ impl DiscreteLeaf {
         let mut discrete = DiscreteLeaf {
             leaf: leaf.clone(),
             grid,
+            rest_curvatures: sections.iter().map(|of| of.rest_curvature).collect(),
             sections,
             coupling,
             strips: Vec::new(),
@@ -367,11 +371,8 @@ impl DiscreteLeaf {
 
     /// Sets all rest curvatures to `factor` times those of the leaf.
     pub fn set_rest(&mut self, factor: f64) {
-        let n = self.segments();
-        for (k, section) in self.sections.iter_mut().enumerate() {
-            let (j, i) = (k / n, k % n);
-            let own = (self.leaf).section(j, self.grid.middle(i), self.grid.width(i));
-            section.rest_curvature = factor * own.rest_curvature;
+        for (section, own) in self.sections.iter_mut().zip(&self.rest_curvatures) {
+            section.rest_curvature = factor * *own;
         }
     }
 }

@@ -97,7 +97,10 @@ impl<'a> Flow<'a> {
             slopes: vec![fields.clone(); STAGES],
             laws: Vec::with_capacity(groups),
             uniform: leaf.leaf.uniform(),
-            natural: leaf.tied().then(|| Natural::new(leaf.leaf.scenario())),
+            natural: leaf.tied().then(|| {
+                let scenario = leaf.leaf.scenario();
+                Natural::new(scenario, scenario.tissue_grown)
+            }),
             fields,
         };
         flow.look_up_laws(0.0);

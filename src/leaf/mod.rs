@@ -16,6 +16,7 @@ mod mirror;
 #[cfg(test)]
 mod not_a_number;
 mod own_loads;
+mod rest_shape;
 mod state;
 mod system;
 mod tissue;

@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
 use crate::rotation::outer;
-use crate::scenario::{Dynamics, Schedule};
+use crate::scenario::{Dynamics, Schedule, Profile};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments.
@@ -101,9 +101,14 @@ impl Physics {
         let sigma = leaf.grid.sigma()[i];
         let length = leaf.grid.weight(i) * leaf.leaf.length(j) * leaf.leaf.share(j);
         let rotary = self.density * self.scale.length * self.scale.length;
+        // Where a blade ends in a point its last node has the inertia of the stretch around it.
+        let around = |of: &Profile| match of.at(sigma) > 0.0 {
+            true => of.at(sigma),
+            false => of.at((0.5 * leaf.grid.weight(i) - sigma).abs()),
+        };
         Inertia {
-            mass: length * self.dynamics.density[j].at(sigma) / self.density,
-            transverse: length * self.dynamics.rotary_inertia[j].at(sigma) / rotary,
+            mass: length * around(&self.dynamics.density[j]) / self.density,
+            transverse: length * around(&self.dynamics.rotary_inertia[j]) / rotary,
             excess: self.dynamics.polar_excess,
         }
     }

@@ -31,11 +31,21 @@ impl Limit {
     /// Checks the extremes of a profile of each rod, in this unit.
     pub fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result<()> {
         for (index, profile) in profiles.iter().enumerate() {
-            for value in [profile.min(), profile.max_abs()] {
+            for value in extremes(profile) {
                 self.check(item.entry(index), value / unit)?;
             }
         }
         Ok(())
+    }
+}
+
+/// The least and the largest value of a quantity that is positive. The mass of a blade may vanish at
+/// its ends: then the largest twice.
+pub(super) fn extremes(profile: &Profile) -> [f64; 2] {
+    let (least, most) = (profile.min(), profile.max_abs());
+    match profile {
+        Profile::Blade { .. } if least == 0.0 => [most; 2],
+        _ => [least, most],
     }
 }
 

@@ -3,7 +3,7 @@
 //! defaults are always within the limits.
 
 use super::bounds::{
-    GRAVITY, Limit, TIME, TIP_FORCE, TIP_MOMENT, UNIT, most, near_one, norm, smallest_unit, softest,
+    GRAVITY, Limit, extremes, TIME, TIP_FORCE, TIP_MOMENT, UNIT, most, near_one, norm, smallest_unit, softest,
 };
 use super::entries::Entries;
 use super::error::Result;
@@ -104,19 +104,19 @@ fn magnitudes(entries: &Entries, scenario: &Scenario) -> Result<()> {
         rotary_inertia,
         ..
     } = &scenario.dynamics;
-    let tissue = scenario.tissue.iter().flatten().flat_map(Tissue::profiles);
     for (rod, it) in scenario.rods.iter().enumerate() {
         let stiffness = it.couple_stiffness.iter().chain(&it.force_stiffness);
         for profile in stiffness.chain([&density[rod], &rotary_inertia[rod]]) {
             is_moderate(size.entry(rod), profile)?;
         }
     }
+    let tissue = scenario.tissue.iter().flatten().flat_map(Tissue::profiles);
     let mut tissue = tissue.filter(|_| scenario.blade.is_some());
     tissue.try_for_each(|profile| is_moderate(size, profile))
 }
 
 fn is_moderate(item: Item, profile: &Profile) -> Result<()> {
-    for value in [profile.min(), profile.max_abs()] {
+    for value in extremes(profile) {
         item.ensure(
             MAGNITUDES.contains(&value),
             format_args!(

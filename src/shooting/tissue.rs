@@ -46,7 +46,7 @@ impl<'a> Tissue<'a> {
             [k, k, k, mean / force]
         });
         Some(Tissue {
-            natural: Natural::new(scenario),
+            natural: Natural::new(scenario, scenario.tissue_grown),
             length,
             gaps,
             factors: factors.collect(),

@@ -5,7 +5,7 @@ use crate::leaf::derivative::{Forces, LeafRate};
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{State, add};
-use crate::rod::Strip;
+use crate::rod::{Section, Strip};
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;
@@ -20,6 +20,24 @@ pub(in crate::leaf::derivative) fn leaves(
         (*weight, Leaf::in_units(scenario, leaf.scale))
     });
     each.collect()
+}
+
+/// The changes of the rest strain and the rest curvature of segment `i` of rod `j`.
+pub(in crate::leaf::derivative) fn rest_rates(
+    each: &[(f64, DiscreteLeaf)],
+    j: usize,
+    i: usize,
+) -> [DVec3; 2] {
+    let Some((_, first)) = each.first() else {
+        return [DVec3::ZERO; 2];
+    };
+    let sum = |of: fn(&Section) -> DVec3| -> DVec3 {
+        let own = of(first.section(j, i));
+        each.iter()
+            .map(|(weight, leaf)| *weight * (of(leaf.section(j, i)) - own))
+            .sum()
+    };
+    [sum(|it| it.rest_strain), sum(|it| it.rest_curvature)]
 }
 
 impl DiscreteLeaf {
@@ -41,6 +59,16 @@ impl DiscreteLeaf {
             .iter()
             .map(|(weight, leaf)| *weight * on(leaf))
             .sum()
+    }
+
+    /// The discrete leaves of neighbouring scenarios with their weights.
+    pub(in crate::leaf::derivative) fn neighbours(
+        &self,
+        rate: &LeafRate,
+    ) -> Vec<(f64, DiscreteLeaf)> {
+        let each = rate.leaves.iter();
+        each.map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
+            .collect()
     }
 
     /// Adds the changes of the loads that veins have of their own, from the weighted leaves of
@@ -72,17 +100,14 @@ impl DiscreteLeaf {
     pub(in crate::leaf::derivative) fn add_tissue_changes(
         &self,
         state: &State,
-        rate: &LeafRate,
+        each: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
         let n = self.segments();
-        let each: Vec<_> = (rate.leaves.iter())
-            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
-            .collect();
         let Some((_, first)) = each.first() else {
             return;
         };
-        self.add_own_load_changes(state, &each, forces);
+        self.add_own_load_changes(state, each, forces);
         let (first, each): (_, Vec<_>) = (
             &first.strips,
             each.iter().map(|(w, leaf)| (w, &leaf.strips)).collect(),

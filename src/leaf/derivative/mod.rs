@@ -8,7 +8,7 @@ mod leaves;
 
 pub use crate::leaf::derivative::forces::{Forces, Response};
 use crate::leaf::derivative::held::HeldRate;
-use crate::leaf::derivative::leaves::leaves;
+use crate::leaf::derivative::leaves::{leaves, rest_rates};
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, State, add};
@@ -173,11 +173,12 @@ impl DiscreteLeaf {
     /// with these segments.
     pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
         let mut forces = Forces::zeros(self.rods());
+        let neighbours = self.neighbours(rate);
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.sections_unchanged() {
-                self.add_section_changes(segments, j, rod, &mut forces);
+                self.add_section_changes(segments, j, rod, &neighbours, &mut forces);
             }
             let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
             if of_all || coupling || rod.length != 0.0 {
@@ -187,7 +188,7 @@ impl DiscreteLeaf {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
-        self.add_tissue_changes(state, rate, &mut forces);
+        self.add_tissue_changes(state, &neighbours, &mut forces);
         if let Some(held) = &rate.held {
             self.add_tip_motion(state, segments, held, &mut forces);
         }
@@ -199,6 +200,7 @@ impl DiscreteLeaf {
         segments: &[Segment],
         j: usize,
         rod: &RodRate,
+        neighbours: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
         let n = self.segments();
@@ -207,7 +209,10 @@ impl DiscreteLeaf {
         for i in 0..n {
             let section = self.section(j, i);
             let segment = &segments[j * n + i];
-            let change = rod.section(section, self.grid.middle(i), self.grid.width(i));
+            let mut change = rod.section(section, self.grid.middle(i), self.grid.width(i));
+            if self.tied() {
+                [change.rest_strain, change.rest_curvature] = rest_rates(neighbours, j, i);
+            }
             let change = segment.rate(section, &change);
             let [left, right] = change.gradient;
             let nodes = &mut forces.nodes[j];

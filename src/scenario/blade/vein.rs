@@ -78,12 +78,9 @@ impl Outline {
     /// is nowhere less than the least width, and smooth. It differs from a width w by the part
     /// (least/w)^4/4.
     pub fn bearing_width(&self, x: f64) -> f64 {
-        let [width, ..] = self.width.at(x);
+        let ([width, ..], least) = (self.width.at(x), self.least * self.largest);
         match self.narrows {
-            true => {
-                let least = self.least * self.largest;
-                (width.powi(4) + least.powi(4)).sqrt().sqrt()
-            }
+            true => (width.powi(4) + least.powi(4)).sqrt().sqrt(),
             false => width,
         }
     }
@@ -193,6 +190,8 @@ impl Vein {
     fn properties(&self, sigma: f64) -> [f64; MOST] {
         let x = self.place(sigma);
         let h = self.outline.bearing_width(x) / self.count;
+        // The mass is that of the blade as it is.
+        let heavy = self.outline.width.at(x)[0].max(0.0) / self.count;
         let Local { t, young, shear, .. } = self.material.at(sigma);
         let mass_density = self.material.mass_density.as_ref();
         let density = mass_density.map_or(0.0, |it| it.at(sigma));
@@ -207,8 +206,8 @@ impl Vein {
             across,
             across,
             second / slope.hypot(1.0).powi(3),
-            density * h * t,
-            0.5 * density * (flat + upright) / 12.0,
+            density * heavy * t,
+            0.5 * density * heavy * t * (heavy * heavy + t * t) / 12.0,
         ]
     }
 }
