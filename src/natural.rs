@@ -50,12 +50,16 @@ impl<'a> Natural<'a> {
     }
 }
 
-/// The steps along vein `j`, which end at every kink of its rest shape.
+/// The steps along vein `j`, which end at every kink and seam of its rest shape.
 fn vein(scenario: &Scenario, j: usize, grown: bool) -> Vec<(f64, Vein)> {
     let rod = &scenario.rods[j];
     let shape = rod.rest_curvature.iter().chain([&rod.rest_stretch]);
-    let mut kinks: Vec<f64> = shape.clone().flat_map(|p| p.kinks()).copied().collect();
+    let mut kinks: Vec<f64> = (shape.clone())
+        .flat_map(|p| p.kinks().iter().chain(p.seams()))
+        .copied()
+        .collect();
     kinks.sort_by(f64::total_cmp);
+    kinks.dedup();
     let turn: f64 = rod.rest_curvature.iter().map(|p| p.max_abs()).sum();
     let longest = (TURN / (turn * rod.length)).min(STEP);
     let mut steps = vec![(0.0, scenario.base(j))];

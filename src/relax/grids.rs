@@ -80,7 +80,6 @@ pub fn refine(problem: &Problem, mut found: NestedEquilibrium, effort: &mut Effo
     loop {
         found = found.estimated(problem, &mut effort.spare_system, &mut effort.work);
         let mut known = false;
-        if std::env::var("DBG").is_ok() { eprintln!("{:?} err {:?} best {:?} est {:?} unres {:?} growth {}", found.levels.iter().map(|l| l.leaf.segments()).collect::<Vec<_>>(), found.error(), found.table.best(), found.estimate.as_ref().map(|e| (e.at_nodes, e.between, e.corrections)), found.unresolved, found.levels.last().map_or(0.0, |l| l.leaf.growth(1.0 / l.leaf.segments() as f64))); }
         if found.is_accurate() {
             (found, known) = check_stability(problem, found, false, effort)?;
         }

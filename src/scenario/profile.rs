@@ -114,6 +114,15 @@ impl Profile {
         }
     }
 
+    /// Fractions strictly inside (0, 1) where some higher derivative may jump: an integration of high
+    /// order stops there.
+    pub(crate) fn seams(&self) -> &[f64] {
+        match self {
+            Profile::Blade { part, .. } => part.seams(),
+            _ => &[],
+        }
+    }
+
     /// The largest absolute value along the rod.
     pub fn max_abs(&self) -> f64 {
         self.fold(0.0, |m, v| m.max(v.abs()))

@@ -2,6 +2,7 @@
 
 mod arch;
 mod balance;
+mod blade;
 mod coming_to_rest;
 mod corrections;
 mod derivatives;

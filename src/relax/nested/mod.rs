@@ -39,7 +39,7 @@ pub struct NestedEquilibrium {
     /// The error of the table's best column where the energy converges otherwise than its order
     /// indicates: then layers are thinner than the segments, and what they change in positions,
     /// which is the same on all grids that miss them, is not seen in these.
-    pub unresolved: f64,
+    unresolved: f64,
     /// The error estimated from the defect of the extrapolated values, if it is known, and the
     /// linear equations for it.
     pub estimate: Option<Estimate>,

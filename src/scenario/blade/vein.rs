@@ -99,6 +99,8 @@ pub struct Vein {
     pub length: f64,
     /// x and its first and second derivative by sigma, at the ends of equal panels.
     places: Vec<[f64; 3]>,
+    /// Fractions of its own length at the inner points of the outline.
+    seams: Vec<f64>,
 }
 
 impl Vein {
@@ -111,6 +113,7 @@ impl Vein {
             material,
             length: 0.0,
             places: Vec::new(),
+            seams: Vec::new(),
         };
         vein.measure();
         vein
@@ -172,6 +175,9 @@ impl Vein {
         let mut places: Vec<_> = (0..=PANELS).map(place).collect();
         (places[0][0], places[PANELS][0]) = (0.0, 1.0);
         self.places = places;
+        let knots = self.outline.width.knots();
+        let known = |knot: &f64| reached[edges.partition_point(|edge| edge < knot)] / self.length;
+        self.seams = knots[1..knots.len() - 1].iter().map(known).collect();
     }
 
     /// The fraction x of the blade's length at the fraction sigma of its own.
@@ -291,6 +297,14 @@ impl BladePart {
     /// Fractions inside (0, 1) where the slope of a property may jump.
     pub fn kinks(&self) -> &[f64] {
         &self.kinks
+    }
+
+    /// Fractions inside (0, 1) where the outline of a vein has its points.
+    pub(in crate::scenario) fn seams(&self) -> &[f64] {
+        match &self.source {
+            Source::Vein(vein) => &vein.seams,
+            Source::Gap(..) => &[],
+        }
     }
 
     /// The least and the largest value of a property.

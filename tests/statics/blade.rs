@@ -1,0 +1,212 @@
+//! Leaves from an outline: blades of constant width against plates, blades as they grow, and how
+//! many veins they need.
+
+use leafdyn::relax::Method;
+use leafdyn_testing::*;
+
+/// A blade of constant width, straight, whose tip is free. Small loads.
+fn strip(rods: usize, edges: bool, more: &str) -> String {
+    format!(
+        r#"
+        name = "strip"
+        leaf = {{ rods = {rods} }}
+        blade = {{ length = {LENGTH}, width = {WIDTH}, thickness = {THICKNESS}, young = {YOUNG}, edges = {edges}, {more} }}
+    "#
+    )
+}
+
+const LENGTH: f64 = 25.0;
+const WIDTH: f64 = 2.0;
+const THICKNESS: f64 = 0.03;
+const YOUNG: f64 = 3e4;
+const POISSON: f64 = 0.3;
+const SHEAR: f64 = YOUNG / (2.0 * (1.0 + POISSON));
+
+/// Forces on the tips of the outermost veins.
+fn on_margins(rods: usize, force: [f64; 3], other: [f64; 3]) -> String {
+    let point = |vein: usize, force: [f64; 3]| {
+        format!("[[load.point]]\nvein = {vein}\nat = 1.0\nforce = {force:?}\n")
+    };
+    point(1, force) + &point(rods, other)
+}
+
+/// However many veins it has, a plate bends as E W t^3/12.
+#[test]
+fn a_blade_bends_as_a_plate() {
+    let load = 1e-9;
+    for rods in [1, 5, 9, 17] {
+        let text = strip(rods, true, "") + &format!("load = {{ gravity = [0.0, 0.0, {load}] }}");
+        let leaf = settle(&parse(&text), 1e-11);
+        let bending = YOUNG * WIDTH * THICKNESS.powi(3) / 12.0;
+        let shear = 5.0 / 6.0 * SHEAR * WIDTH * THICKNESS;
+        let per_length = rods as f64 * load;
+        let deflection = per_length * (LENGTH.powi(4) / (8.0 * bending) + LENGTH.powi(2) / (2.0 * shear));
+        for tip in &leaf.tips {
+            close("tip", tip.z / deflection, 1.0, 1e-6);
+        }
+    }
+}
+
+/// However many veins it has, it twists as G W t^3/3, away from its ends.
+#[test]
+fn a_blade_twists_as_a_plate() {
+    for (rods, edges) in [(5, true), (9, true), (17, true), (5, false), (9, false)] {
+        let gaps = if edges { rods - 1 } else { rods } as f64;
+        let apart = WIDTH * (rods - 1) as f64 / gaps;
+        let torque = 1e-6;
+        let force = torque / apart;
+        let loads = on_margins(rods, [0.0, 0.0, -force], [0.0, 0.0, force]);
+        let leaf = settle(&parse(&(strip(rods, edges, "") + &loads)), 1e-10);
+        let stiffness = SHEAR * WIDTH * THICKNESS.powi(3) / 3.0;
+        let angle = torque / stiffness * LENGTH / 2.0;
+        let nodes = &leaf.shape.rods[rods / 2].nodes;
+        let at = |quarter: usize| (nodes[(nodes.len() - 1) * quarter / 4].rotation * DVec3::Y).z;
+        close("angle", (at(3) - at(1)) / angle, 1.0, 1e-6);
+    }
+}
+
+/// In its plane, if it is stiff against shear, as E t W^3/12: exactly so from veins in the middle of
+/// equal strips, with an error of first order in 1/N from veins of which two are the margins.
+#[test]
+fn a_blade_bends_in_its_plane_as_a_beam() {
+    let beam = YOUNG * THICKNESS * WIDTH.powi(3) / 12.0;
+    for (rods, edges) in [(5, true), (9, true), (17, true), (5, false), (9, false)] {
+        let load = 6e-5 / rods as f64;
+        let more = format!("shear_modulus = {}", 1e4 * YOUNG);
+        let text = strip(rods, edges, &more) + &format!("load = {{ gravity = [0.0, {load}, 0.0] }}");
+        let leaf = settle(&parse(&text), 1e-8);
+        let n = rods as f64;
+        let excess = if edges { 2.0 / (n - 1.0) + 1.0 / (n * n) } else { 0.0 };
+        let deflection = n * load * LENGTH.powi(4) / (8.0 * beam * (1.0 + excess));
+        let base = if edges { WIDTH / 2.0 } else { WIDTH / 2.0 * (1.0 - 1.0 / n) };
+        let found = leaf.tips[rods - 1].y - base;
+        close("tip", found / deflection, 1.0, 2e-5);
+    }
+}
+
+/// A long strip under a force at its tip in its plane buckles sideways at 4.0126 sqrt(E I G J)/L^2
+/// (S. P. Timoshenko and J. M. Gere, Theory of Elastic Stability, sec. 6.3).
+#[test]
+fn a_narrow_blade_buckles_sideways() {
+    let bending = YOUNG * WIDTH * THICKNESS.powi(3) / 12.0;
+    let torsion = SHEAR * WIDTH * THICKNESS.powi(3) / 3.0;
+    let load = 4.0126 * (bending * torsion).sqrt() / LENGTH.powi(2);
+    let more = format!("shear_modulus = {SHEAR}");
+    for (part, index) in [(0.98, 0), (1.06, 1)] {
+        let each = part * load / 3.0;
+        let text = strip(3, false, &more) + &format!("load = {{ tip_force = [0.0, {each}, 0.0] }}");
+        let leaf = kept(&parse(&text), 1e-6);
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{part}");
+    }
+}
+
+/// A pointed blade with a curved outline.
+const BLADE: &str = r#"
+    name = "blade"
+    leaf = { rods = 9 }
+    blade = { length = 25.0, width = { at = [0.0, 0.15, 0.4, 0.7, 1.0], value = [0.9, 1.4, 1.6, 1.0, 0.0] }, thickness = 0.03, young = 5e4, young_across = 2e4, mass_density = 8e-6 }
+"#;
+
+fn blade(change: &str) -> Scenario {
+    let entries = entries(change);
+    Scenario::from_toml_with(BLADE, "blade", &entries).unwrap()
+}
+
+/// Unloaded it lies as it has grown: the margins along the outline, in a plane however it rises,
+/// without energy; its tip is where it ends.
+#[test]
+fn an_unloaded_blade_lies_within_its_outline() {
+    for elevation in [0.0, 0.9, -1.3] {
+        let scenario = blade(&format!("leaf.elevation={elevation}"));
+        let leaf = settle(&scenario, 1e-9);
+        assert_eq!(leaf.stable(), Some(true));
+        close("energy", leaf.energy.unwrap(), 0.0, 1e-12);
+        let along = DVec3::new(f64::cos(elevation), 0.0, f64::sin(elevation));
+        let normal = along.cross(DVec3::Y);
+        close("tip", leaf.tips[0].distance(25.0 * along), 0.0, 1e-9);
+        let made = scenario.blade.as_ref().unwrap();
+        for (j, rod) in leaf.shape.rods.iter().enumerate() {
+            for node in &rod.nodes {
+                let x = node.position.dot(along) / 25.0;
+                let eta = (j as f64 - 4.0) / 4.0;
+                close("place", node.position.y, 0.5 * eta * made.width(x), 1e-9);
+                close("plane", node.position.dot(normal), 0.0, 1e-9);
+                // The section lies in the plane, too.
+                close("section", (node.rotation * DVec3::Z).dot(normal).abs(), 1.0, 1e-9);
+            }
+        }
+    }
+}
+
+const WEIGHT: &str = "load.g=[0, 0, -981]";
+
+/// Half of a blade is the whole, and its own image.
+#[test]
+fn a_blade_under_its_weight_is_its_own_image() {
+    let [half, full] = [
+        settle(&blade(WEIGHT), 1e-6),
+        settled(&blade(WEIGHT), &in_full(to(1e-6))),
+    ];
+    assert!(distance(&half, &full) < 2e-6 * 25.0);
+    close("tip", half.tips[0].y, 0.0, 1e-9);
+    // All that weighs is the blade.
+    let weight = 981.0 * 8e-6 * 0.03 * 25.0;
+    let reaction = blade(WEIGHT).total_load().z;
+    let mean = (0..1000).map(|k| blade("").blade.unwrap().width((k as f64 + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
+    close("weight", reaction / (-weight * mean), 1.0, 1e-2);
+}
+
+/// Twice as many veins, the same blade: the differences of the tip become small.
+#[test]
+fn few_veins_are_enough() {
+    let tip = |rods: usize| settle(&blade(&format!("{WEIGHT}; leaf.rods={rods}")), 1e-7).tips[0];
+    let tips = [3, 5, 9, 17].map(tip);
+    let changes: Vec<f64> = tips.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
+    assert!(changes[1] < changes[0] && changes[2] < changes[1] && changes[2] < 2e-3, "{changes:?}");
+}
+
+/// The width below which stiffnesses are those of a wider blade hardly matters.
+#[test]
+fn the_least_width_hardly_matters() {
+    let tip = |least: f64| settle(&blade(&format!("{WEIGHT}; blade.least_width={least}")), 1e-7).tips[0];
+    let [wide, narrow] = [0.1, 0.03].map(tip);
+    assert!(wide.distance(narrow) < 5e-3, "{}", wide.distance(narrow));
+}
+
+/// By multiple shooting, which knows the energy of the tissue alone.
+#[test]
+fn a_blade_by_shooting() {
+    let scenario = blade(&format!("{WEIGHT}; leaf.rods=3; blade.length=4; blade.thickness=0.01; blade.width.value[4]=0.8"));
+    let leaf = settle(&scenario, 1e-8);
+    let shot = settled(&scenario, &by(Method::ShootingFromRest { intervals: None }, to(1e-8)));
+    let bars = [&leaf, &shot].map(|it| it.accuracy.error_estimate.unwrap());
+    let apart = distance(&leaf, &shot);
+    assert!(apart < bars[0] + bars[1], "{apart:.1e} {bars:?}");
+}
+
+/// Two veins with tissue that keeps their distance and resists shear, of which one has grown by a
+/// small strain: with the height h of square veins that touch each other, S. Timoshenko's bimetal,
+/// J. Opt. Soc. Am. 11 (1925), 233.
+#[test]
+fn veins_of_unequal_growth_curve_as_a_bimetal() {
+    let (apart, axial, growth) = (0.02, 2e4, 1e-6);
+    let text = format!(
+        r#"
+        name = "bimetal"
+        leaf = {{ rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false, base = [[0.0, -0.01, 0.0], [0.0, 0.01, 0.0]] }}
+        stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = {axial}, shear_2 = inf, shear_3 = inf }}
+        tissue = {{ along = 1e9, across = 1e9, grown = false }}
+        rest = {{ stretch = [1.0, {}] }}
+    "#,
+        1.0 + growth
+    );
+    let leaf = settle(&parse(&text), 1e-11);
+    let curvature = growth * apart / (apart * apart + 4.0 / axial);
+    for rod in &leaf.shape.rods {
+        let middle = &rod.nodes[rod.nodes.len() / 2];
+        close("curvature", middle.u.z / -curvature, 1.0, 1e-4);
+    }
+    // Tissue that has grown with them is without force.
+    let grown = settle(&parse(&text.replace(", grown = false", "")), 1e-11);
+    assert!(grown.energy.unwrap().abs() < 1e-16);
+}
