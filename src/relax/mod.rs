@@ -29,6 +29,7 @@ pub use crate::relax::request::options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance, without_grips,
 };
+pub use crate::relax::result::blade::{BladeReport, FewerVeins};
 pub(crate) use crate::relax::result::equilibrium::serialize_index;
 pub use crate::relax::result::equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Sensitivity, Shape, Stability,

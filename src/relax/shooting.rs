@@ -7,6 +7,7 @@ use crate::refusal::RefusedOption;
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError, without_grips};
 use crate::relax::rest::relax_on_grids;
+use crate::relax::result::blade::BladeReport;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::result::plausible;
 use crate::relax::result::reaction::Reaction;
@@ -229,6 +230,7 @@ fn shoot(
         path: None,
         sensitivities: None,
         margin: None,
+        blade: BladeReport::of(scenario),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),

@@ -161,7 +161,7 @@ impl Scenario {
             Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
             Key::BladeMassDensity => optional(materials.map(|of| of.mass_density.as_ref()))?,
             Key::Edges => json!(blade.edges),
-            _ => number(blade.least_width()),
+            _ => number(blade.least_part()),
         })
     }
 

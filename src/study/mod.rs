@@ -1,5 +1,6 @@
 //! Studies built on the solvers.
 
+mod blade;
 mod boundary;
 mod chart;
 mod check;
@@ -15,6 +16,7 @@ mod vary;
 pub use crate::branch::{Doubt, End as BranchEnd, Kind as CriticalKind, Stuck};
 pub use crate::shooting::{Neutral, Solution as ShootingSolution};
 pub use crate::words::UnknownWord;
+pub use blade::relax_blade;
 pub use boundary::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, LeafBeside, MOST_CURVES,
     boundary,

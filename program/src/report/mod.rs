@@ -7,6 +7,7 @@ mod equilibria;
 mod fit;
 pub mod json;
 mod map;
+mod blade;
 mod margin;
 pub mod numbers;
 mod relax;

@@ -1,6 +1,7 @@
 //! The text report of a relaxation.
 
 use crate::report::Reported;
+use crate::report::blade::blade_lines;
 use crate::report::margin::{margin_lines, tip};
 use crate::report::numbers::{
     ROUNDING, as_accurate, bound, brief, decimals, eigenvalues, grids, known, point, rounded_to,
@@ -57,6 +58,8 @@ impl Reported for Equilibrium {
         lines.push(("error", error(self)));
         lines.extend(modes(self).map(|modes| ("modes", modes)));
         lines.extend(labelled("changes", changes(self)));
+        let blade = self.blade.as_ref().map(blade_lines);
+        lines.extend(labelled("blade", blade.unwrap_or_default()));
         let margin = self.margin.as_ref().map(|it| margin_lines(it, length));
         lines.extend(labelled("margin", margin.unwrap_or_default()));
         if !self.accuracy.segments.is_empty() {

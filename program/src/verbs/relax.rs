@@ -162,7 +162,7 @@ impl Relax {
                 error => format!("--margin: {error}").into(),
             });
         }
-        Ok(relax::relax(&job.scenario, &options, &mut |progress| {
+        Ok(study::relax_blade(&job.base, &options, &mut |progress| {
             line.update_solver(progress, tolerance)
         })?)
     }

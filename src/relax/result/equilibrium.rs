@@ -4,6 +4,7 @@ use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::path::Path;
 use crate::relax::request::method::Method;
+use crate::relax::result::blade::BladeReport;
 use crate::relax::result::margin::Margin;
 use crate::relax::result::reaction::{GripReaction, Reaction};
 use crate::relax::saddle::Saddle;
@@ -314,6 +315,9 @@ pub struct Equilibrium {
     /// The stability margin, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<Margin>,
+    /// What follows from its outline, if it is a blade.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blade: Option<BladeReport>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
     /// The model that was solved.

@@ -1,5 +1,6 @@
 //! What was found, in the units of the scenario.
 
+pub mod blade;
 pub mod equilibrium;
 pub mod margin;
 pub mod plausible;

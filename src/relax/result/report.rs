@@ -8,6 +8,7 @@ use crate::relax::path::{Event, Happening, Path, Stage};
 use crate::relax::request::method::Method;
 use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::relax::result::blade::BladeReport;
 use crate::relax::result::reaction::{grip_reactions, reaction};
 use crate::relax::transfer::level::{Level, flat};
 use crate::relax::transfer::strains;
@@ -66,6 +67,7 @@ pub fn equilibrium(
         path: path(problem.leaf, found),
         sensitivities: None,
         margin: None,
+        blade: BladeReport::of(scenario),
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),

@@ -28,6 +28,9 @@ use std::sync::Arc;
 pub use vein::{BladePart, BladeProperty};
 use vein::{Outline, Vein};
 
+/// Places at which the widest one is looked for.
+const SAMPLES: usize = 500;
+
 /// Thickness and material of a vein with its tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Material {
@@ -105,14 +108,27 @@ impl Blade {
         self.outline.bearing_width(x)
     }
 
-    /// Whether the width is less than the least bearing width somewhere.
-    pub fn narrows(&self) -> bool {
-        self.outline.narrows
+    /// The least bearing width as a fraction of the largest width, wherever the blade is wider.
+    pub fn least_part(&self) -> f64 {
+        self.outline.least
     }
 
-    /// The least bearing width, as a fraction of the largest width.
-    pub fn least_width(&self) -> f64 {
-        self.outline.least
+    /// The least bearing width, if the blade is narrower somewhere.
+    pub fn least_width(&self) -> Option<f64> {
+        let Outline { least, largest, narrows, .. } = &*self.outline;
+        narrows.then_some(least * largest)
+    }
+
+    /// Where it is widest: a fraction of the length.
+    pub fn widest(&self) -> f64 {
+        let places = (0..=SAMPLES).map(|k| k as f64 / SAMPLES as f64);
+        let wider = |a: f64, b: f64| if self.width(b) > self.width(a) { b } else { a };
+        places.fold(0.0, wider)
+    }
+
+    /// Where vein `j` lies: a fraction of the half width, negative to the right of the midrib.
+    pub fn place(&self, j: usize) -> f64 {
+        self.eta(j).0
     }
 
     /// Whether all veins meet at the tip.
