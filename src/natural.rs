@@ -45,7 +45,13 @@ impl<'a> Natural<'a> {
         let (from, state) = vein[before];
         match sigma == from {
             true => state,
-            false => step(&self.scenario.rods[j], self.grown, from, sigma - from, state),
+            false => step(
+                &self.scenario.rods[j],
+                self.grown,
+                from,
+                sigma - from,
+                state,
+            ),
         }
     }
 }
@@ -138,7 +144,13 @@ mod tests {
         for (from, to) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.61)] {
             let (mut state, width) = (natural.at(1, from), (to - from) / 100.0);
             for k in 0..100 {
-                state = step(&scenario.rods[1], true, from + k as f64 * width, width, state);
+                state = step(
+                    &scenario.rods[1],
+                    true,
+                    from + k as f64 * width,
+                    width,
+                    state,
+                );
             }
             let (x, q) = natural.at(1, to);
             assert!((x - state.0).length() < 1e-13);

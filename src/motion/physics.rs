@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
 use crate::rotation::outer;
-use crate::scenario::{Dynamics, Schedule, Profile};
+use crate::scenario::{Dynamics, Profile, Schedule};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments.

@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::dynamics::{OUTPUTS, round_inertia};
 use super::blade::{Blade, BladeProperty, Parts, blade};
+use super::dynamics::{OUTPUTS, round_inertia};
 use super::entries::{Entries, MOST_RODS};
 use super::error::Result;
 use super::item::Item;
@@ -217,14 +217,19 @@ fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
             (
                 entries.item(Key::Length)?.one_each(rods)?,
                 entries.item(Key::Base)?.vectors(rods)?,
-                each.map(|(angle, elevation)| [angle, elevation, 0.0]).collect(),
+                each.map(|(angle, elevation)| [angle, elevation, 0.0])
+                    .collect(),
                 quantity(Key::RestBend3)?,
             )
         }
     };
     let couple = triple(Key::COUPLE, Property::Couple)?;
     let force = triple(Key::FORCE, Property::Force)?;
-    let rest = [quantity(Key::RestTwist)?, quantity(Key::RestBend2)?, sideways];
+    let rest = [
+        quantity(Key::RestTwist)?,
+        quantity(Key::RestBend2)?,
+        sideways,
+    ];
     let stretch = quantity(Key::RestStretch)?;
     let pick = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)

@@ -3,7 +3,8 @@
 //! defaults are always within the limits.
 
 use super::bounds::{
-    GRAVITY, Limit, extremes, TIME, TIP_FORCE, TIP_MOMENT, UNIT, most, near_one, norm, smallest_unit, softest,
+    GRAVITY, Limit, TIME, TIP_FORCE, TIP_MOMENT, UNIT, extremes, most, near_one, norm,
+    smallest_unit, softest,
 };
 use super::entries::Entries;
 use super::error::Result;

@@ -2,7 +2,7 @@
 //! refused and written.
 
 use super::entries::Entries;
-use super::{Hold, Key, Part, Scenario, Tissue, schema};
+use super::{Hold, Key, Part, Profile, Scenario, Tissue, schema};
 use leafdyn_testing::pairs;
 use serde_json::{Value, json};
 
@@ -78,8 +78,8 @@ fn all_that_is_given_arrives() {
         (0.3, Hold::Pinned)
     );
     let gap = |across: f64| Tissue {
-        stiffness: [20.0, across, 0.0],
-        fold: 0.5,
+        stiffness: [20.0, across, 0.0].map(Profile::Constant),
+        fold: Profile::Constant(0.5),
     };
     assert_eq!(leaf.tissue, Some(vec![gap(40.0), gap(30.0)]));
     // Of a tube the mass is that of the wall.

@@ -1,9 +1,9 @@
 //! Tissue between neighbouring veins: the table `[tissue]`.
 
+use super::Profile;
 use super::entries::Entries;
 use super::error::Result;
 use super::key::Key;
-use super::Profile;
 
 /// Tissue that fills the gap between two neighbouring veins and turns with them. It is without
 /// force in the natural leaf: every vein in its rest shape from its base, each for itself.

@@ -3,9 +3,7 @@
 
 use super::{Base, Keys};
 use crate::largest::largest;
-use crate::relax::{
-    Equilibrium, FewerVeins, Method, Options, Progress, RelaxError, relax,
-};
+use crate::relax::{Equilibrium, FewerVeins, Method, Options, Progress, RelaxError, relax};
 use crate::scenario::Scenario;
 use glam::DVec3;
 
@@ -44,13 +42,22 @@ pub fn relax_blade(
         let found = relax(&scenario, &options, &mut |_| {}).ok()?;
         (found.stable() == Some(true)).then_some((scenario, found))
     };
-    let least = base.scenario().blade.as_ref().map(|blade| blade.least_part());
-    let narrower = least.filter(|_| narrows).and_then(|least| other(LEAST_WIDTH, 0.5 * least));
-    let effect = narrower.map(|(_, found)| distance(base.scenario(), &leaf, base.scenario(), &found));
+    let least = base
+        .scenario()
+        .blade
+        .as_ref()
+        .map(|blade| blade.least_part());
+    let narrower = least
+        .filter(|_| narrows)
+        .and_then(|least| other(LEAST_WIDTH, 0.5 * least));
+    let effect =
+        narrower.map(|(_, found)| distance(base.scenario(), &leaf, base.scenario(), &found));
     let rods = leaf.rod_count.div_ceil(2);
     // Loads and holders of single veins are on others then.
     let alike = base.scenario().points.is_empty() && base.scenario().grips.is_empty();
-    let fewer = (alike && leaf.rod_count > 2).then(|| other(RODS, rods as f64)).flatten();
+    let fewer = (alike && leaf.rod_count > 2)
+        .then(|| other(RODS, rods as f64))
+        .flatten();
     let half = fewer.map(|(scenario, found)| FewerVeins {
         rods,
         difference: distance(base.scenario(), &leaf, &scenario, &found),
@@ -73,7 +80,9 @@ fn distance(whole: &Scenario, leaf: &Equilibrium, other: &Scenario, fewer: &Equi
     let etas: Vec<f64> = (0..leaf.rod_count).map(|j| blade.place(j)).collect();
     let vein = |k: usize| {
         let eta = fewer_blade.place(k);
-        let right = etas.partition_point(|of| *of < eta).clamp(1, etas.len() - 1);
+        let right = etas
+            .partition_point(|of| *of < eta)
+            .clamp(1, etas.len() - 1);
         let part = (eta - etas[right - 1]) / (etas[right] - etas[right - 1]);
         let shape = &fewer.shape;
         let stations = shape.stations.iter().zip(&shape.rods[k].nodes);

@@ -40,7 +40,8 @@ fn a_blade_bends_as_a_plate() {
         let bending = YOUNG * WIDTH * THICKNESS.powi(3) / 12.0;
         let shear = 5.0 / 6.0 * SHEAR * WIDTH * THICKNESS;
         let per_length = rods as f64 * load;
-        let deflection = per_length * (LENGTH.powi(4) / (8.0 * bending) + LENGTH.powi(2) / (2.0 * shear));
+        let deflection =
+            per_length * (LENGTH.powi(4) / (8.0 * bending) + LENGTH.powi(2) / (2.0 * shear));
         for tip in &leaf.tips {
             close("tip", tip.z / deflection, 1.0, 1e-6);
         }
@@ -73,12 +74,21 @@ fn a_blade_bends_in_its_plane_as_a_beam() {
     for (rods, edges) in [(5, true), (9, true), (17, true), (5, false), (9, false)] {
         let load = 6e-5 / rods as f64;
         let more = format!("shear_modulus = {}", 1e4 * YOUNG);
-        let text = strip(rods, edges, &more) + &format!("load = {{ gravity = [0.0, {load}, 0.0] }}");
+        let text =
+            strip(rods, edges, &more) + &format!("load = {{ gravity = [0.0, {load}, 0.0] }}");
         let leaf = settle(&parse(&text), 1e-8);
         let n = rods as f64;
-        let excess = if edges { 2.0 / (n - 1.0) + 1.0 / (n * n) } else { 0.0 };
+        let excess = if edges {
+            2.0 / (n - 1.0) + 1.0 / (n * n)
+        } else {
+            0.0
+        };
         let deflection = n * load * LENGTH.powi(4) / (8.0 * beam * (1.0 + excess));
-        let base = if edges { WIDTH / 2.0 } else { WIDTH / 2.0 * (1.0 - 1.0 / n) };
+        let base = if edges {
+            WIDTH / 2.0
+        } else {
+            WIDTH / 2.0 * (1.0 - 1.0 / n)
+        };
         let found = leaf.tips[rods - 1].y - base;
         close("tip", found / deflection, 1.0, 2e-5);
     }
@@ -132,7 +142,12 @@ fn an_unloaded_blade_lies_within_its_outline() {
                 close("place", node.position.y, 0.5 * eta * made.width(x), 1e-9);
                 close("plane", node.position.dot(normal), 0.0, 1e-9);
                 // The section lies in the plane, too.
-                close("section", (node.rotation * DVec3::Z).dot(normal).abs(), 1.0, 1e-9);
+                close(
+                    "section",
+                    (node.rotation * DVec3::Z).dot(normal).abs(),
+                    1.0,
+                    1e-9,
+                );
             }
         }
     }
@@ -152,7 +167,10 @@ fn a_blade_under_its_weight_is_its_own_image() {
     // All that weighs is the blade.
     let weight = 981.0 * 8e-6 * 0.03 * 25.0;
     let reaction = blade(WEIGHT).total_load().z;
-    let mean = (0..1000).map(|k| blade("").blade.unwrap().width((k as f64 + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
+    let mean = (0..1000)
+        .map(|k| blade("").blade.unwrap().width((k as f64 + 0.5) / 1000.0))
+        .sum::<f64>()
+        / 1000.0;
     close("weight", reaction / (-weight * mean), 1.0, 1e-2);
 }
 
@@ -161,14 +179,26 @@ fn a_blade_under_its_weight_is_its_own_image() {
 fn few_veins_are_enough() {
     let tip = |rods: usize| settle(&blade(&format!("{WEIGHT}; leaf.rods={rods}")), 1e-7).tips[0];
     let tips = [3, 5, 9, 17].map(tip);
-    let changes: Vec<f64> = tips.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-    assert!(changes[1] < changes[0] && changes[2] < changes[1] && changes[2] < 2e-3, "{changes:?}");
+    let changes: Vec<f64> = tips
+        .windows(2)
+        .map(|pair| pair[0].distance(pair[1]))
+        .collect();
+    assert!(
+        changes[1] < changes[0] && changes[2] < changes[1] && changes[2] < 2e-3,
+        "{changes:?}"
+    );
 }
 
 /// The width below which stiffnesses are those of a wider blade hardly matters.
 #[test]
 fn the_least_width_hardly_matters() {
-    let tip = |least: f64| settle(&blade(&format!("{WEIGHT}; blade.least_width={least}")), 1e-7).tips[0];
+    let tip = |least: f64| {
+        settle(
+            &blade(&format!("{WEIGHT}; blade.least_width={least}")),
+            1e-7,
+        )
+        .tips[0]
+    };
     let [wide, narrow] = [0.1, 0.03].map(tip);
     assert!(wide.distance(narrow) < 5e-3, "{}", wide.distance(narrow));
 }
@@ -176,9 +206,14 @@ fn the_least_width_hardly_matters() {
 /// By multiple shooting, which knows the energy of the tissue alone.
 #[test]
 fn a_blade_by_shooting() {
-    let scenario = blade(&format!("{WEIGHT}; leaf.rods=3; blade.length=4; blade.thickness=0.01; blade.width.value[4]=0.8"));
+    let scenario = blade(&format!(
+        "{WEIGHT}; leaf.rods=3; blade.length=4; blade.thickness=0.01; blade.width.value[4]=0.8"
+    ));
     let leaf = settle(&scenario, 1e-8);
-    let shot = settled(&scenario, &by(Method::ShootingFromRest { intervals: None }, to(1e-8)));
+    let shot = settled(
+        &scenario,
+        &by(Method::ShootingFromRest { intervals: None }, to(1e-8)),
+    );
     let bars = [&leaf, &shot].map(|it| it.accuracy.error_estimate.unwrap());
     let apart = distance(&leaf, &shot);
     assert!(apart < bars[0] + bars[1], "{apart:.1e} {bars:?}");

@@ -13,7 +13,8 @@ pub fn blade_lines(blade: &BladeReport) -> Vec<String> {
         couple_stiffness: [a1, a2, a3],
         ..
     } = blade;
-    let [width, strip_width, bending, torsion] = [width, strip_width, bending, torsion].map(|it| brief(*it));
+    let [width, strip_width, bending, torsion] =
+        [width, strip_width, bending, torsion].map(|it| brief(*it));
     let mass = blade.mass.map(|mass| format!("; mass {}", brief(mass)));
     let mut lines = vec![format!(
         "at its widest, {width}, it bends as {bending} and twists as {torsion}{}",
@@ -35,11 +36,15 @@ pub fn blade_lines(blade: &BladeReport) -> Vec<String> {
             Some(effect) => format!("; half of that moves it by {}", bound(effect)),
             None => String::new(),
         };
-        lines.push(format!("where narrower than {least} it is as stiff as there{effect}"));
+        lines.push(format!(
+            "where narrower than {least} it is as stiff as there{effect}"
+        ));
     }
     if let Some(fewer) = blade.half_as_many {
         let (rods, apart) = (fewer.rods, bound(fewer.difference));
-        lines.push(format!("with {rods} veins in place of these it differs by {apart}"));
+        lines.push(format!(
+            "with {rods} veins in place of these it differs by {apart}"
+        ));
     }
     lines
 }

@@ -1,5 +1,6 @@
 //! Output of results: as lines on the console, as rows of tables, as JSON.
 
+mod blade;
 mod centerlines;
 mod chart;
 mod check;
@@ -7,7 +8,6 @@ mod equilibria;
 mod fit;
 pub mod json;
 mod map;
-mod blade;
 mod margin;
 pub mod numbers;
 mod relax;

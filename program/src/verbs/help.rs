@@ -87,6 +87,8 @@ pub struct New {
 enum Example {
     /// A leaf of nine veins under its own weight
     Leaf,
+    /// A blade from its outline and thickness, under its own weight
+    Blade,
     /// A single rod, clamped, with a weight at its tip
     Rod,
     /// A leaf that is pulled at its tip, to be followed from slack to taut
@@ -100,6 +102,7 @@ impl Example {
     fn contents(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Example::Leaf => ("leaf", include_str!("examples/leaf.toml"), "relax FILE"),
+            Example::Blade => ("blade", include_str!("examples/blade.toml"), "relax FILE"),
             Example::Rod => ("rod", include_str!("examples/rod.toml"), "relax FILE"),
             Example::PullTest => (
                 "pull-test",

@@ -46,12 +46,17 @@ impl BladeReport {
         let blade: &Blade = scenario.blade.as_ref()?;
         let (rods, middle) = (&scenario.rods, scenario.rods.len() / 2);
         let sigma = blade.widest();
-        let at = |profiles: &[crate::scenario::Profile; 3]| profiles.each_ref().map(|of| of.at(sigma));
+        let at =
+            |profiles: &[crate::scenario::Profile; 3]| profiles.each_ref().map(|of| of.at(sigma));
         let tissue = |all: &Vec<crate::scenario::Tissue>| {
             let gap = &all[middle.min(all.len() - 1)];
             gap.profiles().map(|of| of.at(sigma))
         };
-        let sum = |axis: usize| rods.iter().map(|rod| rod.couple_stiffness[axis].at(sigma)).sum();
+        let sum = |axis: usize| {
+            rods.iter()
+                .map(|rod| rod.couple_stiffness[axis].at(sigma))
+                .sum()
+        };
         let masses = rods.iter().zip(&scenario.dynamics.density);
         let mass = masses.map(|(rod, density)| rod.length * density.integral(1.0));
         let width = blade.bearing_width(sigma);

@@ -166,7 +166,10 @@ impl Panel {
                 to.n[first + i] += middle.value(|i| changes[i - start]);
             }
         }
-        if [coarse, fine, to].iter().any(|state| state.tissue.is_empty()) {
+        if [coarse, fine, to]
+            .iter()
+            .any(|state| state.tissue.is_empty())
+        {
             return;
         }
         for g in 0..coarse.tissue.len() / (coarse.segments() + 1) {

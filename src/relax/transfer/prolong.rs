@@ -154,6 +154,9 @@ pub fn restrict(fine: &State) -> State {
     let mut coarse = State::new(fine.segments() / 2, x, q);
     coarse.n = fine.n.chunks(2).map(|n| 0.5 * (n[0] + n[1])).collect();
     let gaps = fine.tissue.chunks(fine.segments() + 1);
-    coarse.tissue = gaps.flat_map(|gap| gap.iter().step_by(2)).copied().collect();
+    coarse.tissue = gaps
+        .flat_map(|gap| gap.iter().step_by(2))
+        .copied()
+        .collect();
     coarse
 }

@@ -18,6 +18,8 @@
 
 mod read;
 mod spline;
+#[cfg(test)]
+mod tests;
 mod vein;
 
 use super::Profile;
@@ -115,7 +117,12 @@ impl Blade {
 
     /// The least bearing width, if the blade is narrower somewhere.
     pub fn least_width(&self) -> Option<f64> {
-        let Outline { least, largest, narrows, .. } = &*self.outline;
+        let Outline {
+            least,
+            largest,
+            narrows,
+            ..
+        } = &*self.outline;
         narrows.then_some(least * largest)
     }
 
@@ -234,7 +241,11 @@ impl Parts {
     pub(super) fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
         let each = self.etas.iter().zip(&self.veins);
         each.map(|(eta, vein)| {
-            let angle = if *eta < 0.0 { -vein.angle() } else { vein.angle() };
+            let angle = if *eta < 0.0 {
+                -vein.angle()
+            } else {
+                vein.angle()
+            };
             tilted(angle, elevation)
         })
         .collect()

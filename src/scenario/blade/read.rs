@@ -37,7 +37,12 @@ pub(in crate::scenario) fn blade(entries: &Entries, rods: usize) -> Result<Optio
         return Err(item.refuse(why));
     }
     let quantity = |key| entries.item(key)?.quantity(rods);
-    let optional = |key| entries.given(key).map(|item| item.quantity(rods)).transpose();
+    let optional = |key| {
+        entries
+            .given(key)
+            .map(|item| item.quantity(rods))
+            .transpose()
+    };
     let thickness = quantity(Key::BladeThickness)?;
     let young = quantity(Key::BladeYoung)?;
     let young_across = optional(Key::YoungAcross)?;

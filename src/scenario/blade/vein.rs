@@ -1,7 +1,7 @@
 //! The veins of a blade, and the tissue between two, as profiles along them.
 
-use super::{Local, Material};
 use super::spline::{Spline, quintic};
+use super::{Local, Material};
 use crate::scenario::gauss::GAUSS;
 use crate::scenario::{Profile, Property, ascending};
 use std::sync::Arc;
@@ -198,7 +198,9 @@ impl Vein {
         let h = self.outline.bearing_width(x) / self.count;
         // The mass is that of the blade as it is.
         let heavy = self.outline.width.at(x)[0].max(0.0) / self.count;
-        let Local { t, young, shear, .. } = self.material.at(sigma);
+        let Local {
+            t, young, shear, ..
+        } = self.material.at(sigma);
         let mass_density = self.material.mass_density.as_ref();
         let density = mass_density.map_or(0.0, |it| it.at(sigma));
         let [slope, second] = self.slopes(x);
@@ -245,7 +247,11 @@ impl BladePart {
     /// width.
     pub(super) fn gap(one: &Arc<Vein>, other: &Arc<Vein>, apart: f64) -> Arc<BladePart> {
         // Its mirror image is the same.
-        let (near, far) = if one.eta <= other.eta { (one, other) } else { (other, one) };
+        let (near, far) = if one.eta <= other.eta {
+            (one, other)
+        } else {
+            (other, one)
+        };
         BladePart::new(Source::Gap([near.clone(), far.clone()], 0.5 * apart))
     }
 

@@ -1,0 +1,211 @@
+//! What is read of a blade, refused, and written again; and the veins that follow from it.
+
+use super::*;
+use crate::natural::Natural;
+use crate::scenario::{Entries, Scenario};
+use leafdyn_testing::pairs;
+use serde_json::json;
+
+const BLADE: &str = r#"
+    name = "blade"
+    leaf = { rods = 5 }
+    blade = { length = 20.0, width = { at = [0.0, 0.2, 0.5, 1.0], value = [0.8, 1.5, 1.7, 0.0] }, thickness = 0.04, young = 4e4, mass_density = 8e-6 }
+"#;
+
+fn given(overrides: &str) -> Result<Scenario, String> {
+    let overrides = overrides.split("; ").filter(|it| !it.is_empty());
+    let overrides: Vec<String> = overrides.map(str::to_string).collect();
+    let read = Scenario::from_toml_with(BLADE, "blade.toml", &overrides);
+    read.map_err(|refused| refused.to_string())
+}
+
+#[test]
+fn contradictions_and_impossible_outlines_are_refused() {
+    let table = "
+        leaf.length=3 => leaf.length = 3: follows from [blade], which is given, too
+        leaf.fan=symmetric => follows from [blade]
+        leaf.base=[0, 0, 0] => follows from [blade]
+        rest.bend_3=0.1 => follows from [blade]
+        stiffness.axial=1 => follows from [blade]
+        section.young=1 => follows from [blade]
+        tissue.across=1 => follows from [blade]
+        blade.width=0 => blade.width = 0: must be greater than 0
+        blade.width=-1 => must not be negative
+        blade.width.value[1]=-1 => must not be negative
+        blade.width.value[1]=0 => entry 2 = 0: must be greater than 0, and may be 0 at the base and at the tip
+        blade.width={at=[0, 1], value=[0, 0]} => must be greater than 0 somewhere
+        blade.width={at=[0, 0.5, 0.55, 1], value=[1, 0.01, 1, 0]} => crosses itself at
+        blade.width={at=[0, 0.5, 0.5, 1], value=[1, 2, 1, 0]} => must be greater than the entry before it
+        blade.width={at=[0, 0.9], value=[1, 2]} => must end at 1 (the tip)
+        blade.width={at=[0, 1], value=[1]} => has 1 entries: must have 2
+        blade.width={value=[1, 2]} => at is missing
+        blade.width=wide => must be a number
+        blade.thickness=0 => must be greater than 0
+        blade.thickness=[0.1, 0.2] => must have 5
+        blade.poisson=0.7 => at most 0.5
+        blade.least_width=0.9 => must be between 0.001 and 0.5
+        blade.length=1e-3 => gives L_max/L
+        blade.thickness=1e-30 => choose other units
+        leaf.joined=true; blade.width.value[3]=0.2 => the blade has a width at its tip
+        leaf.elevation=[0, 0, 0, 0, 0] => a blade rises as a whole: give one number
+        dynamics.density=1 => blade.mass_density is given, too
+        blade.edge=true => did you mean blade.edges?
+    ";
+    for (overrides, said) in pairs(table) {
+        let refused = given(overrides).expect_err(overrides);
+        assert!(refused.contains(said), "{overrides}: {refused}");
+    }
+    let bare = BLADE.replace(", thickness = 0.04", "");
+    let refused = Scenario::from_toml(&bare).unwrap_err().to_string();
+    assert!(
+        refused.contains("blade.thickness is missing") && !refused.contains("stiffness"),
+        "{refused}"
+    );
+    let weight = BLADE.replace(", mass_density = 8e-6", "") + "load = { g = [0, 0, -981] }";
+    let refused = Scenario::from_toml(&weight).unwrap_err().to_string();
+    assert!(
+        refused.contains("mass_density in [section] or [blade]"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn what_is_written_is_read_again_as_the_same() {
+    for overrides in [
+        "",
+        "blade.width=2",
+        "blade.thickness=[0.1, 0.2, 0.1, 0.2, 0.1]; blade.young_across=3e4; blade.edges=false",
+        "blade.thickness={at=[0, 0.4, 1], value=[0.05, 0.04, 0.02]}; blade.shear_modulus=1e4",
+        "leaf.elevation=0.4; rest.bend_2=0.1; load.g=[0, 0, -981]; blade.least_width=0.05",
+        "leaf.rods=1",
+    ] {
+        let leaf = given(overrides).unwrap();
+        let written = serde_json::to_value(&leaf).unwrap();
+        assert_eq!(
+            Scenario::from_toml(&written.to_string()).unwrap(),
+            leaf,
+            "{overrides}"
+        );
+        assert!(
+            written.get("stiffness").is_none()
+                && written
+                    .get("tissue")
+                    .is_none_or(|it| it.get("along").is_none())
+        );
+    }
+    let written = serde_json::to_value(given("").unwrap()).unwrap();
+    assert_eq!(
+        written["blade"]["width"]["value"],
+        json!([0.8, 1.5, 1.7, 0.0])
+    );
+    assert!(written["leaf"].get("length").is_none());
+}
+
+/// In the natural leaf vein j lies along y = eta_j W/2, in the plane of the leaf, and all are as long
+/// as they are.
+#[test]
+fn veins_lie_within_the_outline() {
+    for (edges, outermost) in [(true, 1.0), (false, 0.8)] {
+        let scenario = given(&format!("blade.edges={edges}")).unwrap();
+        let (blade, natural) = (
+            scenario.blade.as_ref().unwrap(),
+            Natural::new(&scenario, true),
+        );
+        assert!(scenario.joined && blade.place(4) == outermost);
+        for j in 0..5 {
+            for k in 0..=10 {
+                let (x, q) = natural.at(j, k as f64 / 10.0);
+                let y = 0.5 * blade.place(j) * blade.width((x.x / 20.0).clamp(0.0, 1.0));
+                assert!((x.y - y).abs() < 1e-11 && x.z == 0.0, "{j} {k}: {x} {y}");
+                assert!((q * DVec3::Z).distance(DVec3::Z) < 1e-14);
+            }
+            let (tip, _) = natural.at(j, 1.0);
+            assert!(tip.distance(20.0 * DVec3::X) < 1e-11, "{tip}");
+        }
+    }
+}
+
+/// Strips add up to the blade, and tissue fills the gaps.
+#[test]
+fn stiffnesses_are_those_of_strips_of_the_plate() {
+    let leaf =
+        given("blade.width=1.5; leaf.rods=4; blade.young_across=2e4; blade.shear_modulus=1e4")
+            .unwrap();
+    let (e, across, g, t, h, w) = (4e4, 2e4, 1e4, 0.04_f64, 1.5 / 4.0, 1.5 / 3.0);
+    let constant = |wanted: f64, found: &Profile| {
+        let Profile::Constant(found) = found else {
+            panic!("{found:?}");
+        };
+        assert!((found / wanted - 1.0).abs() < 1e-14, "{found} {wanted}");
+    };
+    let rod = &leaf.rods[1];
+    let couple = [
+        g * h * t.powi(3) / 3.0,
+        e * h * t.powi(3) / 12.0,
+        e * t * f64::powi(h, 3) / 12.0,
+    ];
+    let shear = 5.0 / 6.0 * g * h * t;
+    let force = [e * h * t, shear, shear];
+    let all = rod.couple_stiffness.iter().chain(&rod.force_stiffness);
+    couple
+        .into_iter()
+        .chain(force)
+        .zip(all)
+        .for_each(|(wanted, found)| constant(wanted, found));
+    let tissue = [
+        g * t / w,
+        across * t / w,
+        5.0 / 6.0 * g * t / w,
+        across * t.powi(3) / (12.0 * w),
+    ];
+    let gap = &leaf.tissue.as_ref().unwrap()[2];
+    tissue
+        .into_iter()
+        .zip(gap.profiles())
+        .for_each(|(wanted, found)| constant(wanted, found));
+    constant(8e-6 * h * t, &leaf.dynamics.density[0]);
+    // The mass is that of the outline, the stiffness that of at least a tenth of its width.
+    let leaf = given("").unwrap();
+    let blade = leaf.blade.as_ref().unwrap();
+    let mean = (0..2000)
+        .map(|k| blade.width((k as f64 + 0.5) / 2000.0))
+        .sum::<f64>()
+        / 2000.0;
+    let veins = leaf.rods.iter().zip(&leaf.dynamics.density);
+    let mass: f64 = veins
+        .map(|(rod, density)| rod.length * density.integral(1.0))
+        .sum();
+    assert!((mass / (8e-6 * 0.04 * 20.0 * mean) - 1.0).abs() < 0.02);
+    assert!(leaf.dynamics.density[0].at(1.0) == 0.0 && blade.bearing_width(1.0) > 0.17);
+}
+
+/// A profile that a blade determines is its own image on the other side, but for the curvature.
+#[test]
+fn veins_are_images_of_each_other() {
+    let leaf = given("").unwrap();
+    for (j, image) in [(0, 4), (1, 3)] {
+        let [one, other] = [&leaf.rods[j], &leaf.rods[image]];
+        assert_eq!(one.couple_stiffness, other.couple_stiffness);
+        assert_eq!(one.rest_curvature[2], other.rest_curvature[2].scaled(-1.0));
+        assert_eq!((one.angle, one.base[1]), (-other.angle, -other.base[1]));
+    }
+    let tissue = leaf.tissue.as_ref().unwrap();
+    assert!(tissue[0] == tissue[3] && tissue[1] == tissue[2] && tissue[0] != tissue[1]);
+}
+
+/// Entries are replaced and scaled as those of other tables.
+#[test]
+fn numbers_of_a_blade_vary() {
+    let twice = given("scale:blade.width=2").unwrap();
+    assert!((twice.blade.as_ref().unwrap().width(0.5) - 3.4).abs() < 1e-14);
+    let entries = Entries::of_text(BLADE, "blade").unwrap();
+    for (part, problem) in [
+        ("blade.width.value=2", "must be a list"),
+        ("blade.width[0]=2", ""),
+    ] {
+        let refused = entries
+            .replaced(&[part.to_string()])
+            .and_then(|it| it.check());
+        assert!(refused.unwrap_err().to_string().contains(problem));
+    }
+}
