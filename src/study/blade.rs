@@ -80,18 +80,20 @@ fn distance(whole: &Scenario, leaf: &Equilibrium, other: &Scenario, fewer: &Equi
     let etas: Vec<f64> = (0..leaf.rod_count).map(|j| blade.place(j)).collect();
     let vein = |k: usize| {
         let eta = fewer_blade.place(k);
-        let right = etas
-            .partition_point(|of| *of < eta)
-            .clamp(1, etas.len() - 1);
-        let part = (eta - etas[right - 1]) / (etas[right] - etas[right - 1]);
+        let right = etas.partition_point(|of| *of < eta).min(etas.len() - 1);
+        let left = right.saturating_sub(1);
+        // A single vein is compared with a single one.
+        let part = match left == right {
+            true => 0.0,
+            false => (eta - etas[left]) / (etas[right] - etas[left]),
+        };
         let shape = &fewer.shape;
         let stations = shape.stations.iter().zip(&shape.rods[k].nodes);
         let apart = stations.filter_map(|(sigma, node)| {
             let same = |station: &f64| (station - sigma).abs() < SAME_STATION;
             let at = leaf.shape.stations.iter().position(same)?;
-            let [left, right]: [DVec3; 2] =
-                [right - 1, right].map(|j| leaf.shape.rods[j].nodes[at].position);
-            Some(left.lerp(right, part).distance(node.position))
+            let [a, b]: [DVec3; 2] = [left, right].map(|j| leaf.shape.rods[j].nodes[at].position);
+            Some(a.lerp(b, part).distance(node.position))
         });
         largest(apart.collect::<Vec<f64>>())
     };

@@ -55,6 +55,10 @@ impl Spline {
 /// The polynomial of degree 5 with these values, first and second derivatives at 0 and at 1: its
 /// value and derivatives at `t`.
 pub(super) fn quintic(t: f64, [f0, d0, c0]: [f64; 3], [f1, d1, c1]: [f64; 3]) -> [f64; 3] {
+    if t == 1.0 {
+        // The sums below would lose a small value next to large ones, or a zero.
+        return [f1, d1, c1];
+    }
     let rise = f1 - f0;
     let a3 = 10.0 * rise - 6.0 * d0 - 4.0 * d1 - 1.5 * c0 + 0.5 * c1;
     let a4 = -15.0 * rise + 8.0 * d0 + 7.0 * d1 + 1.5 * c0 - c1;
