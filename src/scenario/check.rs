@@ -204,12 +204,21 @@ fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
         };
         Ok([one(0)?, one(1)?, one(2)?])
     };
-    let (length, base, directions, sideways) = match made {
+    let rest_of_blade = |axis: usize| match made {
+        Made::Blade(blade, parts) if axis == 2 || blade.curvature().is_some() => {
+            Some(parts.profiles(BladeProperty::Rest(axis)))
+        }
+        _ => None,
+    };
+    let rest = |axis: usize| match rest_of_blade(axis) {
+        Some(profiles) => Ok(profiles),
+        None => quantity(Key::REST[axis]),
+    };
+    let (length, base, directions) = match made {
         Made::Blade(blade, parts) => (
             parts.lengths(),
             parts.bases(),
             parts.directions(blade.elevation),
-            parts.profiles(BladeProperty::RestBend),
         ),
         _ => {
             let angle = angles(entries.item(Key::Fan)?, rods)?.into_iter();
@@ -219,17 +228,12 @@ fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
                 entries.item(Key::Base)?.vectors(rods)?,
                 each.map(|(angle, elevation)| [angle, elevation, 0.0])
                     .collect(),
-                quantity(Key::RestBend3)?,
             )
         }
     };
     let couple = triple(Key::COUPLE, Property::Couple)?;
     let force = triple(Key::FORCE, Property::Force)?;
-    let rest = [
-        quantity(Key::RestTwist)?,
-        quantity(Key::RestBend2)?,
-        sideways,
-    ];
+    let rest = [rest(0)?, rest(1)?, rest(2)?];
     let stretch = quantity(Key::RestStretch)?;
     let pick = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)

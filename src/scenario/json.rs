@@ -79,8 +79,13 @@ impl Scenario {
 
     /// The value of a key; `None` if other keys determine it.
     fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
-        if self.blade.is_some() && key.follows_from_blade() {
-            return None;
+        if let Some(blade) = &self.blade {
+            match (key, blade.curvature()) {
+                _ if key.follows_from_blade() => return None,
+                (Key::RestTwist, Some(_)) => return None,
+                (Key::RestBend2, Some((at, value))) => return Some(along(at, value)),
+                _ => {}
+            }
         }
         match key.parts().0 {
             "blade" => return self.of_blade(key),
@@ -152,8 +157,7 @@ impl Scenario {
         let (at, value) = blade.points();
         Some(match key {
             Key::BladeLength => number(blade.length()),
-            Key::BladeWidth if blade.is_even() => number(value[0]),
-            Key::BladeWidth => json!({ "at": at, "value": value }),
+            Key::BladeWidth => along(at, value),
             Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
             Key::BladeYoung => quantity(materials.map(|of| &of.young)),
             Key::YoungAcross => optional(materials.map(|of| of.young_across.as_ref()))?,
@@ -338,6 +342,14 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
         false => profiles.iter().map(|profile| values(profile)).collect(),
     };
     json!({ "at": at, "value": value })
+}
+
+/// A quantity along a leaf.
+fn along(at: &[f64], value: &[f64]) -> Value {
+    match value.iter().all(|one| *one == value[0]) {
+        true => number(value[0]),
+        false => json!({ "at": at, "value": value }),
+    }
 }
 
 /// A quantity of all rods; `None` if it is left out.

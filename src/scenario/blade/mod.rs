@@ -11,6 +11,9 @@
 //! | stretch and shear | H1 = E h t, H2 = H3 = 5/6 G h t |
 //! | tissue | k1 = G t/w, k2 = E' t/w, k3 = 5/6 G t/w, c1 = E' t^3/(12 w) |
 //!
+//! Its surface may be curved at rest about the y axis, kappa(x): a vein at the angle phi to its axis
+//! then has u0_1 = kappa sin(phi) cos(phi) and u0_2 = kappa cos(phi)^2, so that all fit together.
+//!
 //! E is Young's modulus along the veins, E' the one across. A blade of constant width bends as
 //! E W t^3/12 and twists as G W t^3/3, whatever N is, and in its plane as E t W^3/12, if shear
 //! is stiff: for veins in the middle of equal strips whatever N is; if the outermost veins are the
@@ -144,10 +147,11 @@ impl Blade {
         widths.last() == Some(&0.0)
     }
 
-    /// Whether its width is the same everywhere.
-    pub(super) fn is_even(&self) -> bool {
-        let (_, widths) = self.points();
-        widths.iter().all(|width| *width == widths[0])
+    /// Where the curvature of its surface at rest is given, as fractions of the length, and its values
+    /// there; `None` if it lies flat.
+    pub(super) fn curvature(&self) -> Option<(&[f64], &[f64])> {
+        let curvature = self.outline.curvature.as_ref()?;
+        Some((curvature.knots(), curvature.values()))
     }
 
     /// Whether it has a mass.

@@ -102,7 +102,32 @@ fn outline(entries: &Entries) -> Result<Outline> {
         width,
         least,
         largest,
+        curvature: curvature(entries)?,
     })
+}
+
+/// The curvature of the surface at rest, over fractions of the length.
+fn curvature(entries: &Entries) -> Result<Option<Spline>> {
+    let Some(item) = entries.given(Key::RestBend2) else {
+        return Ok(None);
+    };
+    item.ensure(
+        !item.value.is_array(),
+        "a blade bends as a whole: give one number, or one profile",
+    )?;
+    let (at, value) = match item.value.is_table() {
+        true => item.knots()?,
+        false => (vec![0.0, 1.0], vec![item.number()?; 2]),
+    };
+    if value.iter().all(|value| *value == 0.0) {
+        return Ok(None);
+    }
+    if let Some(twist) = entries.given(Key::RestTwist) {
+        let why = "the veins of a blade that is curved (rest.bend_2) twist as its surface does: \
+                   leave one of them out";
+        return Err(twist.refuse(why));
+    }
+    Ok(Some(Spline::through(at, value)))
 }
 
 /// The width over fractions of the length.

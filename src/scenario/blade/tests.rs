@@ -48,6 +48,8 @@ fn contradictions_and_impossible_outlines_are_refused() {
         blade.thickness=1e-30 => choose other units
         leaf.joined=true; blade.width.value[3]=0.2 => the blade has a width at its tip
         leaf.elevation=[0, 0, 0, 0, 0] => a blade rises as a whole: give one number
+        rest.bend_2=[0, 0, 0, 0, 0] => a blade bends as a whole
+        rest.bend_2=0.1; rest.twist=0.1 => twist as its surface does
         dynamics.density=1 => blade.mass_density is given, too
         blade.edge=true => did you mean blade.edges?
     ";
@@ -77,7 +79,8 @@ fn what_is_written_is_read_again_as_the_same() {
         "blade.thickness=[0.1, 0.2, 0.1, 0.2, 0.1]; blade.young_across=3e4; blade.edges=false",
         "blade.thickness={at=[0, 0.4, 1], value=[0.05, 0.04, 0.02]}; blade.shear_modulus=1e4",
         "leaf.elevation=0.4; rest.bend_2=0.1; load.g=[0, 0, -981]; blade.least_width=0.05",
-        "leaf.rods=1",
+        "leaf.rods=1; rest.bend_2={at=[0, 0.5, 1], value=[0.1, 0.2, -0.1]}",
+        "rest.bend_2=0; rest.twist=0.3",
     ] {
         let leaf = given(overrides).unwrap();
         let written = serde_json::to_value(&leaf).unwrap();
@@ -121,6 +124,37 @@ fn veins_lie_within_the_outline() {
             }
             let (tip, _) = natural.at(j, 1.0);
             assert!(tip.distance(20.0 * DVec3::X) < 1e-11, "{tip}");
+        }
+    }
+}
+
+/// A blade that is curved at rest is a part of a cylinder: its veins still fit together.
+#[test]
+fn veins_of_a_curved_blade_lie_on_a_cylinder() {
+    for (curvature, bend) in [
+        (0.08, "0.08"),
+        (0.0, "{at=[0, 0.4, 0.7, 1], value=[0.1, 0.05, -0.1, 0.2]}"),
+    ] {
+        let scenario = given(&format!("rest.bend_2={bend}")).unwrap();
+        let (blade, natural) = (
+            scenario.blade.as_ref().unwrap(),
+            Natural::new(&scenario, true),
+        );
+        let (middle, _) = natural.at(2, 1.0);
+        for j in 0..5 {
+            let (tip, _) = natural.at(j, 1.0);
+            assert!(tip.distance(middle) < 1e-10, "{}", tip.distance(middle));
+            for k in (0..=10).filter(|_| curvature > 0.0) {
+                let (x, q) = natural.at(j, k as f64 / 10.0);
+                let angle = (x.x).atan2(x.z + 1.0 / curvature);
+                let radius = x.x.hypot(x.z + 1.0 / curvature);
+                assert!((radius * curvature - 1.0).abs() < 1e-11, "{radius}");
+                let y =
+                    0.5 * blade.place(j) * blade.width((angle / curvature / 20.0).clamp(0.0, 1.0));
+                assert!((x.y - y).abs() < 1e-10, "{j} {k}: {x} {y}");
+                let normal = DVec3::new(angle.sin(), 0.0, angle.cos());
+                assert!((q * DVec3::Z).distance(normal) < 1e-11);
+            }
         }
     }
 }

@@ -20,8 +20,8 @@ pub enum BladeProperty {
     Couple(usize),
     /// H1, H2 and H3, by index.
     Force(usize),
-    /// u0_3.
-    RestBend,
+    /// u0_1, u0_2 and u0_3, by index.
+    Rest(usize),
     /// Mass per length.
     Density,
     /// Moment of inertia per length: the mean of those about d2 and d3.
@@ -42,7 +42,7 @@ impl From<Property> for BladeProperty {
 }
 
 /// Most properties that something has.
-const MOST: usize = 9;
+const MOST: usize = 11;
 
 impl BladeProperty {
     /// Its number among those of a vein, or of tissue.
@@ -50,9 +50,9 @@ impl BladeProperty {
         match self {
             BladeProperty::Couple(axis) => axis,
             BladeProperty::Force(axis) => 3 + axis,
-            BladeProperty::RestBend => 6,
-            BladeProperty::Density => 7,
-            BladeProperty::RotaryInertia => 8,
+            BladeProperty::Rest(axis) => 6 + axis,
+            BladeProperty::Density => 9,
+            BladeProperty::RotaryInertia => 10,
             BladeProperty::Tissue(which) => which,
         }
     }
@@ -71,6 +71,8 @@ pub struct Outline {
     pub largest: f64,
     /// Whether the width falls below the least one.
     pub narrows: bool,
+    /// The curvature of its surface at rest about the y axis, downwards, at fractions of the length.
+    pub curvature: Option<Spline>,
 }
 
 impl Outline {
@@ -150,7 +152,10 @@ impl Vein {
     /// Finds its length, and x at equal distances along it.
     fn measure(&mut self) {
         let even = (0..=PANELS).map(|k| k as f64 / PANELS as f64);
-        let edges = ascending(even.chain(self.outline.width.knots().iter().copied()));
+        let outline = self.outline.clone();
+        let curved = outline.curvature.iter().flat_map(Spline::knots);
+        let knots = ascending(outline.width.knots().iter().chain(curved).copied());
+        let edges = ascending(even.chain(knots.iter().copied()));
         let mut reached = vec![0.0];
         for pair in edges.windows(2) {
             let before = reached[reached.len() - 1];
@@ -175,9 +180,9 @@ impl Vein {
         let mut places: Vec<_> = (0..=PANELS).map(place).collect();
         (places[0][0], places[PANELS][0]) = (0.0, 1.0);
         self.places = places;
-        let knots = self.outline.width.knots();
+        let inner = |knot: &&f64| **knot > 0.0 && **knot < 1.0;
         let known = |knot: &f64| reached[edges.partition_point(|edge| edge < knot)] / self.length;
-        self.seams = knots[1..knots.len() - 1].iter().map(known).collect();
+        self.seams = knots.iter().filter(inner).map(known).collect();
     }
 
     /// The fraction x of the blade's length at the fraction sigma of its own.
@@ -206,6 +211,9 @@ impl Vein {
         let [slope, second] = self.slopes(x);
         let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
         let across = SHEAR_FACTOR * shear * h * t;
+        // On a cylinder at the angle phi, tan(phi) = y', to its principal direction.
+        let curvature = self.outline.curvature.as_ref();
+        let curvature = curvature.map_or(0.0, |of| of.at(x)[0]) / (1.0 + slope * slope);
         [
             shear * flat / 3.0,
             young * flat / 12.0,
@@ -213,6 +221,8 @@ impl Vein {
             young * h * t,
             across,
             across,
+            curvature * slope,
+            curvature,
             second / slope.hypot(1.0).powi(3),
             density * heavy * t,
             0.5 * density * heavy * t * (heavy * heavy + t * t) / 12.0,
@@ -320,7 +330,7 @@ impl BladePart {
 
     /// A property along it; of a vein on the other side of the midrib if `image`.
     pub(super) fn profile(self: &Arc<BladePart>, property: BladeProperty, image: bool) -> Profile {
-        let turns = image && property == BladeProperty::RestBend;
+        let turns = image && matches!(property, BladeProperty::Rest(0 | 2));
         let [least, most] = self.extremes(property);
         let factor = if turns { -1.0 } else { 1.0 };
         match least == most {
