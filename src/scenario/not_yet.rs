@@ -7,14 +7,12 @@ pub(super) fn not_yet(scenario: &Scenario) -> Option<Key> {
     let Scenario {
         base_held,
         points,
-        wind,
         ..
     } = scenario;
     let turned = |point: &PointLoad| point.moment != [0.0; 3];
     let used = [
         (Key::PointMoment, points.iter().any(turned)),
         (Key::BaseHeld, *base_held != Hold::Clamped),
-        (Key::WindVelocity, wind.is_some()),
     ];
     let first = used.into_iter().find(|(_, used)| *used)?;
     Some(first.0)
