@@ -5,8 +5,8 @@ mod convergence;
 mod following;
 
 use convergence::{BALANCED, NEUTRAL_STEP, ROUNDING};
-pub use following::Following;
 pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_lengths};
+pub use following::Following;
 
 use crate::largest::larger;
 use crate::leaf::{

@@ -78,7 +78,11 @@ impl Physics {
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
         let still = schedules(&dynamics).iter().all(|load| load.is_constant());
-        let air = leaf.scenario().wind.as_ref().map(|wind| wind.velocity.clone());
+        let air = leaf
+            .scenario()
+            .wind
+            .as_ref()
+            .map(|wind| wind.velocity.clone());
         let mut physics = Physics {
             own_loads: leaf.loads.own,
             constant_loads: None,

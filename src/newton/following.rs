@@ -85,7 +85,11 @@ pub fn solve(
 }
 
 fn product(a: &Field, b: &Field) -> f64 {
-    let pairs = a.iter().flatten().flatten().zip(b.iter().flatten().flatten());
+    let pairs = a
+        .iter()
+        .flatten()
+        .flatten()
+        .zip(b.iter().flatten().flatten());
     pairs.map(|(a, b)| a * b).sum()
 }
 
@@ -102,6 +106,9 @@ fn add(sum: &mut Field, factor: f64, other: &Field) {
 
 fn scaled(field: &Field, factor: f64) -> Field {
     let mut all = field.clone();
-    all.iter_mut().flatten().flatten().for_each(|x| *x *= factor);
+    all.iter_mut()
+        .flatten()
+        .flatten()
+        .for_each(|x| *x *= factor);
     all
 }

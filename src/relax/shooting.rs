@@ -5,7 +5,9 @@ use crate::memory;
 use crate::newton::Work;
 use crate::refusal::RefusedOption;
 use crate::relax::request::method::Method;
-use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError, without_grips, without_wind};
+use crate::relax::request::options::{
+    MAX_INTERVALS, Options, Progress, RelaxError, without_grips, without_wind,
+};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::result::plausible;

@@ -5,9 +5,7 @@ use super::{Hold, Key, PointLoad, Scenario};
 /// The first key of a scenario that would be left out of account, if any.
 pub(super) fn not_yet(scenario: &Scenario) -> Option<Key> {
     let Scenario {
-        base_held,
-        points,
-        ..
+        base_held, points, ..
     } = scenario;
     let turned = |point: &PointLoad| point.moment != [0.0; 3];
     let used = [

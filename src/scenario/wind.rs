@@ -5,8 +5,8 @@ use super::error::Result;
 use super::key::Key;
 use super::{Profile, Schedule};
 
-/// Air that flows past the veins. The force per length on a vein is rho C_D w |u| u/2, with the
-/// part u of the air's velocity relative to the vein that is normal to the vein's tangent.
+/// Air that flows past the veins. The force per reference length on a vein is rho C_D w |u| u/2, with
+/// the part u of the air's velocity relative to the vein that is normal to the vein's tangent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wind {
     /// Velocity of the air.

@@ -7,7 +7,9 @@ use serde::{Serialize, Serializer};
 use super::judge::{common, differences};
 use crate::limit::Limit;
 use crate::numbers::power_of_ten;
-use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind};
+use crate::relax::{
+    Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
+};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 

@@ -250,7 +250,11 @@ impl Explicit {
         let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
-            let ahead = if last > 0.0 { last / (last + before) } else { 0.0 };
+            let ahead = if last > 0.0 {
+                last / (last + before)
+            } else {
+                0.0
+            };
             let air = (self.physics.mean_air([from, to]), ahead);
             applied.update(&self.leaf, (self.layout, &self.positions), &self.packs, air);
         }

@@ -153,6 +153,11 @@ pub enum RelaxError {
         /// The method or the question.
         what: &'static str,
     },
+    /// Wind that changes, in which nothing rests.
+    #[error(
+        "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
+    )]
+    ChangingWind,
 }
 
 /// Refuses scenarios with grips for what does not take them into account.
@@ -177,12 +182,18 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
         return Ok(());
     };
     let what = match options.method {
-        Method::SemiImplicit(how) if how.keep_unstable => "Newton's method from the start",
+        Method::SemiImplicit(how) if how.keep_unstable => {
+            "the search for an equilibrium of any index"
+        }
         Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
         Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
-        Method::SemiImplicit(_) if options.mode_shapes => "a request for modes",
-        Method::SemiImplicit(_) if !wind.velocity.is_constant() => "rest in changing air",
-        Method::SemiImplicit(_) if scenario.tip_moment != [0.0; 3] => "rest under load.tip_moment",
+        Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
+        Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
+            return Err(RelaxError::ChangingWind);
+        }
+        Method::SemiImplicit(_) if scenario.tip_moment != [0.0; 3] => {
+            "a leaf under load.tip_moment"
+        }
         Method::SemiImplicit(_) if !scenario.grips.is_empty() => "a leaf held by [[grip]]",
         Method::SemiImplicit(_) => return Ok(()),
         Method::Explicit { .. } => "explicit relaxation",

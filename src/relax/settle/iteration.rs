@@ -109,8 +109,9 @@ fn settle_upright(
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     let dead_moment = leaf.tip_moment() != DVec3::ZERO;
     let windy = leaf.leaf.in_wind();
-    // What was held without wind is not at rest in it.
+    // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);
+    moved |= windy && from_start;
     if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
         let how = (near_rest, cg_tolerance);
         effort.spare_system = None;
