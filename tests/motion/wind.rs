@@ -335,6 +335,10 @@ fn continued_motions_and_threads_have_equal_bits() {
             assert!(moved(threads, scheme) == alone, "{scheme:?} {threads}");
         }
     }
+    // It hardly moves: motions on so many segments take long.
+    let faint = Schedule::constant([0.1, 0.2, 0.3]);
+    (many.joined, many.gravity) = (false, [0.0; 3]);
+    many.wind.as_mut().unwrap().velocity = faint;
     let relaxed = |threads| on_threads(threads, || bits(&rests(&many, on(520)).shape.rods));
     assert!(relaxed(1) == relaxed(2));
 }
@@ -344,9 +348,9 @@ fn continued_motions_and_threads_have_equal_bits() {
 #[test]
 fn explicit_steps_are_as_short_as_drag_demands() {
     let mut rod = twisted_rod();
-    rod.wind = Some(air(Schedule::constant([20.0, -30.0, 50.0]), 4.0, 1));
+    rod.wind = Some(air(Schedule::constant([1.0, -2.0, 2.0]), 20.0, 1));
     let leaf = Leaf::new(&rod);
-    let start = released(&leaf, 6);
+    let start = released(&leaf, 8);
     let stable = explicit(&leaf, &start, None).stable_step();
     assert_eq!(stable.limit, "the drag of the wind");
     let after = |scheme, h| at(scheme, &leaf, &start, h, 0.5).state.tip(0);

@@ -11,7 +11,7 @@ use crate::relax::settle::methods::Relaxation;
 use glam::DVec3;
 
 /// Local error of the steps of the motion (lengths, radians).
-const MOTION_ERROR: f64 = 1e-4;
+const MOTION_ERROR: f64 = 1e-3;
 
 /// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
 const LOOK: f64 = 0.5;
