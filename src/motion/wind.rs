@@ -56,23 +56,19 @@ impl Drag {
         self.factor * self.speed * self.normal
     }
 
-    /// c |u_n| times the part P of a vector that is normal to the tangent, and once more the part
-    /// along u_n.
-    fn across(&self) -> DMat3 {
+    /// The derivative of the force with respect to the air's velocity: c (|u_n| P + u_n u_n/|u_n|),
+    /// P being the projection normal to the tangent.
+    pub fn by_velocity(&self) -> DMat3 {
         let normal = DMat3::IDENTITY - outer(self.tangent, self.tangent);
         let direction = self.normal.normalize_or_zero();
         self.factor * self.speed * (normal + outer(direction, direction))
     }
 
-    /// The derivative of the force with respect to the air's velocity: c (|u_n| P + u_n u_n/|u_n|).
-    pub fn by_velocity(&self) -> DMat3 {
-        self.across()
-    }
-
-    /// The derivative of the force with respect to the vector from one end to the other.
+    /// The derivative of the force with respect to the vector from one end to the other, as the
+    /// tangent turns with it.
     pub fn by_chord(&self) -> DMat3 {
         let turned = self.factor * self.speed * outer(self.tangent, self.normal);
-        (self.along * self.across() + turned) * (-self.chord.max(f64::MIN_POSITIVE).recip())
+        (self.along * self.by_velocity() + turned) * (-self.chord.max(f64::MIN_POSITIVE).recip())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Wind, which acts on moving leaves: the table `[wind]`.
+//! Wind: the table `[wind]`.
 
 use super::entries::Entries;
 use super::error::Result;
