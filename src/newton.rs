@@ -2,9 +2,11 @@
 //! convergence test, and the solution of its linear equations.
 
 mod convergence;
+mod following;
 
 use convergence::{BALANCED, NEUTRAL_STEP, ROUNDING};
 pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_lengths};
+pub use following::Following;
 
 use crate::largest::larger;
 use crate::leaf::{
@@ -156,6 +158,13 @@ pub enum Equations<'s> {
     AnySign { largest: f64 },
     /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
+    /// Of a leaf on which forces act that have no potential, with their derivatives: the matrix is
+    /// unsymmetric, and pivots without them have any sign. An increment above the given size ends
+    /// the iteration.
+    Following {
+        forces: &'s dyn Following,
+        largest: f64,
+    },
     /// With a positive definite matrix, shifted where necessary if it may be; an increment above
     /// the given size ends the iteration.
     Definite {
@@ -183,9 +192,9 @@ impl Equations<'_> {
         match self {
             Equations::AnySign { largest } => (*largest, f64::INFINITY),
             Equations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
-            Equations::Definite { largest, .. } | Equations::Proximal { largest, .. } => {
-                (f64::INFINITY, *largest)
-            }
+            Equations::Definite { largest, .. }
+            | Equations::Proximal { largest, .. }
+            | Equations::Following { largest, .. } => (f64::INFINITY, *largest),
         }
     }
 }
@@ -239,6 +248,9 @@ impl Newton<'_> {
                 leaf.hold_turn(state, system);
             }
             self.work.force_evaluations += 1;
+            if let Equations::Following { forces, .. } = &linear.equations {
+                forces.add_forces(state, system);
+            }
             if turn > RESOLVED_TURN {
                 return Err(Stop::Unresolved);
             }
@@ -319,6 +331,16 @@ impl Linear<'_> {
                 let mut factor = pattern.factorize(system, self.neutral)?;
                 factor.solve(system, None);
                 work.factorizations += 1;
+                Ok(0.0)
+            }
+            Equations::Following { forces, .. } => {
+                let pattern = match self.pattern.take() {
+                    Some(pattern) => pattern,
+                    None => DirectSolver::new(system)?,
+                };
+                work.factorizations += 1;
+                let pattern = self.pattern.insert(pattern);
+                following::solve(system, pattern, self.neutral, (*forces, state))?;
                 Ok(0.0)
             }
             Equations::Unsymmetric => {

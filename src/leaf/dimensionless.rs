@@ -155,6 +155,17 @@ impl Leaf {
         &self.scenario
     }
 
+    /// Whether all that acts on it has a potential: a dead moment has none, nor has wind. Otherwise
+    /// its rest is no minimum of an energy, and no eigenvalue tells whether it is stable.
+    pub fn has_potential(&self) -> bool {
+        self.loads.tip_moment == DVec3::ZERO && !self.in_wind()
+    }
+
+    /// Whether wind acts on it.
+    pub fn in_wind(&self) -> bool {
+        self.scenario.wind.is_some()
+    }
+
     /// Number of rods: of the whole leaf, or of the half.
     pub fn rods(&self) -> usize {
         let rods = self.scenario.rods.len();

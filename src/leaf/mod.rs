@@ -32,5 +32,5 @@ pub use factorised::Factorised;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
 pub use mirror::{are_mirrored, half_of, is_mirrored, whole_fields, whole_of};
-pub use state::{Field, Increment, State, shift, turn};
+pub use state::{Field, Increment, State, add, shift, turn};
 pub use system::{Solved, Sums, System};

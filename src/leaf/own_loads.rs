@@ -65,6 +65,15 @@ impl DiscreteLeaf {
         self.own_part() * here.map(|(_, _, force)| force).sum::<DVec3>()
     }
 
+    /// Adds dead forces on all nodes to the veins' own loads.
+    pub fn load_nodes(&mut self, forces: &[DVec3]) {
+        self.own_loads.resize(forces.len(), DVec3::ZERO);
+        for (own, force) in self.own_loads.iter_mut().zip(forces) {
+            *own += *force;
+        }
+        self.loads.own = 1.0;
+    }
+
     /// Adds the veins' own loads to the moments and forces on all nodes.
     pub fn add_own_forces(&self, nodes: &mut [[DVec3; 2]]) {
         for (node, own) in nodes.iter_mut().zip(&self.own_loads) {

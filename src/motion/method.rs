@@ -25,8 +25,8 @@ pub struct Energy {
     pub potential: f64,
     /// Energy dissipated by damping since the start.
     pub dissipated: f64,
-    /// Work done since the start by varying loads and rest shapes, and by
-    /// the moment on a tip, which has no potential.
+    /// Work done since the start by varying loads and rest shapes, and by what has no potential:
+    /// the moment on a tip, and wind.
     pub work: f64,
 }
 

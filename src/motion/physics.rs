@@ -1,4 +1,4 @@
-//! What a leaf needs to move: masses, damping, and time-dependent loads.
+//! What a leaf needs to move: masses, damping, time-dependent loads, and the air.
 //! Dimensionless: time in units of sqrt(rho L^4/A).
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
@@ -46,11 +46,14 @@ pub struct Physics {
     pub retardation: f64,
     /// Part of the loads of single veins.
     own_loads: f64,
+    /// Velocity of the air, if there is wind, in the scenario's units.
+    air: Option<Schedule<[f64; 3]>>,
     /// The loads, if they are constant.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it is constant.
     pub constant_rest: Option<f64>,
-    /// Times at which a load or the factor may change its slope, in increasing order.
+    /// Times at which a load, the air's velocity or the factor may change its slope, in increasing
+    /// order.
     knots: Vec<f64>,
 }
 
@@ -75,10 +78,16 @@ impl Physics {
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
         let still = schedules(&dynamics).iter().all(|load| load.is_constant());
+        let air = leaf
+            .scenario()
+            .wind
+            .as_ref()
+            .map(|wind| wind.velocity.clone());
         let mut physics = Physics {
             own_loads: leaf.loads.own,
             constant_loads: None,
-            knots: knots(&dynamics, time),
+            knots: knots(&dynamics, air.as_ref(), time),
+            air,
             constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
             time,
@@ -146,7 +155,46 @@ impl Physics {
         }
     }
 
-    /// The first time after `time` at which a load or the factor of the rest curvatures may
+    /// Whether there is wind.
+    pub fn is_windy(&self) -> bool {
+        self.air.is_some()
+    }
+
+    /// The velocity of the air at a time.
+    pub fn air(&self, time: f64) -> DVec3 {
+        self.air_by(|velocity| velocity.at(time * self.time))
+    }
+
+    /// The mean of that velocity over an interval.
+    pub fn mean_air(&self, interval: [f64; 2]) -> DVec3 {
+        let [from, to] = interval.map(|time| time * self.time);
+        self.air_by(|velocity| velocity.mean(from, to))
+    }
+
+    /// The largest speed of the air.
+    pub fn strongest_wind(&self) -> f64 {
+        let speeds = self.air.iter().flat_map(|velocity| &velocity.value);
+        let speeds = speeds.map(|value| DVec3::from_array(*value).length());
+        speeds.fold(0.0, f64::max) * self.time / self.scale.length
+    }
+
+    fn air_by(&self, value: impl Fn(&Schedule<[f64; 3]>) -> [f64; 3]) -> DVec3 {
+        let velocity = self.air.as_ref().map_or([0.0; 3], value);
+        DVec3::from_array(velocity) * (self.time / self.scale.length)
+    }
+
+    /// The factor of |u_n| u_n in the drag on segment `i` of rod `j`: rho_a C_D w L/(2 rho) times
+    /// its length; zero without wind.
+    pub fn drag(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> f64 {
+        let length = leaf.grid.width(i) * leaf.leaf.length(j);
+        leaf.leaf.scenario().wind.as_ref().map_or(0.0, |wind| {
+            let width = wind.width[j].at(leaf.grid.middle(i));
+            let pressed = 0.5 * wind.density * wind.drag * width * self.scale.length;
+            pressed / self.density * length
+        })
+    }
+
+    /// The first time after `time` at which a load, the air's velocity or the factor of the rest curvatures may
     /// change its slope; infinite if there is none. Not closer than [`SHORTEST`]: a jump
     /// within less takes that long.
     pub fn next_knot(&self, time: f64) -> f64 {
@@ -155,11 +203,11 @@ impl Physics {
         knot.max(time + SHORTEST)
     }
 
-    /// A time at which a load or that factor has a pulse too short for steps that end at its
+    /// A time at which one of them has a pulse too short for steps that end at its
     /// knots, in the scenario's unit.
     pub fn too_short_a_pulse(&self) -> Option<f64> {
         let (d, shortest) = (&self.dynamics, SHORTEST * self.time);
-        let mut loads = schedules(d).into_iter();
+        let mut loads = schedules(d).into_iter().chain(&self.air);
         let of_loads = loads.find_map(|load| load.pulse_within(shortest));
         of_loads.or_else(|| d.rest.pulse_within(shortest))
     }
@@ -202,8 +250,8 @@ fn schedules(dynamics: &Dynamics) -> [&Schedule<[f64; 3]>; 3] {
 }
 
 /// The knots of everything that varies in time, over the unit of time.
-fn knots(dynamics: &Dynamics, unit: f64) -> Vec<f64> {
-    let loads = schedules(dynamics).into_iter();
+fn knots(dynamics: &Dynamics, air: Option<&Schedule<[f64; 3]>>, unit: f64) -> Vec<f64> {
+    let loads = schedules(dynamics).into_iter().chain(air);
     let loads = loads.filter(|load| !load.is_constant());
     let rest = Some(&dynamics.rest).filter(|rest| !rest.is_constant());
     let knots = loads.flat_map(|load| &load.at);

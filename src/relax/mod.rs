@@ -27,7 +27,7 @@ pub use crate::relax::relaxation::Relaxation;
 pub use crate::relax::request::method::{Method, SemiImplicit, Settings, Unfit};
 pub use crate::relax::request::options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
-    check_tolerance, without_grips,
+    check_tolerance, without_grips, without_wind,
 };
 pub use crate::relax::result::blade::{BladeReport, FewerVeins};
 pub(crate) use crate::relax::result::equilibrium::serialize_index;

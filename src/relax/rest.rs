@@ -6,7 +6,9 @@ use crate::relax::grids::{follow, solve};
 use crate::relax::loading::arrival::{arrive, guess, load_slowly};
 use crate::relax::nested::{Found, History, NestedEquilibrium, along};
 use crate::relax::request::method::Method;
-use crate::relax::request::options::{Options, Progress, RelaxError, check_tolerance};
+use crate::relax::request::options::{
+    Options, Progress, RelaxError, check_tolerance, rests_in_wind,
+};
 use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::{Equilibrium, Outcome};
 use crate::relax::result::plausible;
@@ -36,6 +38,7 @@ pub(crate) fn relax_on_grids(
 ) -> Result<(Equilibrium, NestedEquilibrium), RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
+    rests_in_wind(scenario, options)?;
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {

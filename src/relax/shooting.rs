@@ -5,7 +5,9 @@ use crate::memory;
 use crate::newton::Work;
 use crate::refusal::RefusedOption;
 use crate::relax::request::method::Method;
-use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError, without_grips};
+use crate::relax::request::options::{
+    MAX_INTERVALS, Options, Progress, RelaxError, without_grips, without_wind,
+};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::blade::BladeReport;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
@@ -93,6 +95,7 @@ pub fn relax(
     };
     check_intervals(scenario.rods.len(), intervals)?;
     without_grips(scenario, "shooting")?;
+    without_wind(scenario, "shooting")?;
     if !from_rest && scenario.joined && scenario.rods.len() > 1 && !Leaf::new(scenario).is_fan() {
         let why = "veins that begin apart are led to their joint tip by the relaxation; \
                    use shooting-from-rest";

@@ -75,6 +75,7 @@ impl Scenario {
             && self.grips.iter().all(|grip| flat(grip.displacement))
             && flat(self.tip_force)
             && self.tip_moment == [0.0; 3]
+            && self.wind.is_none()
     }
 
     /// The sum of all weights, and of the loads along veins and on points.

@@ -112,7 +112,7 @@ pub struct Scenario {
     pub held_tip: Option<HeldTip>,
     /// Holders along the veins; no point has two.
     pub grips: Vec<Grip>,
-    /// Wind; equilibria do not depend on it.
+    /// Wind.
     pub wind: Option<Wind>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,

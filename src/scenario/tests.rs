@@ -322,10 +322,6 @@ fn what_no_method_takes_into_account_is_refused() {
         assert!(refused.to_string().contains(&said), "{entry}: {refused}");
         assert!(refused.key.is_some());
     }
-    let wind = "[wind]\nvelocity = [1, 0, 0]\ndensity = 1\ndrag = 1\nwidth = 0.1";
-    let entries = Entries::of_text(&format!("{text}\n{wind}"), "plain.toml").unwrap();
-    let refused = entries.check().unwrap_err().to_string();
-    assert!(refused.contains("wind is read"), "{refused}");
 }
 
 /// The same leaf in other units of length, force and time.

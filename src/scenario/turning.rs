@@ -27,8 +27,11 @@ pub struct Turning {
 }
 
 impl Scenario {
-    /// The groups of veins that can turn without resistance, each about its own axis.
+    /// The groups of veins that can turn without resistance, each about its own axis: none in wind.
     pub fn turnings(&self) -> Vec<Turning> {
+        if self.wind.is_some() {
+            return Vec::new();
+        }
         let groups = self.tied_groups().into_iter();
         groups
             .filter_map(|rods| {

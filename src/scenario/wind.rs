@@ -1,12 +1,12 @@
-//! Wind, which acts on moving leaves: the table `[wind]`.
+//! Wind: the table `[wind]`.
 
 use super::entries::Entries;
 use super::error::Result;
 use super::key::Key;
 use super::{Profile, Schedule};
 
-/// Air that flows past the veins. The force per length on a vein is rho C_D w |u| u/2, with the
-/// part u of the air's velocity relative to the vein that is normal to the vein's tangent.
+/// Air that flows past the veins. The force per reference length on a vein is rho C_D w |u| u/2, with
+/// the part u of the air's velocity relative to the vein that is normal to the vein's tangent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wind {
     /// Velocity of the air.

@@ -25,7 +25,7 @@ const MODE_ACCURACY: f64 = 1e-9;
 pub(super) fn unstable(leaf: &DiscreteLeaf, physics: &Physics, start: &State) -> Option<String> {
     let mut leaf = leaf.clone();
     leaf.loads = physics.loads(0.0);
-    if leaf.loads.tip_moment != DVec3::ZERO || !physics.clamped() {
+    if leaf.leaf.in_wind() || leaf.loads.tip_moment != DVec3::ZERO || !physics.clamped() {
         // Its rest is no minimum of an energy, or it has none.
         return None;
     }

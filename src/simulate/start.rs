@@ -3,8 +3,8 @@
 use super::Refused;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::unstrained;
-use crate::relax;
-use crate::scenario::{Scenario, Start};
+use crate::relax::{self, Route};
+use crate::scenario::{Scenario, Schedule, Start};
 use std::f64::consts::PI;
 
 /// Largest force in a segment of the arcs that a leaf is released from, in units of A/L^2 of its
@@ -37,12 +37,16 @@ fn released(leaf: &DiscreteLeaf) -> State {
     unstrained.unwrap_or(arcs)
 }
 
-/// The equilibrium under the loads and with the rest shape at time 0.
+/// The equilibrium under the loads, in the wind and with the rest shape at time 0.
 fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
         method: relax::Method::default().on_grid(Some(grid.segments())),
         tolerance: Some(tolerance),
+        route: match scenario.wind {
+            Some(_) => Route::Release,
+            None => Route::default(),
+        },
         ..relax::Options::default()
     };
     let found = relax::relax(&scenario, &options, &mut |_| {})?;
@@ -57,7 +61,7 @@ fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     Ok(State::new(grid.segments(), x.collect(), q.collect()))
 }
 
-/// The scenario with the loads and the rest shape at time 0.
+/// The scenario with the loads, the wind and the rest shape at time 0.
 fn at_beginning(scenario: &Scenario) -> Scenario {
     let mut scenario = scenario.clone();
     let dynamics = &scenario.dynamics;
@@ -65,6 +69,11 @@ fn at_beginning(scenario: &Scenario) -> Scenario {
     scenario.tip_force = dynamics.tip_force.at(0.0);
     scenario.tip_moment = dynamics.tip_moment.at(0.0);
     let factor = dynamics.rest.at(0.0);
+    let air = scenario.wind.as_ref().map(|wind| wind.velocity.at(0.0));
+    match (&mut scenario.wind, air) {
+        (Some(wind), Some(air)) if air != [0.0; 3] => wind.velocity = Schedule::constant(air),
+        (wind, _) => *wind = None,
+    }
     let rods = scenario.rods.iter_mut();
     for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {
         *curvature = curvature.scaled(factor);

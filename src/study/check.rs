@@ -232,6 +232,7 @@ pub fn check(
 ) -> Result<Check, RelaxError> {
     relax::check_intervals(scenario.rods.len(), options.intervals)?;
     relax::without_grips(scenario, "shooting")?;
+    relax::without_wind(scenario, "shooting")?;
     let asked = Options {
         tolerance: options.tolerance,
         method: SemiImplicit {

@@ -7,7 +7,9 @@ use serde::{Serialize, Serializer};
 use super::judge::{common, differences};
 use crate::limit::Limit;
 use crate::numbers::power_of_ten;
-use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
+use crate::relax::{
+    Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
+};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 
@@ -99,6 +101,7 @@ pub fn equilibria(
     limit: &Limit,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Equilibria, RelaxError> {
+    without_wind(scenario, "the search for all shapes")?;
     let clock = std::time::Instant::now();
     let mut all = Equilibria {
         scenario: scenario.name.clone(),

@@ -9,3 +9,4 @@ mod released_rigid;
 mod released_stiff;
 mod stability;
 mod stiff;
+mod wind;

@@ -126,7 +126,7 @@ fn an_acceleration_of_a_flat_strip_is_named() {
 /// Nothing is said about the leaves that come with the program, whose numbers are meant.
 #[test]
 fn nothing_is_said_about_other_leaves() {
-    for file in scenario_files() {
+    for file in resting_files() {
         let doubts = settle(&read(&file, ""), 1e-4).doubts;
         assert!(doubts.is_empty(), "{}: {doubts:?}", file.display());
     }

@@ -46,7 +46,7 @@ fn ends_as_documented(file: &Path, tolerance: f64, (modes, mode_shapes): (usize,
 
 #[test]
 fn every_scenario_ends_as_documented_at_every_tolerance() {
-    let files = scenario_files();
+    let files = resting_files();
     let tolerances: Vec<f64> = (1..=10).map(|k| 0.1_f64.powi(k)).collect();
     let all: Vec<_> = (files
         .iter()

@@ -60,6 +60,13 @@ pub fn scenario_files() -> Vec<PathBuf> {
     all
 }
 
+/// Those of leaves that come to rest: not in wind, in which `relax` only releases them.
+pub fn resting_files() -> Vec<PathBuf> {
+    let mut all = scenario_files();
+    all.retain(|file| read(file, "").wind.is_none());
+    all
+}
+
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
 pub fn path(name: &str) -> PathBuf {
     root().join("scenarios").join(format!("{name}.toml"))

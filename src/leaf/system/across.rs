@@ -43,7 +43,7 @@ impl System {
     }
 
     /// Adds a moment and a force to the right-hand side of node `i` (from 1) of rod `j`.
-    pub(in crate::leaf) fn add_load(&mut self, j: usize, i: usize, [moment, force]: [DVec3; 2]) {
+    pub fn add_load(&mut self, j: usize, i: usize, [moment, force]: [DVec3; 2]) {
         let (group, lane) = group_and_lane(j);
         let rhs = &mut self.groups[group].rhs[i - 1];
         for c in 0..3 {

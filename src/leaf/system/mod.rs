@@ -212,6 +212,18 @@ impl System {
         }
     }
 
+    /// Adds `stiffness` to the matrix between the displacements of nodes `i` (from 1) and `i` + 1 of
+    /// rod `j`.
+    pub fn hold_together(&mut self, j: usize, i: usize, stiffness: DMat3) {
+        let (group, lane) = group_and_lane(j);
+        let chain = &mut self.groups[group].matrix;
+        for c in 0..3 {
+            for r in 0..3 {
+                chain.off(i - 1, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+            }
+        }
+    }
+
     /// The right-hand side of node `i` (from 1) of rod `j`: moment and force on it; at a joint
     /// tip the rod's share.
     pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {

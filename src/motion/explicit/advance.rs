@@ -1,6 +1,7 @@
 //! Motion to a given time, snapshots, and saved states.
 
 use super::Explicit;
+use super::applied::Applied;
 use super::kernel::Forces;
 use super::packs::{Pack, vector};
 use crate::leaf::State;
@@ -92,6 +93,7 @@ impl Method for Explicit {
     fn snapshot(&mut self) -> Snapshot {
         let packs = self.packs.iter();
         let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
+        let past = self.applied.as_ref().map(Applied::past);
         let path = (self.positions.clone(), moving);
         let (time, widths, work) = (self.stepped, self.widths, self.work);
         let mut exchange = Exchange::default();
@@ -109,6 +111,9 @@ impl Method for Explicit {
         self.positions = path.0;
         for (pack, moving) in self.packs.iter_mut().zip(path.1) {
             (pack.motion, pack.past) = moving;
+        }
+        if let (Some(applied), Some(past)) = (&mut self.applied, past) {
+            applied.set_past(past);
         }
         (self.stepped, self.widths, self.work) = (time, widths, work);
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
@@ -128,6 +133,9 @@ impl Method for Explicit {
         pass_count(&mut self.begin.1, each);
         self.widths.iter_mut().for_each(&mut *each);
         self.work.each_number(each);
+        if let Some(applied) = &mut self.applied {
+            applied.each_number(each);
+        }
         self.balance.each_number(each);
         let moving = self.packs.iter_mut().flat_map(Pack::moving_arrays);
         let arrays = self.positions.iter_mut().chain(moving);

@@ -121,7 +121,7 @@ impl Explicit {
             next: positions.clone(),
             positions,
             layout,
-            applied: (leaf.tied() || leaf.loads.own != 0.0).then(|| Applied::new(&leaf, layout)),
+            applied: Applied::new(&leaf, &physics, layout),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_weight: (0..count).map(tip_weight).sum(),
@@ -249,7 +249,14 @@ impl Explicit {
         let last = self.leaf.segments();
         let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
         if let Some(applied) = &mut self.applied {
-            applied.update(&self.leaf, (self.layout, &self.positions), &self.packs);
+            let [last, before] = self.widths;
+            let ahead = if last > 0.0 {
+                last / (last + before)
+            } else {
+                0.0
+            };
+            let air = (self.physics.mean_air([from, to]), ahead);
+            applied.update(&self.leaf, (self.layout, &self.positions), &self.packs, air);
         }
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
@@ -282,6 +289,9 @@ impl Explicit {
             }
         }
         work += 0.5 * length * (before_kick + self.power(&loads));
+        if let Some(applied) = &self.applied {
+            work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
+        }
         if loads.tip_moment != DVec3::ZERO {
             let momentum = 0.5 * (before.1 + self.moving(0, last).1);
             let spin = self.packs[0].spin(self.layout.place(0, last).1, rotation, momentum);

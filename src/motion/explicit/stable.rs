@@ -15,10 +15,18 @@
 //! ```
 //!
 //! with roots inside the unit circle while a + 4 b < 4; external damping
-//! does not change that.
+//! does not change that. The drag of wind, with velocities extrapolated from those of the last two
+//! half steps, at which they decay at the rate lambda, gives
+//!
+//! ```text
+//! z^3 + (a + 3 b/2 - 2) z^2 + (1 - 2 b) z + b/2 = 0,   b = h lambda
+//! ```
+//!
+//! and the same bound.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::motion::physics::Physics;
+use crate::motion::wind::Wind;
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;
 use std::array::from_fn;
@@ -45,12 +53,19 @@ impl StableStep {
             };
         }
         let coupling = coupling + tissue;
-        let (friction, all) = (physics.retardation * strains, strains + coupling);
-        if friction * friction > all {
-            limit = "internal damping";
+        let all = strains + coupling;
+        let friction = physics.retardation * strains;
+        let drag = Wind::new(leaf, physics).map_or(0.0, |wind| wind.fastest_decay(leaf, physics));
+        let damping = friction + drag;
+        if damping * damping > all {
+            limit = if drag > friction {
+                "the drag of the wind"
+            } else {
+                "internal damping"
+            };
         }
         StableStep {
-            step: 2.0 / (friction + (friction * friction + all).sqrt()),
+            step: 2.0 / (damping + (damping * damping + all).sqrt()),
             limit,
         }
     }

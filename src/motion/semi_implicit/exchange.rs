@@ -42,7 +42,7 @@ impl SemiImplicit {
     fn exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
-            work: self.work_of_changes(h),
+            work: self.work_of_changes(h) + self.work_of_wind(h),
         };
         if self.physics.retardation > 0.0 {
             let power = self.power_of_friction(h);

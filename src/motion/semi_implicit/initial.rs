@@ -70,6 +70,7 @@ impl SemiImplicit {
         self.trial.clone_from(&self.state);
         for _ in 0..ITERATIONS {
             self.leaf.assemble(&self.trial, &mut self.system);
+            self.add_drag(0.0, 0.0);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
             let (inertia, per_mass) = (&self.inertia, INVERSE_STEP_SQUARED);
             let inertial = |k: usize, tensor: &DMat3| {
@@ -92,6 +93,8 @@ impl SemiImplicit {
 
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
+        self.trial.clone_from(&self.state);
+        self.add_drag(0.0, 0.0);
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);

@@ -16,6 +16,7 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
+mod drag;
 mod exchange;
 mod initial;
 mod step;
@@ -23,6 +24,7 @@ mod step;
 use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Method, Snapshot, Stopped, Velocity, pass_count};
 use super::physics::{Inertia, Physics};
+use super::wind::Wind;
 use crate::leaf::{DirectSolver, DiscreteLeaf, Loads, State, System};
 use crate::newton::Definite;
 use crate::rod::Section;
@@ -116,6 +118,7 @@ pub struct SemiImplicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     inertia: Vec<Inertia>,
+    wind: Option<Wind>,
     /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
     /// Strains (v, u) of all segments at the last step and the one before.
@@ -149,6 +152,7 @@ impl SemiImplicit {
         let nodes = leaf.each(0..=leaf.segments());
         let mut motion = SemiImplicit {
             inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
+            wind: Wind::new(&leaf, &physics),
             sections: leaf.sections.clone(),
             past: [Vec::new(), Vec::new()],
             past_step: 0.0,

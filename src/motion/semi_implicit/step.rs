@@ -106,6 +106,7 @@ impl SemiImplicit {
         for _ in 0..ITERATIONS {
             self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
+            self.add_drag(self.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_moving, &self.inertia);
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];

@@ -122,7 +122,9 @@ impl NestedEquilibrium {
     ) -> Self {
         let most = problem.corrections();
         let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
+        // The defect is that of dead loads.
         let columns = match self.table.best() {
+            _ if problem.leaf.in_wind() => None,
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
             None => (problem.may_be_alone() && self.history.pushes == 0).then_some(0),

@@ -145,6 +145,19 @@ pub enum RelaxError {
         /// The method or the question.
         what: &'static str,
     },
+    /// Wind, which this method or question does not take into account.
+    #[error(
+        "[wind]: {what} does not take wind into account: simulate does, and relax --path release in a steady one; leave it out"
+    )]
+    Wind {
+        /// The method or the question.
+        what: &'static str,
+    },
+    /// Wind that changes, in which nothing rests.
+    #[error(
+        "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
+    )]
+    ChangingWind,
 }
 
 /// Refuses scenarios with grips for what does not take them into account.
@@ -153,4 +166,38 @@ pub fn without_grips(scenario: &Scenario, what: &'static str) -> Result<(), Rela
         true => Ok(()),
         false => Err(RelaxError::Grips { what }),
     }
+}
+
+/// Refuses scenarios with wind for what does not take it into account.
+pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
+    match scenario.wind {
+        None => Ok(()),
+        Some(_) => Err(RelaxError::Wind { what }),
+    }
+}
+
+/// Refuses a leaf in wind unless it is released, to move to rest by the semi-implicit method.
+pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), RelaxError> {
+    let Some(wind) = &scenario.wind else {
+        return Ok(());
+    };
+    let what = match options.method {
+        Method::SemiImplicit(how) if how.keep_unstable => {
+            "the search for an equilibrium of any index"
+        }
+        Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
+        Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
+        Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
+        Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
+            return Err(RelaxError::ChangingWind);
+        }
+        Method::SemiImplicit(_) if scenario.tip_moment != [0.0; 3] => {
+            "a leaf under load.tip_moment"
+        }
+        Method::SemiImplicit(_) if !scenario.grips.is_empty() => "a leaf held by [[grip]]",
+        Method::SemiImplicit(_) => return Ok(()),
+        Method::Explicit { .. } => "explicit relaxation",
+        _ => "shooting",
+    };
+    Err(RelaxError::Wind { what })
 }

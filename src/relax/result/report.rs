@@ -52,7 +52,8 @@ pub fn equilibrium(
         remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
-        energy: Some(energy * scale.moment()),
+        // Wind has no potential.
+        energy: (!problem.leaf.in_wind()).then_some(energy * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: reaction(&found.levels, columns),
@@ -84,7 +85,8 @@ pub fn equilibrium(
             tolerance: problem.tolerance,
             residual: Some(finest.leaf.residual(&finest.state)),
             error_estimate,
-            energy_error: energy_error.map(|error| error * scale.moment()),
+            energy_error: (energy_error.filter(|_| !problem.leaf.in_wind()))
+                .map(|error| error * scale.moment()),
         },
         work: found.work,
         wall_seconds,
@@ -225,6 +227,8 @@ pub fn outcome(
                 _ => Outcome::Converged,
             },
             found.index.is_none().then(|| match problem.leaf.loads.tip_moment == DVec3::ZERO {
+                _ if problem.leaf.in_wind() => "wind has no potential: energy and eigenvalues are not stated; the leaf rests where its damped motion \
+                     came to rest, and is stable as that motion is".into(),
                 true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
                      its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),

@@ -11,7 +11,7 @@ use crate::relax::saddle;
 use crate::relax::saddle::saddle_of;
 use crate::relax::settle::effort::{BUDGET, Effort};
 use crate::relax::settle::grip::move_grips;
-use crate::relax::settle::methods::{FAR_FROM_REST, Relaxation, explicit, moment};
+use crate::relax::settle::methods::{FAR_FROM_REST, Relaxation, explicit, moment, wind};
 use crate::relax::settle::start::{disturb, start};
 use crate::relax::transfer::level::Level;
 use glam::DVec3;
@@ -108,7 +108,11 @@ fn settle_upright(
     }
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     let dead_moment = leaf.tip_moment() != DVec3::ZERO;
-    if !explicit && !dead_moment && !problem.keeps_unstable() {
+    let windy = leaf.leaf.in_wind();
+    // What was held without wind is not at rest in it; two grids must lead to the same place.
+    near_rest &= !(windy && from_start);
+    moved |= windy && from_start;
+    if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
         let how = (near_rest, cg_tolerance);
         effort.spare_system = None;
         let mut system = System::new(&leaf);
@@ -135,6 +139,7 @@ fn settle_upright(
         ..Relaxation::new(state, accuracy, out, &problem.options.limit)
     };
     let rest = match (explicit, dead_moment) {
+        _ if windy => wind::settle(&mut leaf, &mut system, &mut relaxation),
         (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
         (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
         // To the next equilibrium, stable or not.
@@ -149,7 +154,7 @@ fn settle_upright(
         }
     };
     let Relaxation { state, moved, .. } = relaxation;
-    if explicit {
+    if explicit || windy {
         history.remaining = history.remaining.max(rest.unwrap_or(0.0));
     }
     let level = Level { leaf, state };

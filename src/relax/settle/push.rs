@@ -9,7 +9,6 @@ use crate::relax::saddle::saddle_of;
 use crate::relax::settle::effort::Effort;
 use crate::relax::settle::iteration::{InitialGuess, MAX_SADDLES, Settled, settle};
 use crate::relax::transfer::level::{Level, complete};
-use glam::DVec3;
 
 /// What is known of the stability on one grid.
 struct Count {
@@ -66,7 +65,7 @@ pub fn check_stability(
     effort: &mut Effort,
 ) -> Result<(NestedEquilibrium, bool), Box<Failure>> {
     let level = found.levels.last().expect("the leaf has settled");
-    if level.leaf.tip_moment() != DVec3::ZERO {
+    if !level.leaf.leaf.has_potential() {
         return Ok((found, true));
     }
     let compared = !last && found.levels.len() == 1 && problem.segments().is_none();

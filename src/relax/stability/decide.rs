@@ -12,7 +12,6 @@ use crate::relax::settle::effort::Effort;
 use crate::relax::stability::eigenvalues;
 use crate::relax::stability::eigenvalues::{List, Lowest, deciding_grid, small_grid};
 use crate::relax::transfer::level::Level;
-use glam::DVec3;
 
 /// What is known of the Morse index.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,8 +161,8 @@ fn next(problem: &Problem, found: &NestedEquilibrium, may_refine: bool, work: &m
     let Some(level) = found.levels.last() else {
         return Next::Nothing;
     };
-    // A single grid allows no comparison; a dead moment has no potential.
-    let comparable = problem.segments().is_none() && level.leaf.tip_moment() == DVec3::ZERO;
+    // A single grid allows no comparison; without a potential there is nothing to compare.
+    let comparable = problem.segments().is_none() && level.leaf.leaf.has_potential();
     match found.index {
         Some(0) if comparable && !found.clearly_stable => Next::Compute(List {
             count: requested.count.max(1),

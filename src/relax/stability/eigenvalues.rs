@@ -15,7 +15,6 @@ use crate::relax::result::equilibrium::Mode;
 use crate::relax::stability::eigenvalue_bars::{Extrapolated, GRIDS, Series};
 use crate::relax::transfer::level::Level;
 use crate::relax::transfer::stencil::Stencil;
-use glam::DVec3;
 use shapes::{Shape, normalized};
 use std::borrow::Cow;
 
@@ -117,7 +116,7 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
     let options = problem.options;
     let finest = found.levels.last()?;
     let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !list.decides;
-    if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
+    if count == 0 || !finest.leaf.leaf.has_potential() || large {
         return None;
     }
     let physics = Physics::new(problem.leaf);

@@ -14,7 +14,6 @@ use crate::relax::transfer::level::{Level, positions};
 use crate::relax::transfer::prolong::prolong;
 use crate::scenario::Scenario;
 use crate::shape::{NodeState, RodShape};
-use glam::DVec3;
 
 /// The finest grid on which an equilibrium is looked for first.
 const FINEST: usize = 1024;
@@ -36,7 +35,7 @@ const SAFETY: f64 = 10.0;
 /// the equilibrium, or if an eigenvalue may have either sign.
 pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape], error: f64) -> Option<usize> {
     let leaf = Leaf::new(scenario);
-    if leaf.loads.tip_moment != DVec3::ZERO {
+    if !leaf.has_potential() {
         return None;
     }
     let options = Options {

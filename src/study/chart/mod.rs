@@ -22,7 +22,7 @@ pub use result::{Chart, Decade, Ending, Row};
 pub use scaling::{Scaling, ScalingRow, scaling};
 pub use timing::{Spread, Turn};
 
-use crate::relax::RelaxError;
+use crate::relax::{RelaxError, without_wind};
 use crate::scenario::{Scenario, longest};
 
 /// Options of a chart.
@@ -70,6 +70,7 @@ pub fn chart(
     options: &ChartOptions,
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> Result<Chart, ChartError> {
+    without_wind(scenario, "a chart")?;
     let each = |&who: &Contender| {
         let knobs = who.knobs().into_iter();
         knobs.map(move |knob| Runs::new(scenario, who, knob))

@@ -10,7 +10,7 @@ use super::motion;
 use super::row::{MapMethod, MapRow};
 use crate::limit::Limit;
 use crate::memory::{self, TooMuch};
-use crate::relax::check_tolerance;
+use crate::relax::{RelaxError, check_tolerance, without_wind};
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
 /// Largest number of cells of a map.
@@ -48,6 +48,9 @@ pub enum MapRefused {
     /// A number cannot vary.
     #[error("{0}")]
     Vary(#[from] VaryError),
+    /// The leaf has what no method of a map takes into account.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
     /// The axes or the methods do not make a map, or one that is too large.
     #[error("{0}")]
     Map(String),
@@ -63,6 +66,7 @@ impl MapRequest {
         tolerance: Option<f64>,
         cell_seconds: f64,
     ) -> Result<Self, MapRefused> {
+        without_wind(base.scenario(), "a map")?;
         let refuse = |why: String| Err(MapRefused::Map(why));
         if !(1..=2).contains(&axes.len()) {
             return refuse(format!("{} axes: a map has one or two axes", axes.len()));

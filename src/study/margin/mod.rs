@@ -16,7 +16,7 @@ use crate::limit::Limit;
 use crate::memory;
 use crate::relax::{
     Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, relax_on_grids,
-    without_grips,
+    without_grips, without_wind,
 };
 use crate::scenario::Scenario;
 
@@ -89,6 +89,7 @@ pub fn relax_with_margin(
         return Err(MarginError::Moment);
     }
     without_grips(scenario, "the margin")?;
+    without_wind(scenario, "the margin")?;
     let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;

@@ -11,8 +11,7 @@ pub(super) use run::traced;
 
 use super::vary::{Base, Vary};
 use crate::refusal::RefusedOption;
-use crate::relax::RelaxError;
-use crate::relax::without_grips;
+use crate::relax::{RelaxError, without_grips, without_wind};
 use crate::scenario::Key;
 use crate::study::{Target, VaryError};
 
@@ -64,6 +63,7 @@ impl TraceRequest {
     /// Validates the request before it is run.
     pub(super) fn check(&self) -> Result<(), TraceError> {
         without_grips(self.base.scenario(), "following a branch")?;
+        without_wind(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
         if keys.is_whole() {

@@ -4,6 +4,7 @@ mod damped_motion;
 pub mod explicit;
 pub mod moment;
 pub mod semi_implicit;
+pub mod wind;
 
 pub use crate::relax::settle::methods::semi_implicit::softens;
 
