@@ -87,8 +87,8 @@ fn of_a_leaf_with_tissue() {
     leaf.coupling = vec![[0.0; 3]; 2];
     leaf.tissue = Some(vec![
         Tissue {
-            stiffness: [20.0, 40.0, 30.0],
-            fold: 0.5,
+            stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
+            fold: Profile::Constant(0.5),
         };
         2
     ]);
