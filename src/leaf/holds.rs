@@ -94,7 +94,7 @@ impl DiscreteLeaf {
     }
 
     /// Moment and force on a node by its segments, loads and neighbours.
-    fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+    pub(super) fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
         let n = self.segments();
         let gradient = |i: usize| {
             let segment = self.segment(state, j, i, state.n[j * n + i]);

@@ -3,7 +3,6 @@
 use super::{Base, Keys, VaryError};
 use crate::relax::{
     Equilibrium, Options, Parameter, Progress, RelaxError, relax_on_grids, sensitivities,
-    without_grips,
 };
 
 /// Why there are no derivatives.
@@ -33,7 +32,6 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    without_grips(scenario, "a derivative")?;
     let values = keys.iter().map(|keys| Ok((keys, base.value(keys)?)));
     let values = values.collect::<Result<Vec<(&Keys, f64)>, VaryError>>()?;
     let numbers: Vec<(String, Parameter)> = (values.chunks(1).zip(keys))

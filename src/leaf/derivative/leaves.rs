@@ -23,6 +23,14 @@ pub(in crate::leaf::derivative) fn leaves(
 }
 
 impl DiscreteLeaf {
+    /// The weighted leaves of a rate on this grid.
+    pub(in crate::leaf::derivative) fn each_of(&self, rate: &LeafRate) -> Vec<(f64, DiscreteLeaf)> {
+        let leaves = rate.leaves.iter();
+        leaves
+            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
+            .collect()
+    }
+
     /// The change of the loads that rod `j` has of its own on its node `i`.
     pub(in crate::leaf::derivative) fn own_load_rate(
         &self,
@@ -68,21 +76,18 @@ impl DiscreteLeaf {
     }
 
     /// Adds the effect of the changes of the tissue, and of its natural state, and of loads of
-    /// single veins.
+    /// single veins: from the weighted leaves of which they are the sum.
     pub(in crate::leaf::derivative) fn add_tissue_changes(
         &self,
         state: &State,
-        rate: &LeafRate,
+        each: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
         let n = self.segments();
-        let each: Vec<_> = (rate.leaves.iter())
-            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
-            .collect();
         let Some((_, first)) = each.first() else {
             return;
         };
-        self.add_own_load_changes(state, &each, forces);
+        self.add_own_load_changes(state, each, forces);
         let (first, each): (_, Vec<_>) = (
             &first.strips,
             each.iter().map(|(w, leaf)| (w, &leaf.strips)).collect(),

@@ -26,8 +26,8 @@ pub struct LeafRate<'s> {
     tip_force: DVec3,
     tip_moment: DVec3,
     held: Option<HeldRate>,
-    /// The leaves that differ in the number, with their weights, if they have tissue or loads of
-    /// single veins.
+    /// The leaves that differ in the number, with their weights, if they have tissue, loads of
+    /// single veins, or grips.
     leaves: Vec<(f64, Leaf)>,
 }
 
@@ -114,7 +114,11 @@ impl<'s> LeafRate<'s> {
             tip_force: vector(|s| s.tip_force, scale.force()),
             tip_moment: vector(|s| s.tip_moment, scale.moment()),
             held: HeldRate::new(leaf, terms),
-            leaves: match leaf.has_tissue() || terms.iter().any(|(_, s)| s.has_own_loads()) {
+            leaves: match leaf.has_tissue()
+                || terms
+                    .iter()
+                    .any(|(_, s)| s.has_own_loads() || !s.grips.is_empty())
+            {
                 true => leaves(leaf, terms),
                 false => Vec::new(),
             },
@@ -187,10 +191,10 @@ impl DiscreteLeaf {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
-        self.add_tissue_changes(state, rate, &mut forces);
-        if let Some(held) = &rate.held {
-            self.add_tip_motion(state, segments, held, &mut forces);
-        }
+        let each = self.each_of(rate);
+        self.add_tissue_changes(state, &each, &mut forces);
+        let motion = self.held_motion(rate, &each);
+        self.add_held_motion(state, segments, motion, &mut forces);
         forces
     }
 

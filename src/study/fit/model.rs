@@ -125,7 +125,7 @@ impl<'a> Model<'a> {
             options: options.clone(),
             cases: Arc::new(cases),
             grids: Grids::AsNeeded,
-            linear: is_linear(coordinates) && base.scenario().tissue.is_none(),
+            linear: is_linear(coordinates) && !base.scenario().depends_on_natural_leaf(),
             changes: Arc::default(),
         })
     }
