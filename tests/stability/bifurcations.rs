@@ -172,7 +172,7 @@ const HANGING: [(f64, f64); 2] = [(6.0, 11.868750740620), (2.0 * PI, 12.18707875
 const MIDRIB: &str = "2500 1000 0.93780575743\n 1e5 4e4 0.92789056742";
 
 /// Euler's loads P_E of columns that are clamped at the base and held at the tip, as the
-/// grip's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
+/// holder's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
 const HELD: [(&str, f64); 2] = [
     ("clamped", 39.47841760435743),
     ("pinned", 20.19072855642663),
@@ -209,6 +209,18 @@ fn others() -> Vec<Case> {
             vary: ("tip.position[0]", 1.0, 1.0 - 1.4 * travel),
             critical: vec![(1.0 - travel, 1)],
             within: 1e-10,
+        });
+        // In the middle of a vein twice as long, the rest of which bears nothing.
+        let grip = format!("grip = [{{ vein = 1, at = 0.5, held = \"{how}\" }}]");
+        cases.push(Case {
+            text: format!("{ROD}\n{grip}"),
+            entries: format!(
+                "{}; stiffness.bending_2=3; leaf.length=2",
+                set_stiffness(1e3, f64::INFINITY)
+            ),
+            vary: ("grip[0].move[0]", 0.0, -1.4 * travel),
+            critical: vec![(-travel, 1)],
+            within: 1e-9,
         });
     }
     cases

@@ -3,16 +3,17 @@
 mod law;
 mod result;
 mod run;
+mod show;
 
 pub use law::Law;
-pub use result::{PointKind, Trace, TraceBranch, TracePoint, TraceShow};
+pub use result::{PointKind, Trace, TraceBranch, TracePoint};
 pub use run::trace;
 pub(super) use run::traced;
+pub use show::TraceShow;
 
 use super::vary::{Base, Vary};
 use crate::refusal::RefusedOption;
 use crate::relax::RelaxError;
-use crate::relax::without_grips;
 use crate::scenario::Key;
 use crate::study::{Target, VaryError};
 
@@ -63,7 +64,6 @@ pub enum TraceError {
 impl TraceRequest {
     /// Validates the request before it is run.
     pub(super) fn check(&self) -> Result<(), TraceError> {
-        without_grips(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
         if keys.is_whole() {
