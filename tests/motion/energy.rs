@@ -120,6 +120,7 @@ fn when_shaken(name: &str, leaf: Scenario, change: impl Fn(&mut Dynamics)) {
 fn of_what_is_shaken() {
     when_shaken("rod", twisted_rod(), |_| {});
     when_shaken("leaf", three_veins(), |_| {});
+    when_shaken("gripped leaf", gripped_veins(), |_| {});
     when_shaken("curling rod", twisted_rod(), |dynamics| {
         dynamics.rest = curling(4.0);
         dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);

@@ -220,7 +220,7 @@ fn others() -> Vec<Case> {
             ),
             vary: ("grip[0].move[0]", 0.0, -1.4 * travel),
             critical: vec![(-travel, 1)],
-            within: 1e-9,
+            within: 1e-7,
         });
     }
     cases
