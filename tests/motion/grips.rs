@@ -32,7 +32,7 @@ fn a_clamp_in_the_middle_divides_a_motion() {
         let beyond = shaken(scheme, 1.0, 8, "");
         let tip = "tip = { held = \"clamped\", position = [1.0, 0.0, 0.0] }";
         let before = shaken(scheme, 1.0, 8, tip);
-        assert!(beyond[8].z < -0.1, "{:?}", beyond[8]);
+        assert!(beyond[8].distance(DVec3::X) > 0.03, "{:?}", beyond[8]);
         for i in 0..=8 {
             let off = whole[i].distance(before[i]);
             assert!(off < 1e-9, "{scheme:?}, before, {i}: {off:e}");

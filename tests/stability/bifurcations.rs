@@ -210,10 +210,18 @@ fn others() -> Vec<Case> {
             critical: vec![(1.0 - travel, 1)],
             within: 1e-10,
         });
-        // In the middle of a vein twice as long, the rest of which bears nothing.
-        let grip = format!("grip = [{{ vein = 1, at = 0.5, held = \"{how}\" }}]");
-        cases.push(Case {
-            text: format!("{ROD}\n{grip}"),
+    }
+    cases
+}
+
+/// A grip in the middle of a vein, beyond which nothing bears, presses it as a holder of its tip
+/// does.
+#[test]
+fn a_vein_buckles_before_its_grip() {
+    for (how, load) in HELD {
+        let travel = 0.5 * (1.0 - (1.0 - 4e-3 * load).sqrt());
+        let case = Case {
+            text: format!("{ROD}\ngrip = [{{ vein = 1, at = 0.5, held = \"{how}\" }}]"),
             entries: format!(
                 "{}; stiffness.bending_2=3; leaf.length=2",
                 set_stiffness(1e3, f64::INFINITY)
@@ -221,9 +229,10 @@ fn others() -> Vec<Case> {
             vary: ("grip[0].move[0]", 0.0, -1.4 * travel),
             critical: vec![(-travel, 1)],
             within: 1e-7,
-        });
+        };
+        case.is_followed();
+        case.is_relaxed();
     }
-    cases
 }
 
 #[test]
