@@ -10,7 +10,7 @@ fn shaken(scheme: Scheme, length: f64, segments: usize, grip: &str) -> Vec<DVec3
         r#"
         {ROD}
         {grip}
-        dynamics = {{ density = 1.0, rotary_inertia = 0.01, duration = 1.5, start = "released" }}
+        dynamics = {{ density = 1.0, rotary_inertia = 0.01, external_damping = 0.5, duration = 1.5, start = "released" }}
         "#
     );
     let gravity = "dynamics.gravity={ at = [0.0, 0.4, 1.5], value = [[0.0, 0.0, 0.0], [0.5, 1.0, -3.0], [0.0, -1.0, 2.0]] }";
