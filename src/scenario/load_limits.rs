@@ -6,7 +6,7 @@ use super::bounds::{
 use super::entries::Entries;
 use super::error::Result;
 use super::key::Key;
-use super::{Profile, Scale, Scenario, longest};
+use super::{Profile, Rod, Scale, Scenario, longest};
 
 /// A thousandth of the digits of positions is lost.
 const BASE: Limit = most("|base|/L", 1e3, FAR);
@@ -56,6 +56,15 @@ fn tissue(entries: &Entries, scenario: &Scenario) -> Result<()> {
         .flatten()
         .zip(scenario.rods.windows(2));
     for (gap, (tissue, rods)) in gaps.enumerate() {
+        // The ends of a blade may be far narrower than the rest.
+        let middle = scenario.blade.is_some();
+        let softest = |rod: &Rod| match middle {
+            true => Scale {
+                length: rod.length,
+                stiffness: (rod.couple_stiffness[1].at(0.5)).min(rod.couple_stiffness[2].at(0.5)),
+            },
+            false => softest(rod),
+        };
         let [one, other] = [softest(&rods[0]), softest(&rods[1])];
         let both = Scale {
             length: one.length.max(other.length),
@@ -63,7 +72,10 @@ fn tissue(entries: &Entries, scenario: &Scenario) -> Result<()> {
         };
         for (key, profile) in Key::TISSUE.into_iter().zip(tissue.profiles()) {
             let blade = || entries.given(Key::BladeThickness);
-            let stiffness = profile.max_abs();
+            let stiffness = match middle {
+                true => profile.at(0.5),
+                false => profile.max_abs(),
+            };
             if let Some(item) = entries.given(key).or_else(blade) {
                 let limit = if key == Key::TissueFold {
                     &FOLD
