@@ -3,12 +3,18 @@
     python benches/peers/turns.py scenarios/paper/fig04.toml --rods 5,21,35 --leafdyn target/release/leafdyn
 
 In every round each program runs once, and after it leafdyn with every tolerance for a second, so that whatever else the
-machine does meets both. Their settings are those of PEERS. Prints a table in Markdown: the medians over the rounds, and the
+machine does meets both. Their settings are those of PEERS, or of --peer:
+
+    python benches/peers/turns.py scenarios/study/plate.toml --rods 5 --peer 'exudyn --segments 40 --load-steps 5'
+
+Prints a table in Markdown: the medians over the rounds, and the
 ratio to leafdyn's loosest tolerance whose true error is at most as large. Times are those of the solutions alone.
 """
 import argparse
 import csv
+import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -39,14 +45,17 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def measure(scenario, rods, leafdyn, rounds, folder):
-    """Seconds of every round and the true error, by program and setting, and by leafdyn's tolerance."""
+def measure(scenario, rods, leafdyn, rounds, peers, folder):
+    """Seconds of every round and the true error, relative to the longest rod, by program and setting, and by leafdyn's tolerance."""
     leaf = [scenario, "--set", f"leaf.rods={rods}"]
     rest, chart, table = folder / "rest", folder / "chart", folder / "peers.csv"
     run([leafdyn, "relax", *leaf, "--tolerance", "1e-12", "--write", "json", "--out", rest])
+    given = json.loads((rest / "summary.json").read_text(encoding="utf-8"))["input"]
+    length = given.get("blade", given["leaf"])["length"]
+    longest = max(length) if isinstance(length, list) else length
     theirs, ours = {}, {}
     for _ in range(rounds):
-        for program, settings, most in PEERS:
+        for program, settings, most in peers:
             if rods > most:
                 continue
             table.unlink(missing_ok=True)
@@ -55,7 +64,7 @@ def measure(scenario, rods, leafdyn, rounds, folder):
             [row] = rows(table)
             if row["outcome"] not in ("converged", "at-rest"):
                 continue
-            theirs.setdefault((program, row["knob"]), []).append((float(row["seconds"]), float(row["error"])))
+            theirs.setdefault((program, row["knob"]), []).append((float(row["seconds"]), float(row["error"]) / longest))
             run([leafdyn, "chart", *leaf, "--methods", "semi-implicit", "--seconds", "1", "--write", "csv", "--out", chart])
             for row in rows(chart / "chart.csv"):
                 ours.setdefault(row["knob"], []).append((float(row["seconds"]), float(row["true_error"])))
@@ -73,12 +82,15 @@ def main():
     parser.add_argument("--rods", default="5,21,35", help="numbers of veins")
     parser.add_argument("--leafdyn", default="target/release/leafdyn", help="the program")
     parser.add_argument("--rounds", type=int, default=3)
+    help_peer = "a program and its settings, in place of PEERS; may be repeated"
+    parser.add_argument("--peer", metavar="TEXT", action="append", help=help_peer)
     asked = parser.parse_args()
+    peers = [(program, settings, float("inf")) for program, *settings in map(shlex.split, asked.peer or [])] or PEERS
     print("| N | other program | setting | true error | time | default | true error | time | ratio |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for rods in map(int, asked.rods.split(",")):
         with tempfile.TemporaryDirectory() as folder:
-            theirs, ours = measure(asked.scenario, rods, asked.leafdyn, asked.rounds, Path(folder))
+            theirs, ours = measure(asked.scenario, rods, asked.leafdyn, asked.rounds, peers, Path(folder))
         for (program, knob), runs in theirs.items():
             seconds, error = middle(runs)
             as_good = [(*middle(runs), knob) for knob, runs in ours.items() if middle(runs)[1] <= error]
