@@ -48,6 +48,8 @@ done
 
 # docs/undulation.md
 leafdyn relax scenarios/paper/fig08.toml --set leaf.rods=5 --set 'load.gravity=[0,0,0]' --segments 320 --keep-unstable
+leafdyn trace scenarios/study/saddle.toml --tolerance 1e-3 --vary blade.thickness=0.0389..0.038 --set leaf.rods=17 \
+  --set 'rest.stretch=[1.0088581,1.006782,1.0049827,1.0034602,1.0022145,1.0012457,1.0005536,1.0001384,1.0,1.0001384,1.0005536,1.0012457,1.0022145,1.0034602,1.0049827,1.006782,1.0088581]'
 K='stiffness.bending_2[0]+stiffness.bending_2[1]+stiffness.bending_2[2]+stiffness.bending_2[3]+stiffness.bending_2[4]'
 K="$K+stiffness.bending_2[6]+stiffness.bending_2[7]+stiffness.bending_2[8]+stiffness.bending_2[9]+stiffness.bending_2[10]"
 leafdyn map scenarios/study/undulation.toml --tolerance 1e-4 --methods semi-implicit --show waves --out out/undulation-map \

@@ -8,6 +8,12 @@ the reference. The base is clamped by a generic joint, joined tips by spherical 
 Cartesian spring-dampers between the nodes of neighbours, weight is forces on the nodes. An element's
 stiffness is that in its middle.
 
+Tissue is the same beam, laid across: one between every two neighbouring nodes, undeformed in the reference, too. Of a
+gap of the width w and of the part ds of the leaf its stiffnesses are w ds times `along`, `across` and `normal`
+against forces and w ds times `fold` against torsion; in bending it has none. Its strains follow the helix from node
+to node, those of leafdyn's tissue the chord: across the axis of the angle theta between the two veins they differ by
+the factor (theta / 2) / sin(theta / 2), on every mesh.
+
 Newton's method with exudyn's analytical Jacobian and its sparse factorisation; load steps only where
 Newton's method fails, unless --load-steps wants more. The time is that of SolveStatic alone; building the
 model is measured apart.
@@ -49,7 +55,6 @@ class Model:
         self.leaf, self.n = leaf, n
         self.from_arcs = leaf.joined and leaf.rods > 1 and not close_tips
         self.system = exudyn.SystemContainer().AddSystem()
-        self.ground = self.system.AddNode(items.NodePointGround())
         self.weights = np.ones(n + 1)
         self.weights[[0, -1]] = 0.5
         places, directors = leaf.arcs(np.linspace(0.0, 1.0, n + 1))
@@ -59,6 +64,9 @@ class Model:
         for j, stiffness in enumerate((leaf.coupling * leaf.gap).T / n):
             for pair in zip(markers[j][1:-1], markers[j + 1][1:-1]):
                 self.system.AddObject(items.CartesianSpringDamper(markerNumbers=list(pair), stiffness=stiffness))
+        if leaf.tissue.any():
+            for j, stiffness in enumerate((leaf.tissue * leaf.gap).T / n):
+                self.lay_across(self.nodes[j : j + 2, 1:].T, stiffness)
         if leaf.joined and close_tips:
             self.close_tips([rod[-1] for rod in markers])
         elif leaf.joined:
@@ -75,6 +83,7 @@ class Model:
         element = leaf.length[j] / self.n
         frame = np.eye(4)  # of the undeformed rod
         frame[:3, :3] = leaf.base[j].T
+        frame[:3, 3] = leaf.origin[j]
         base = exudyn.HT().Set(rotation=frame[:3, :3])
         nodes, markers = [], []
         for i in range(self.n + 1):
@@ -93,9 +102,19 @@ class Model:
             section = exudyn.BeamSection()
             section.stiffnessMatrix = np.diag([*self.force[j, :, i], *self.couple[j, :, i]])
             system.AddObject(items.Beam3D(nodeNumbers=list(pair), length=element, sectionData=section))
-        clamp = system.AddMarker(items.MarkerNodeRigid(nodeNumber=self.ground, localHT=base))
+        ground = system.AddNode(items.NodePointGround(referenceCoordinates=leaf.origin[j]))
+        clamp = system.AddMarker(items.MarkerNodeRigid(nodeNumber=ground, localHT=base))
         system.AddObject(items.GenericJoint(markerNumbers=[clamp, markers[0]]))
         return nodes, markers
+
+    def lay_across(self, pairs, stiffness):
+        """Beams of tissue between pairs of nodes, from the first above the base to the tips."""
+        for nodes, weight in zip(pairs, self.weights[1:]):
+            places = [self.system.GetNode(int(node))["referenceCoordinates"][:3] for node in nodes]
+            width = np.linalg.norm(places[1] - places[0])
+            section = exudyn.BeamSection()
+            section.stiffnessMatrix = np.diag([*(width * weight * stiffness), 0.0, 0.0])
+            self.system.AddObject(items.Beam3D(nodeNumbers=list(map(int, nodes)), length=width, sectionData=section))
 
     def close_tips(self, tips):
         """Springs from the first tip to the others; the load factor, of which exudyn makes a time, closes them."""
@@ -151,7 +170,7 @@ def coordinates(place, rotation):
 
 def solve(options):
     """Builds and solves, prints what came of it; true if it converged."""
-    leaf = Leaf(load(options.scenario, options.set))
+    leaf = Leaf(load(options.scenario, options.set), tissue=True)
     summary = read_summary(options.compare, leaf)
     began = time.perf_counter()
     model = Model(leaf, options.segments, options.close_tips)
