@@ -96,6 +96,6 @@ fn a_blade() {
     let there = leaf.at_stations(&scenario, Some(10)).stress.unwrap();
     assert_eq!(there.rods[4].len(), 11);
     assert_eq!(there.largest, found.largest);
-    let stiff = settle(&leafdyn_testing::scenario("fig04", ""), 1e-3);
+    let stiff = settle(&leafdyn_testing::scenario("paper/fig04", ""), 1e-3);
     assert_eq!(stiff.stress, None);
 }
