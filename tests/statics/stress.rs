@@ -96,6 +96,17 @@ fn a_blade() {
     let there = leaf.at_stations(&scenario, Some(10)).stress.unwrap();
     assert_eq!(there.rods[4].len(), 11);
     assert_eq!(there.largest, found.largest);
+    // A strip that is twisted as a part of a plate: 3 M/(w t^2).
+    let twisted = text.replace("rods = 5", "rods = 1").replace(
+        "gravity = [0.0, 0.0, -1e-6]",
+        "tip_moment = [1e-3, 0.0, 0.0]",
+    );
+    let twisted = settle(&Scenario::from_toml(&twisted).unwrap(), 1e-8);
+    relative(
+        twisted.stress.unwrap().largest.shear,
+        3e-3 / (0.05 * 4e-6),
+        1e-9,
+    );
     let stiff = settle(&leafdyn_testing::scenario("paper/fig04", ""), 1e-3);
     assert_eq!(stiff.stress, None);
 }
