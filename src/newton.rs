@@ -141,10 +141,9 @@ impl Definite {
             None => DirectSolver::new(system)?,
         };
         let pattern = self.direct.insert(pattern);
-        let mut factor = pattern.factorize(system, shift)?;
-        if factor.negative() > 0 {
+        let Some(mut factor) = pattern.factorize_definite(system, shift)? else {
             return Err(Unsolved::Indefinite);
-        }
+        };
         factor.solve(system, inertia);
         Ok(())
     }

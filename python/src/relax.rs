@@ -180,6 +180,14 @@ pub fn relax_one(
             study::relax_with_margin(&scenario, &options, &mut report_margin)
         })?;
         found.map_err(value_error)?
+    } else if asked.sensitivity.is_empty() && input.blade.is_some() {
+        let base = scenario.base(py)?;
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let name = base.scenario().name.clone();
+            study::relax_blade(&base, &options, &mut reporter(monitor, &name))
+        })?;
+        found.map_err(value_error)?
     } else if asked.sensitivity.is_empty() {
         if let Some(found) = solve_here(py, &input, &asked, &options, progress)? {
             return Ok(Leaf::new(

@@ -13,11 +13,9 @@ impl Factorised {
         if !system.tied() {
             return system.factorize(shift).then_some(Factorised(None));
         }
-        let factors = DirectSolver::new(system)
-            .ok()?
-            .factorize(system, shift)
-            .ok()?;
-        (factors.negative() == 0).then_some(Factorised(Some(factors)))
+        let solver = DirectSolver::new(system).ok()?;
+        let factors = solver.factorize_definite(system, shift).ok()??;
+        Some(Factorised(Some(factors)))
     }
 
     /// Factorises the matrix of a single rod whatever the signs of its pivots; `None` if one of them

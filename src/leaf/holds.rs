@@ -93,8 +93,19 @@ impl DiscreteLeaf {
         reactions
     }
 
+    /// The forces on all holders: on that of held tips, if they are, and on every grip.
+    pub fn forces_on_holders(&self, state: &State) -> Vec<DVec3> {
+        let tips = self.leaf.held.as_ref().map(|_| self.reaction(state).0);
+        let grips = match self.has_grips() {
+            true => self.grip_reactions(state),
+            false => Vec::new(),
+        };
+        let grips = grips.into_iter().map(|[force, _]| force);
+        tips.into_iter().chain(grips).collect()
+    }
+
     /// Moment and force on a node by its segments, loads and neighbours.
-    fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+    pub(super) fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
         let n = self.segments();
         let gradient = |i: usize| {
             let segment = self.segment(state, j, i, state.n[j * n + i]);

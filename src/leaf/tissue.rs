@@ -3,7 +3,7 @@
 
 use super::discrete::DiscreteLeaf;
 use super::loads::NodeLoad;
-use super::state::{State, shift, turn};
+use super::state::{Increment, State, shift, turn};
 use super::system::System;
 use crate::largest::largest;
 use crate::rod::{Ends, Strip};
@@ -172,15 +172,22 @@ impl DiscreteLeaf {
         &self,
         state: &State,
     ) -> impl Iterator<Item = (usize, usize, SMatrix<f64, 12, 12>)> {
-        self.each_strip().map(|(g, i, strip)| {
-            let hessian = strip.hessian(&across(state, g, i));
-            let entry = |r: usize, c: usize| match (r / 6, c / 6) {
-                (0, 1) => hessian.across[r][c - 6],
-                (1, 0) => hessian.across[c][r - 6],
-                (a, _) => hessian.own[a][r.min(c) % 6][r.max(c) % 6],
-            };
-            (g, i, SMatrix::from_fn(entry))
-        })
+        self.each_strip()
+            .map(|(g, i, strip)| (g, i, stiffness(strip, &across(state, g, i))))
+    }
+
+    /// The changes of moment and force of the strip of node `i` in gap `g` on its two nodes, by
+    /// increments of both.
+    pub(super) fn tissue_response(
+        &self,
+        state: &State,
+        (g, i): (usize, usize),
+        increments: &[Increment; 2],
+    ) -> [[DVec3; 2]; 2] {
+        let both = SVector::<f64, 12>::from_fn(|k, _| increments[k / 6][k % 6]);
+        let change = stiffness(self.strip(g, i), &across(state, g, i)) * both;
+        let vector = |first: usize| DVec3::from_slice(&change.as_slice()[first..first + 3]);
+        [0, 6].map(|node| [-vector(node), -vector(node + 3)])
     }
 
     /// The largest stiffness against displacements, that against a fold, and the natural width of
@@ -218,6 +225,16 @@ impl DiscreteLeaf {
         });
         each.sum()
     }
+}
+
+/// The second derivatives of the energy of a strip by the unknowns of both nodes.
+fn stiffness(strip: &Strip, ends: &Ends) -> SMatrix<f64, 12, 12> {
+    let hessian = strip.hessian(ends);
+    SMatrix::from_fn(|r, c| match (r / 6, c / 6) {
+        (0, 1) => hessian.across[r][c - 6],
+        (1, 0) => hessian.across[c][r - 6],
+        (a, _) => hessian.own[a][r.min(c) % 6][r.max(c) % 6],
+    })
 }
 
 /// The two nodes of a strip.

@@ -4,7 +4,7 @@ use super::entries::Entries;
 use super::error::Result;
 use super::item::Item;
 use super::key::Key;
-use super::{Hold, Rod, longest};
+use super::{Hold, Rod, Scenario, longest};
 
 /// Largest way of a grip, in lengths of the longest rod.
 const FARTHEST: f64 = 10.0;
@@ -21,6 +21,14 @@ pub struct Grip {
     pub held: Hold,
     /// The displacement.
     pub displacement: [f64; 3],
+}
+
+impl Scenario {
+    /// Whether tissue, which has no force in the natural leaf, or grips, which hold veins where they
+    /// are in it, make a leaf depend on shapes at rest in another way than by their strains.
+    pub fn depends_on_natural_leaf(&self) -> bool {
+        self.tissue.is_some() || !self.grips.is_empty()
+    }
 }
 
 impl Item<'_> {

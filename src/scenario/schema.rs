@@ -20,8 +20,8 @@ fn table(name: &str) -> Value {
     for key in Key::all().filter(|key| key.parts().0 == name) {
         let (_, within) = key.parts();
         properties.insert(within.into(), entry(key));
-        // Alternatives, such as stiffnesses and sections, are not required here.
-        let alone = matches!(name, "" | "leaf") || key.is_repeated();
+        // Alternatives, such as stiffnesses, sections and blades, are not required here.
+        let alone = matches!(name, "" | "leaf") && !key.follows_from_blade() || key.is_repeated();
         if alone && matches!(key.left_out(), LeftOut::Required(_)) {
             required.push(within);
         }

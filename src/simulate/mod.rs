@@ -101,7 +101,6 @@ impl Simulation {
             let step = RefusedOption::new("step", found, "must be greater than 0");
             return Err(step.into());
         }
-        relax::without_grips(scenario, "motion in time")?;
         let leaf = Leaf::new(scenario);
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         relax::check_tolerance(tolerance)?;

@@ -15,10 +15,8 @@ const LARGEST_FORCE: f64 = 256.0 * PI * PI;
 /// The positions and rotations at time 0.
 pub(super) fn state(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     match leaf.scenario().dynamics.start {
-        Start::Released if leaf.held.is_none() => {
-            Ok(released(&DiscreteLeaf::new(leaf, grid.clone())))
-        }
-        // Held tips are moved to their positions by the relaxation.
+        Start::Released if !leaf.is_held() => Ok(released(&DiscreteLeaf::new(leaf, grid.clone()))),
+        // Held tips and grips are moved to their positions by the relaxation.
         Start::Released | Start::AtRest => at_rest(leaf, grid, tolerance),
     }
 }

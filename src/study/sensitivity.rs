@@ -3,7 +3,7 @@
 use super::{Base, Keys, VaryError};
 use crate::relax::{
     Equilibrium, Options, Parameter, Progress, RelaxError, relax_on_grids, sensitivities,
-    without_grips, without_wind,
+    without_wind,
 };
 
 /// Why there are no derivatives.
@@ -33,7 +33,6 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    without_grips(scenario, "a derivative")?;
     without_wind(scenario, "a derivative")?;
     let values = keys.iter().map(|keys| Ok((keys, base.value(keys)?)));
     let values = values.collect::<Result<Vec<(&Keys, f64)>, VaryError>>()?;

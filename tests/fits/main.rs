@@ -2,6 +2,7 @@
 
 mod coverage;
 mod ends;
+mod grips;
 mod hanging;
 mod next;
 mod numbers;

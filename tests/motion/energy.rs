@@ -130,6 +130,18 @@ fn of_what_is_shaken() {
     });
 }
 
+/// Holders that stay where they are do no work.
+#[test]
+fn of_a_leaf_in_grips() {
+    for damping in DAMPINGS {
+        let leaf = shaken(gripped_veins(), damping);
+        let name = format!("gripped leaf {damping:?}");
+        for scheme in BOTH {
+            assert_order_on(&name, &leaf, scheme, 4, (5e-4, 1.5));
+        }
+    }
+}
+
 /// The explicit method goes along a rod in blocks of nodes: nothing is lost or
 /// counted twice between them.
 #[test]

@@ -2,6 +2,7 @@
 
 mod damping;
 mod energy;
+mod grips;
 mod momentum;
 mod order;
 mod pulses;

@@ -8,8 +8,8 @@
 use leafdyn::internals::leaf::State;
 use leafdyn::scenario::Tissue;
 use leafdyn_testing::motion::{
-    BOTH, DAMPINGS, Scheme, apart, at, curling, distance, limit, method, numbers, ramp, rest,
-    three_veins, twisted_rod,
+    BOTH, DAMPINGS, Scheme, apart, at, curling, distance, gripped_veins, limit, method, numbers,
+    ramp, rest, three_veins, twisted_rod,
 };
 use leafdyn_testing::*;
 
@@ -79,6 +79,15 @@ fn of_a_rod_and_a_leaf_in_space_and_a_rod_that_changes_its_rest_shape() {
     assert_order("changing rod", &rod, 0.7, equal(0.01));
 }
 
+/// With grips along veins that are tied by coupling and tissue.
+#[test]
+fn of_a_leaf_in_grips() {
+    let mut leaf = gripped_veins();
+    leaf.dynamics.tip_force = ramp(2.0, [-8.0, 16.0, 26.0]);
+    leaf.dynamics.gravity = ramp(2.0, [0.7, -0.7, -1.3]);
+    assert_order("gripped leaf", &leaf, 0.05, equal(0.0));
+}
+
 /// With tissue between veins that begin apart, and loads of single ones.
 #[test]
 fn of_a_leaf_with_tissue() {
@@ -87,8 +96,8 @@ fn of_a_leaf_with_tissue() {
     leaf.coupling = vec![[0.0; 3]; 2];
     leaf.tissue = Some(vec![
         Tissue {
-            stiffness: [20.0, 40.0, 30.0],
-            fold: 0.5,
+            stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
+            fold: Profile::Constant(0.5),
         };
         2
     ]);

@@ -154,8 +154,8 @@ fn with_tissue() -> Scenario {
     leaf.joined = false;
     leaf.tissue = Some(vec![
         Tissue {
-            stiffness: [20.0, 40.0, 30.0],
-            fold: 0.5,
+            stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
+            fold: Profile::Constant(0.5),
         };
         2
     ]);

@@ -172,7 +172,7 @@ const HANGING: [(f64, f64); 2] = [(6.0, 11.868750740620), (2.0 * PI, 12.18707875
 const MIDRIB: &str = "2500 1000 0.93780575743\n 1e5 4e4 0.92789056742";
 
 /// Euler's loads P_E of columns that are clamped at the base and held at the tip, as the
-/// grip's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
+/// holder's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
 const HELD: [(&str, f64); 2] = [
     ("clamped", 39.47841760435743),
     ("pinned", 20.19072855642663),
@@ -212,6 +212,27 @@ fn others() -> Vec<Case> {
         });
     }
     cases
+}
+
+/// A grip in the middle of a vein, beyond which nothing bears, presses it as a holder of its tip
+/// does.
+#[test]
+fn a_vein_buckles_before_its_grip() {
+    for (how, load) in HELD {
+        let travel = 0.5 * (1.0 - (1.0 - 4e-3 * load).sqrt());
+        let case = Case {
+            text: format!("{ROD}\ngrip = [{{ vein = 1, at = 0.5, held = \"{how}\" }}]"),
+            entries: format!(
+                "{}; stiffness.bending_2=3; leaf.length=2",
+                set_stiffness(1e3, f64::INFINITY)
+            ),
+            vary: ("grip[0].move[0]", 0.0, -1.4 * travel),
+            critical: vec![(-travel, 1)],
+            within: 1e-7,
+        };
+        case.is_followed();
+        case.is_relaxed();
+    }
 }
 
 #[test]

@@ -11,5 +11,6 @@ mod margin_random;
 mod mode_shapes;
 mod modes;
 mod trace_consistent;
+mod trace_of_grips;
 mod trace_verified;
 mod vertices;

@@ -2,6 +2,7 @@
 //! many veins they need.
 
 use leafdyn::relax::Method;
+use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 use leafdyn_testing::*;
 
 /// A blade of constant width, straight, whose tip is free. Small loads.
@@ -244,4 +245,38 @@ fn veins_of_unequal_growth_curve_as_a_bimetal() {
     // Tissue that has grown with them is without force.
     let grown = settle(&parse(&text.replace(", grown = false", "")), 1e-11);
     assert!(grown.energy.unwrap().abs() < 1e-16);
+}
+
+/// Numbers of a blade have derivatives: those of whole relaxations.
+#[test]
+fn derivatives_by_the_outline_and_the_material() {
+    let keys = [
+        ("blade.width.value[2]", 1.6),
+        ("blade.length", 25.0),
+        ("blade.young", 5e4),
+        ("blade.young_across", 2e4),
+        ("blade.thickness", 0.03),
+        ("leaf.elevation", 0.4),
+    ];
+    let given = entries(&format!("{WEIGHT}; leaf.rods=5; leaf.elevation=0.4"));
+    let base = Base::of_text(BLADE.into(), "blade".into(), &given).unwrap();
+    let names: Vec<Keys> = keys.iter().map(|(key, _)| key.parse().unwrap()).collect();
+    let leaf = relax_with_sensitivities(&base, &names, &to(1e-7), &mut |_| {}).unwrap();
+    let found = leaf.sensitivities.unwrap();
+    assert_eq!(found.len(), keys.len());
+    for ((key, value), found) in keys.into_iter().zip(found) {
+        let step = 1e-3 * value;
+        let tip = |value: f64| {
+            let change = format!("{WEIGHT}; leaf.rods=5; leaf.elevation=0.4; {key}={value}");
+            settle(&blade(&change), 1e-7).tips[0]
+        };
+        let slope = |h: f64| (tip(value + h) - tip(value - h)) / (2.0 * h);
+        let expected = (4.0 * slope(step) - slope(2.0 * step)) / 3.0;
+        let off = found.tips[0].distance(expected);
+        assert!(
+            off < 1e-4 * expected.length(),
+            "{key}: {} {expected}",
+            found.tips[0]
+        );
+    }
 }

@@ -94,3 +94,80 @@ fn forces_on_points_anywhere_are_within_the_bars() {
         }
     }
 }
+
+/// A tapered column that leans under its own weight, by the fourth-order Runge-Kutta method from its
+/// tip: with the weight W(s) above, the force n = -W e3, theta' = -M/A2, and M' = -W r1'.
+#[test]
+fn a_tapered_column_under_its_own_weight() {
+    const LENGTH: f64 = 2.0;
+    const YOUNG: f64 = 1e8;
+    const WEIGHT: f64 = 9.81 * 800.0;
+    const ELEVATION: f64 = 1.4;
+    let (thick, thin, poisson) = (0.04, 0.01, 0.3);
+    let text = format!(
+        r#"
+        name = "column"
+        leaf = {{ rods = 1, length = {LENGTH}, fan = [0.0], elevation = {ELEVATION} }}
+        section = {{ shape = "circle", diameter = {{ at = [0.0, 1.0], value = [{thick}, {thin}] }}, young = {YOUNG}, mass_density = 800.0 }}
+        load = {{ g = [0.0, 0.0, -9.81] }}
+    "#
+    );
+    let diameter = |s: f64| thick + s / LENGTH * (thin - thick);
+    let above = |s: f64| {
+        let cubes = f64::powi(thin, 3) - diameter(s).powi(3);
+        WEIGHT * PI / 4.0 * cubes / 3.0 * LENGTH / (thin - thick)
+    };
+    let slopes = |s: f64, [theta, moment, ..]: [f64; 4]| {
+        let (d, weight, (sin, cos)) = (diameter(s), above(s), theta.sin_cos());
+        let stretch = YOUNG * PI / 4.0 * d * d;
+        let shear =
+            6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson) * stretch / (2.0 * (1.0 + poisson));
+        let (along, across) = (1.0 - weight * sin / stretch, -weight * cos / shear);
+        let x = along * cos - across * sin;
+        let bending = YOUNG * PI / 64.0 * d.powi(4);
+        [
+            -moment / bending,
+            -weight * x,
+            x,
+            along * sin + across * cos,
+        ]
+    };
+    const STEPS: usize = 4000;
+    // From the tip down: theta, M, and the way to the base.
+    let down = |tip: f64| {
+        let (mut y, h) = ([tip, 0.0, 0.0, 0.0], -LENGTH / STEPS as f64);
+        for k in 0..STEPS {
+            let s = LENGTH + k as f64 * h;
+            let to = |y: [f64; 4], by: f64, k: [f64; 4]| [0, 1, 2, 3].map(|c| y[c] + by * k[c]);
+            let a = slopes(s, y);
+            let b = slopes(s + 0.5 * h, to(y, 0.5 * h, a));
+            let c = slopes(s + 0.5 * h, to(y, 0.5 * h, b));
+            let d = slopes(s + h, to(y, h, c));
+            y = [0, 1, 2, 3].map(|i| y[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+        }
+        y
+    };
+    let (mut before, mut tip) = (ELEVATION, ELEVATION - 0.3);
+    for _ in 0..30 {
+        let [one, other] = [before, tip].map(|tip| down(tip)[0] - ELEVATION);
+        if one == other {
+            break;
+        }
+        (before, tip) = (tip, tip - other * (tip - before) / (other - one));
+    }
+    let [base, moment, x, z] = down(tip);
+    close("base", base, ELEVATION, 1e-12);
+    let leaf = settle(&parse(&text), 1e-10);
+    assert!(
+        leaf.stable() == Some(true) && tip < ELEVATION - 0.1,
+        "{tip}"
+    );
+    close("tip x", leaf.tips[0].x, -x, 1e-9);
+    close("tip z", leaf.tips[0].z, -z, 1e-9);
+    close(
+        "moment",
+        leaf.shape.rods[0].nodes[0].m.y / moment,
+        1.0,
+        1e-8,
+    );
+}

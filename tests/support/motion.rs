@@ -5,7 +5,7 @@ use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Profile, Scenario, Schedule};
+use leafdyn::scenario::{Grip, Hold, Profile, Scenario, Schedule, Tissue};
 use leafdyn::simulate::{self, Frame, Simulation};
 
 pub use leafdyn::simulate::Scheme;
@@ -52,6 +52,29 @@ pub fn three_veins() -> Scenario {
         rod.rest_curvature[1] = Profile::Constant(0.4 * part);
     }
     leaf.dynamics.external_damping = 0.0;
+    leaf
+}
+
+/// The same with tissue, a stretch of one vein pinned and displaced, and a point of another clamped.
+pub fn gripped_veins() -> Scenario {
+    let mut leaf = three_veins();
+    leaf.tissue = Some(vec![
+        Tissue {
+            stiffness: [20.0, 40.0, 30.0].map(Profile::Constant),
+            fold: Profile::Constant(0.5),
+        };
+        2
+    ]);
+    let grip = |vein: usize, at: [f64; 2], held: Hold, displacement: [f64; 3]| Grip {
+        vein,
+        at,
+        held,
+        displacement,
+    };
+    leaf.grips = vec![
+        grip(0, [0.25, 0.5], Hold::Pinned, [0.02, -0.03, 0.04]),
+        grip(2, [0.75; 2], Hold::Clamped, [0.0, 0.05, 0.0]),
+    ];
     leaf
 }
 

@@ -88,7 +88,7 @@ fn draw_result(
     });
     let unit = match kind.split_once('_') {
         Some(("tip", _)) => units.length.as_deref(),
-        Some(("reaction", _)) => units.force.as_deref(),
+        Some(("reaction" | "grip", _)) => units.force.as_deref(),
         _ => None,
     };
     let mut up = Axis::holding(&with_unit(kind, unit), values);

@@ -33,8 +33,6 @@ const VISIBLE: f64 = 0.04;
 const VISIBLE_FRACTION: f64 = 0.25;
 /// Equal parts of each vein at whose ends leaves are compared.
 const PARTS: usize = 8;
-/// Index of the first component of the reaction in [`TraceShow::ALL`].
-const REACTION: usize = 3;
 /// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
 
@@ -157,18 +155,26 @@ fn caption(point: &TracePoint) -> String {
     format!("{}, {kind}", short(point.value))
 }
 
-/// The coordinate of the tip that varies most; for a held tip the component of the
-/// reaction that does.
+/// The coordinate of the tip that varies most; of a leaf that is held the component of a reaction
+/// that does.
 fn most_varying(trace: &Trace) -> TraceShow {
-    let points = trace.branches.iter().flat_map(|branch| &branch.points);
-    let of = |point: &TracePoint| point.reaction.or(point.tips.first().copied());
-    let values = points.filter_map(|point| of(point).map(|it| (it, it)));
-    let extent = values.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let (low, high) = extent.unwrap_or_default();
-    let change = high - low;
-    let largest = (0..3).max_by(|&a, &b| change[a].total_cmp(&change[b]));
-    let first = if trace.held { REACTION } else { 0 };
-    TraceShow::ALL[first + largest.unwrap_or(2)]
+    let axes = 0..3;
+    let on_grips = |grip: usize| (0..3).map(move |axis| TraceShow::Grip { grip, axis });
+    let shown: Vec<TraceShow> = match (trace.held, trace.grips) {
+        (false, 0) => axes.map(TraceShow::Tip).collect(),
+        (true, 0) => axes.map(TraceShow::Reaction).collect(),
+        (_, grips) => (0..grips).flat_map(on_grips).collect(),
+    };
+    let change = |what: TraceShow| {
+        let points = trace.branches.iter().flat_map(|branch| &branch.points);
+        let ends = points.map(|point| point.shown(what)).map(|it| (it, it));
+        let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        ends.map_or(0.0, |(low, high)| high - low)
+    };
+    let largest = shown
+        .into_iter()
+        .max_by(|a, b| change(*a).total_cmp(&change(*b)));
+    largest.unwrap_or(TraceShow::Tip(2))
 }
 
 /// The axis of a quantity with its unit, wide enough that rounding is invisible.
@@ -178,8 +184,12 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
     let (name, least) = match quantity {
         TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
         TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
-        TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
-            let force = quantity.word().replace('_', ", ");
+        TraceShow::Reaction(axis) => {
+            let force = format!("reaction, {}", TraceShow::Tip(axis));
+            (with_unit(&force, units.force.as_deref()), 0.0)
+        }
+        TraceShow::Grip { grip, axis } => {
+            let force = format!("on grip {}, {}", grip + 1, TraceShow::Tip(axis));
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         tip => {
@@ -188,11 +198,11 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
             (name, ROUNDING * longest)
         }
     };
-    Axis::holding(&name, points().map(|point| quantity.of(point))).at_least(least)
+    Axis::holding(&name, points().map(|point| point.shown(quantity))).at_least(least)
 }
 
 fn tip(point: &TracePoint, axis: usize) -> f64 {
-    TraceShow::ALL[axis].of(point)
+    point.shown(TraceShow::Tip(axis))
 }
 
 fn draw_branches(
@@ -203,7 +213,7 @@ fn draw_branches(
     cell: Cell,
     letter: &str,
 ) {
-    let at = |point: &TracePoint| (point.value, quantity.of(point));
+    let at = |point: &TracePoint| (point.value, point.shown(quantity));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
     let across = match trace.keys.to_string() {
         force if force.starts_with("load.tip_force") => {
@@ -302,7 +312,7 @@ fn draw_law(
         .map(|point| (tip(point, law.axis) - start, point.force_on_tip(law.axis)))
         .collect();
     let units = &trace.units;
-    let across = format!("displacement along {}", TraceShow::ALL[law.axis]);
+    let across = format!("displacement along {}", TraceShow::Tip(law.axis));
     let across = with_unit(&across, units.length.as_deref());
     let up = with_unit("force", units.force.as_deref());
     let count = points.len() as f64;

@@ -187,9 +187,9 @@ impl Viewed for Trace {
 fn branches(trace: &Trace, units: &Units) -> Chart {
     let (length, energy) = (units.length.as_deref(), units.energy());
     let choices = [
-        ("tip z", TraceShow::TipZ, length),
-        ("tip y", TraceShow::TipY, length),
-        ("tip x", TraceShow::TipX, length),
+        ("tip z", TraceShow::Tip(2), length),
+        ("tip y", TraceShow::Tip(1), length),
+        ("tip x", TraceShow::Tip(0), length),
         ("energy", TraceShow::Energy, energy.as_deref()),
     ];
     let curves = choices
@@ -202,7 +202,7 @@ fn branches(trace: &Trace, units: &Units) -> Chart {
                 special: (branch.critical())
                     .map(|(at, point)| (at, point.kind.word()))
                     .collect(),
-                ..along(&branch.points, |point| (point.value, shown.of(point)))
+                ..along(&branch.points, |point| (point.value, point.shown(*shown)))
             };
             numbered("branch", trace.branches.iter().map(curve).collect())
         });

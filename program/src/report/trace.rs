@@ -12,6 +12,7 @@ use crate::report::numbers::{
 };
 use crate::report::table::{Lines, csv_without_header, header, labelled};
 use crate::report::words::{branch_end, stable_or_index};
+use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,
@@ -25,6 +26,12 @@ const COLUMNS: &str = "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,err
 
 /// Further columns if tips are held: the force on their holder.
 const REACTION: &str = ",reaction_x,reaction_y,reaction_z";
+
+/// And with grips: the force on each.
+fn on_grip(number: usize) -> String {
+    let number = number + 1;
+    format!(",grip_{number}_x,grip_{number}_y,grip_{number}_z")
+}
 
 impl Reported for Trace {
     fn heading(&self) -> String {
@@ -104,9 +111,10 @@ pub fn slope_unit(units: &Units) -> String {
 }
 
 pub fn error_location(trace: &Trace) -> &'static str {
-    match trace.held {
-        true => "middles of the veins",
-        false => "tips",
+    match (trace.held, trace.grips) {
+        (true, _) => "middles of the veins",
+        (false, 0) => "tips",
+        (false, _) => "tips and middles of the veins",
     }
 }
 
@@ -120,14 +128,20 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
         }
         _ => String::new(),
     };
-    let reaction = point.reaction.map(|force| {
+    let text = |force: &DVec3| {
         let error = trace.tolerance * force.length();
         let [x, y, z] = force.to_array().map(|it| short(rounded_to(it, error)));
-        format!(", reaction ({x}, {y}, {z})")
-    });
-    let reaction = reaction.unwrap_or_default();
+        format!("({x}, {y}, {z})")
+    };
+    let reaction = point.reaction.as_ref().map(text);
+    let reaction = reaction.map_or(String::new(), |force| format!(", reaction {force}"));
+    let grips = point.grip_reactions.iter().enumerate();
+    let grips = grips.map(|(k, force)| format!(", on grip {} {}", k + 1, text(force)));
     let value = value_of(trace, point);
-    format!("{value}: {stability}{tip}{reaction}")
+    format!(
+        "{value}: {stability}{tip}{reaction}{}",
+        grips.collect::<String>()
+    )
 }
 
 /// The number that varies at a point: as it was prescribed, or with the digits that its error
@@ -159,13 +173,20 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
 /// `trace.csv`: one row per branch and point.
 pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
     let (reaction, more) = if trace.held { (REACTION, 3) } else { ("", 0) };
-    out.write_all(&header(&[COLUMNS, reaction].concat()))?;
+    let grips: String = (0..trace.grips).map(on_grip).collect();
+    out.write_all(&header(&[COLUMNS, reaction, &grips].concat()))?;
     let mut table = csv_without_header(out);
     for (number, branch) in trace.branches.iter().enumerate() {
         for point in &branch.points {
             let reaction = point.reaction.unwrap_or_default().to_array();
-            let reaction = reaction.map(|x| x + 0.0);
-            table.serialize((number + 1, point.point, cells(point), &reaction[..more]))?;
+            let grips = point
+                .grip_reactions
+                .iter()
+                .flat_map(|force| force.to_array());
+            let forces = reaction.into_iter().take(more).chain(grips);
+            // Adding zero turns -0 into 0.
+            let forces: Vec<f64> = forces.map(|x| x + 0.0).collect();
+            table.serialize((number + 1, point.point, cells(point), forces))?;
         }
     }
     table.flush()

@@ -41,7 +41,7 @@ pub struct Trace {
     #[arg(long, value_name = "N", default_value_t = MOST_POINTS)]
     points: usize,
 
-    /// What the figure shows against that number, a panel each: x, y, z of the tip, reaction_x, reaction_y, reaction_z on the holder of a held tip, energy, twist; left out: the coordinate of the tip that varies most, of the reaction if it is held
+    /// What the figure shows against that number, a panel each: x, y, z of the tip, reaction_x, reaction_y, reaction_z on the holder of a held tip, grip_1_x, ... on a grip, energy, twist; left out: the coordinate of the tip that varies most, of a reaction if the leaf is held
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     show: Vec<TraceShow>,
 
@@ -129,11 +129,18 @@ impl Trace {
 
     fn one(&self, job: &Job, vary: &Vary) -> Result<Delivered, Refusal> {
         let request = self.trace_request(job, vary);
-        let free = request.base.scenario().held_tip.is_none();
-        if let Some(show) = self.show.iter().find(|show| free && show.is_reaction()) {
-            return Err(
-                format!("--show {show}: nothing holds the tip: add [tip] with held").into(),
-            );
+        let scenario = request.base.scenario();
+        for show in &self.show {
+            let why = match show {
+                TraceShow::Reaction(_) if scenario.held_tip.is_none() => {
+                    "nothing holds the tip: add [tip] with held".into()
+                }
+                TraceShow::Grip { grip, .. } if *grip >= scenario.grips.len() => {
+                    format!("there are {} of [[grip]]", scenario.grips.len())
+                }
+                _ => continue,
+            };
+            return Err(format!("--show {show}: {why}").into());
         }
         let mut line = job.progress();
         let mut seen = (0, vary.ends()[0]);

@@ -34,6 +34,26 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
 }
 
+/// With grips the table has the forces on them, and the figure shows the one that varies most.
+#[test]
+fn forces_on_grips_are_columns() {
+    let place = Workplace::new();
+    let grips = "\n[[grip]]\nvein = 1\nat = [0.3, 0.6]\n\n[[grip]]\nvein = 2\nat = 0.5\nheld = \"clamped\"\n";
+    place.write("gripped.toml", &(place.read("leaf.toml") + grips));
+    let run = "trace gripped.toml --vary grip[0].move[2]=0..0.1";
+    place
+        .run(run)
+        .ends(0)
+        .says(&["on grip 1", "on grip 2", "tips and middles"]);
+    let columns = format!("{COLUMNS},grip_1_x,grip_1_y,grip_1_z,grip_2_x,grip_2_y,grip_2_z");
+    let rows = place.table("out/small/trace.csv", &columns);
+    let pushed: f64 = rows.last().unwrap()[18].parse().unwrap();
+    assert!(pushed < -0.1, "{pushed}");
+    contains(&place.picture("out/small/trace"), &["on grip 1, z"]);
+    let refused = place.run(format!("{run} --show grip_3_x"));
+    contains(&refused.ends(2).err, &["there are 2 of [[grip]]"]);
+}
+
 #[test]
 fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let place = Workplace::new();

@@ -236,6 +236,12 @@ class Equilibrium(Viewed):
         """How far a stable leaf is from losing its stability, as in ``summary.json``; none if that was not asked for."""
         return self.to_dict().get("margin")
 
+    @property
+    def blade(self) -> dict[str, Any] | None:
+        """Of a leaf from an outline (``[blade]``): the stiffnesses that follow at its widest place, and how much its least
+        width and the number of veins matter, as in ``summary.json``; none of other leaves."""
+        return self.to_dict().get("blade")
+
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
 

@@ -44,6 +44,10 @@ class Sensitivity:
     """Change of the moments that the holder of a clamped tip feels, shape (N, 3); none of another."""
     tip_reaction_error: float | None
     """Bound on the error of the force."""
+    grip_reactions: list[tuple[Array, Array | None]]
+    """Of every grip the change of the force that its holder feels, shape (3,), and of the moment if it is clamped."""
+    grip_reactions_error: float | None
+    """Bound on the error of these forces."""
     stations: Array
     """Fractions of the length at which `positions` are, shape (K + 1,): nodes that all grids have."""
     positions: Array
@@ -57,6 +61,8 @@ class Sensitivity:
         self.frequencies = np.array(entry.get("frequencies", []), dtype=np.float64)
         self.tip_reaction = _vectors(entry.get("tip_reaction"))
         self.tip_reaction_moments = _vectors(entry.get("tip_reaction_moments"))
+        grips = entry.get("grip_reactions", [])
+        self.grip_reactions = [(np.array(grip["force"], dtype=float), _vectors(grip.get("moment"))) for grip in grips]
         self.stations, self.positions, self.positions_error = stations, positions, positions_error
         read_only(self.__dict__)
 
@@ -80,6 +86,7 @@ _NUMBERS = (
     "lowest_eigenvalue",
     "lowest_eigenvalue_error",
     "tip_reaction_error",
+    "grip_reactions_error",
 )
 
 

@@ -119,6 +119,14 @@ class Branch:
         return np.stack([self.columns[name] for name in names], axis=1) if names[0] in self.columns else None
 
     @property
+    def grip_reactions(self) -> Array | None:
+        """The forces on the grips, shape (P, G, 3); none without grips."""
+        count = sum(name.startswith("grip_") for name in self.columns) // 3
+        names = [[f"grip_{number}_{axis}" for axis in "xyz"] for number in range(1, count + 1)]
+        forces = [np.stack([self.columns[name] for name in grip], axis=1) for grip in names]
+        return np.stack(forces, axis=1) if forces else None
+
+    @property
     def energies(self) -> Array:
         """Potential energies, shape (P,)."""
         return self.columns["energy"]
@@ -191,8 +199,8 @@ class Trace(Table, Viewed):
             Where; left out: axes in a new figure.
         show
             ``"x"``, ``"y"`` or ``"z"`` of the tip, ``"reaction_x"``, ``"reaction_y"`` or ``"reaction_z"`` of a held one,
-            ``"energy"`` or ``"twist"``; left out: the coordinate of the tip that varies most, of the reaction if it is
-            held.
+            ``"grip_1_x"`` and so on of a grip, ``"energy"`` or ``"twist"``; left out: the coordinate of the tip that
+            varies most, of a reaction if the leaf is held.
         style
             What ``Axes.plot`` takes.
 
@@ -201,9 +209,10 @@ class Trace(Table, Viewed):
         matplotlib Axes
         """
         table = self.columns
-        shown = {name: column for name, column in SHOWN.items() if column in table}
+        on_grips = {name: name for name in table if name.startswith("grip_")}
+        shown = {name: column for name, column in (SHOWN | on_grips).items() if column in table}
         if show is None:
-            varying = REACTION if "reaction_x" in shown else TIP
+            varying = on_grips or (REACTION if "reaction_x" in shown else TIP)
             show = max(reversed(varying), key=lambda name: float(np.ptp(table[shown[name]])))
         if show not in shown:
             raise ValueError(f"show = {show!r}: must be one of {', '.join(shown)}")

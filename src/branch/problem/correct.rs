@@ -66,7 +66,7 @@ impl Equations<'_> {
     /// Derivative, with respect to the parameter, of the positions of nodes held away from the
     /// bases, which the forces do not contain; `None` if there are none.
     fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
-        if self.leaves.at([fraction])?.leaf.held.is_none() {
+        if !self.leaves.at([fraction])?.leaf.is_held() {
             return Ok(None);
         }
         let held = |step: f64| {

@@ -27,10 +27,10 @@ pub struct Refined {
     pub energy: f64,
     /// Tips of all rods, likewise.
     pub tips: Vec<DVec3>,
-    /// The reaction at held tips, likewise; zero if they are free.
-    pub reaction: DVec3,
-    /// Bound on the error of the tips, or of the rods' midpoints if the tips are held: of the
-    /// branch at this parameter, or, at a fold, of the fold itself.
+    /// The forces on the holder of held tips, if they are, and on every grip, likewise.
+    pub reactions: Vec<DVec3>,
+    /// Bound on the error of the tips, or of the rods' midpoints if the tips are held, and of both
+    /// with grips: of the branch at this parameter, or, at a fold, of the fold itself.
     pub error: f64,
     /// Bound on the error of the parameter, as a fraction of its range.
     pub fraction_error: f64,
@@ -96,13 +96,13 @@ impl From<OutOfRange> for Doubt {
 /// Quantities of a point on one grid.
 #[derive(Clone)]
 pub(in crate::branch) struct Values {
-    /// The coordinates of every tip; then, if the tips are held, those of the midpoint of
-    /// every rod.
+    /// The coordinates of every tip; then, if the tips or others are held, those of the midpoint
+    /// of every rod.
     pub points: Vec<f64>,
     pub fraction: f64,
     pub energy: f64,
-    /// The reaction at held tips; zero if they are free.
-    pub reaction: DVec3,
+    /// The forces on the holders.
+    pub reactions: Vec<DVec3>,
 }
 
 /// The nodes of each rod whose positions are used.
@@ -110,7 +110,7 @@ pub(in crate::branch) fn observed_nodes(
     leaf: &DiscreteLeaf,
     segments: usize,
 ) -> impl Iterator<Item = usize> {
-    let middle = leaf.leaf.held.is_some().then_some(segments / 2);
+    let middle = leaf.leaf.is_held().then_some(segments / 2);
     [segments].into_iter().chain(middle)
 }
 
@@ -118,29 +118,29 @@ impl Values {
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
         let leaf = equations.leaves.at([fraction])?;
         let nodes = observed_nodes(leaf, state.segments());
-        let reaction = match leaf.leaf.held {
-            Some(_) => leaf.reaction(state).0,
-            None => DVec3::ZERO,
-        };
         let points = nodes.flat_map(|i| (0..state.rods()).map(move |j| state.base(j) + i));
         Ok(Values {
             points: points.flat_map(|k| state.x[k].to_array()).collect(),
             fraction,
             energy: leaf.energy(state),
-            reaction,
+            reactions: leaf.forces_on_holders(state),
         })
     }
 
     pub fn sum(parts: &[(f64, Values)]) -> Self {
         let sum = |of: &dyn Fn(&Values) -> f64| parts.iter().map(|(w, v)| w * of(v)).sum();
         let points = parts.first().map_or(0, |(_, values)| values.points.len());
+        let holders = parts
+            .first()
+            .map_or(0, |(_, values)| values.reactions.len());
+        let on = |k: usize| parts.iter().map(|(w, v)| *w * v.reactions[k]).sum();
         Values {
             points: (0..points)
                 .map(|k| sum(&|values| values.points[k]))
                 .collect(),
             fraction: sum(&|values| values.fraction),
             energy: sum(&|values| values.energy),
-            reaction: parts.iter().map(|(w, v)| *w * v.reaction).sum(),
+            reactions: (0..holders).map(on).collect(),
         }
     }
 
@@ -251,21 +251,27 @@ impl Table {
         let fraction = fractions.column(best)[0];
         let mut points = self.of(|values| values.points.clone()).column(own).to_vec();
         let mut energy = self.of(|values| vec![values.energy]).column(own)[0];
-        let reaction = self.of(|values| values.reaction.to_array().to_vec());
-        let mut reaction = DVec3::from_slice(reaction.column(own));
+        let flat = |values: &Values| {
+            let forces = values.reactions.iter();
+            forces.flat_map(|force| force.to_array()).collect()
+        };
+        let reactions = self.of(flat);
+        let reactions = reactions.column(own).chunks(3);
+        let mut reactions: Vec<DVec3> = reactions.map(DVec3::from_slice).collect();
         if let Some(slope) = &self.slope {
             let correction = fraction - fractions.column(own)[0];
             let moved = points.iter_mut().zip(&slope.points);
             moved.for_each(|(point, slope)| *point += correction * slope);
             energy += correction * slope.energy;
-            reaction += correction * slope.reaction;
+            let moved = reactions.iter_mut().zip(&slope.reactions);
+            moved.for_each(|(force, slope)| *force += correction * *slope);
         }
         let tips = points.chunks(3).take(state.rods());
         Refined {
             fraction,
             energy,
             tips: tips.map(DVec3::from_slice).collect(),
-            reaction,
+            reactions,
             error: self.error(),
             fraction_error: self.fraction_error() + self.softening + self.rounding,
             state,

@@ -10,7 +10,6 @@ use crate::branch::{Direction, Point};
 use crate::largest::larger;
 use crate::leaf::{Grid, State};
 use crate::relax::transfer::prolong::{prolong, restrict};
-use glam::DVec3;
 
 /// Largest number of grids of a point, and of segments of the finest.
 pub(in crate::branch) const GRIDS: usize = 6;
@@ -253,24 +252,24 @@ fn refine_in(
 }
 
 /// Derivatives of a point's values with respect to the parameter: of points from the tangent;
-/// of the energy, stationary in the state, from that of the loads; of the reaction from
-/// neighbouring states.
+/// of the energy, stationary in the state, from that of the loads; of the forces on holders, and of
+/// the energy if these may move, from neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let held = equations.leaves.at([point.fraction])?.leaf.held.is_some();
+    let held = equations.leaves.at([point.fraction])?.leaf.is_held();
     let [
-        (after, energy, force),
-        (before, energy_before, force_before),
+        (after, energy, forces),
+        (before, energy_before, forces_before),
     ] = both_sides(|step| {
         let at = point.fraction + step;
-        let energy = equations.leaves.at([at])?.energy(&point.state);
-        let mut force = DVec3::ZERO;
-        if held {
-            let length = step / tangent.params[0];
-            let state = equations.advanced(&point.state, [at], &tangent.increments, length)?;
-            force = equations.leaves.at([at])?.reaction(&state).0;
+        if !held {
+            let energy = equations.leaves.at([at])?.energy(&point.state);
+            return Ok((at, energy, Vec::new()));
         }
-        Ok::<_, OutOfRange>((at, energy, force))
+        let length = step / tangent.params[0];
+        let state = equations.advanced(&point.state, [at], &tangent.increments, length)?;
+        let leaf = equations.leaves.at([at])?;
+        Ok::<_, OutOfRange>((at, leaf.energy(&state), leaf.forces_on_holders(&state)))
     })?;
     let leaf = equations.leaves.at([point.fraction])?;
     let nodes = observed_nodes(leaf, leaf.segments());
@@ -281,6 +280,8 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
             .collect(),
         fraction: 1.0,
         energy: (energy - energy_before) / (after - before),
-        reaction: (force - force_before) / (after - before),
+        reactions: (forces.iter().zip(forces_before))
+            .map(|(force, before)| (*force - before) / (after - before))
+            .collect(),
     })
 }

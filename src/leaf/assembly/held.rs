@@ -91,6 +91,8 @@ impl DiscreteLeaf {
                 let across = system.across_mut(g, i);
                 for &c in self.held_components(g, i + 1) {
                     across[c] = [0.0; UNKNOWNS];
+                }
+                for &c in self.held_components(g + 1, i + 1) {
                     across.iter_mut().for_each(|row| row[c] = 0.0);
                 }
             }

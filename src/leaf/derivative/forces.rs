@@ -12,8 +12,8 @@ pub struct Forces {
     pub gaps: Vec<Vec<DVec3>>,
     /// On the energy.
     pub energy: f64,
-    /// Increments of held tips; empty if it does not move them.
-    pub tips: Vec<Increment>,
+    /// Increments of held nodes. Rods on which it moves none have no entries.
+    pub moved: Field,
 }
 
 /// The linear response of a leaf to forces.
@@ -32,7 +32,7 @@ impl Forces {
             nodes: vec![Vec::new(); rods],
             gaps: vec![Vec::new(); rods],
             energy: 0.0,
-            tips: Vec::new(),
+            moved: vec![Vec::new(); rods],
         }
     }
 
@@ -60,9 +60,10 @@ impl Forces {
             (sums.iter_mut().zip(gaps)).for_each(|(sum, more)| *sum += times * *more);
         }
         self.energy += times * other.energy;
-        self.tips
-            .resize(self.tips.len().max(other.tips.len()), [0.0; 6]);
-        add_nodes(&mut self.tips, times, &other.tips);
+        for (moved, more) in self.moved.iter_mut().zip(&other.moved) {
+            moved.resize(moved.len().max(more.len()), [0.0; 6]);
+            add_nodes(moved, times, more);
+        }
     }
 
     /// Forces on all nodes and effects on all gaps of rods of `segments` segments, zeros included.

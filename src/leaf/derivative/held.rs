@@ -1,14 +1,15 @@
-//! Held tips: the effect of moving their holder, and the change of the force on it.
+//! Held nodes: the effect of moving their holders, and the changes of the forces on these.
 
 use crate::leaf::derivative::{Forces, LeafRate, Response, at_constant_force, change};
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{State, add};
+use crate::leaf::state::{Field, Increment, State, add, shift, turn};
 use crate::rod::Segment;
+use crate::rotation;
 use crate::scenario::{Clamp, Scenario};
 use glam::{DQuat, DVec3};
 
-/// The rate of change of the holder's position and orientation, in the leaf's units.
+/// The rate of change of the position and the orientation of the tips' holder, in the leaf's units.
 pub(in crate::leaf::derivative) struct HeldRate {
     shift: DVec3,
     /// Rotations of the clamps, one per rod; empty for a pinned tip.
@@ -38,38 +39,164 @@ impl HeldRate {
     }
 }
 
+impl HeldRate {
+    /// The increment of the tip of rod `j`.
+    fn of_tip(&self, j: usize) -> Increment {
+        increment(
+            self.turns.get(j).copied().unwrap_or(DVec3::ZERO),
+            self.shift,
+        )
+    }
+}
+
+fn increment(turned: DVec3, moved: DVec3) -> Increment {
+    let [a, b] = [turned.to_array(), moved.to_array()];
+    [a[0], a[1], a[2], b[0], b[1], b[2]]
+}
+
 impl DiscreteLeaf {
-    /// Adds the effect of holders that move and rotate.
-    pub(in crate::leaf::derivative) fn add_tip_motion(
+    /// The increments of held nodes by the motion of their holders; rods without any have none.
+    /// Where grips hold nodes depends on the natural leaf: on those of the weighted leaves, of which
+    /// the change is the sum.
+    pub(in crate::leaf::derivative) fn held_motion(
+        &self,
+        rate: &LeafRate,
+        each: &[(f64, DiscreteLeaf)],
+    ) -> Field {
+        let n = self.segments();
+        let mut motion = vec![Vec::new(); self.rods()];
+        let mut put = |j: usize, i: usize, by: Increment| {
+            if by != [0.0; 6] {
+                let nodes: &mut Vec<Increment> = &mut motion[j];
+                nodes.resize(n, [0.0; 6]);
+                nodes[i - 1] = by;
+            }
+        };
+        for (j, held) in (0..self.rods()).flat_map(|j| rate.held.iter().map(move |it| (j, it))) {
+            put(j, n, held.of_tip(j));
+        }
+        for (k, own) in self.grips.iter().enumerate() {
+            let (mut turned, mut moved) = (DVec3::ZERO, DVec3::ZERO);
+            for (weight, leaf) in each {
+                let [first, other] = [&each[0].1, leaf].map(|leaf| leaf.grips[k]);
+                moved += *weight * (other.position - first.position);
+                if let (Some(from), Some(to)) = (first.rotation, other.rotation) {
+                    turned += *weight * rotation::log(to * from.conjugate());
+                }
+            }
+            put(own.rod, own.node, increment(turned, moved));
+        }
+        motion
+    }
+
+    /// Adds the effect of holders that move and rotate by these increments of held nodes.
+    pub(in crate::leaf::derivative) fn add_held_motion(
         &self,
         state: &State,
         segments: &[Segment],
-        rate: &HeldRate,
+        motion: Field,
+        forces: &mut Forces,
+    ) {
+        for (j, rod) in motion.iter().enumerate() {
+            for (i, by) in rod.iter().enumerate() {
+                if *by != [0.0; 6] {
+                    self.add_node_motion((state, segments), (j, i + 1), by, forces);
+                }
+            }
+        }
+        self.add_response_of_ties(state, &motion, forces);
+        forces.moved = motion;
+    }
+
+    /// Adds what moving node `i` of rod `j` does to both of its segments, and to the energy.
+    fn add_node_motion(
+        &self,
+        (state, segments): (&State, &[Segment]),
+        (j, i): (usize, usize),
+        by: &Increment,
         forces: &mut Forces,
     ) {
         let n = self.segments();
-        let moved = rate.shift;
-        for j in 0..self.rods() {
-            let turned = rate.turns.get(j).copied().unwrap_or(DVec3::ZERO);
-            let section = self.section(j, n - 1);
-            let segment = &segments[j * n + n - 1];
+        let (turned, moved) = (turn(by), shift(by));
+        let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
+        let k = at_constant_force(segment, section);
+        let nodes = forces.on_nodes(j, n);
+        if i > 1 {
+            let moment = k.ab * turned + k.xa.transpose() * moved;
+            add(&mut nodes[i - 2], -moment, k.xx * moved + k.xb * turned);
+        }
+        // A node that is only pinned rotates freely.
+        let moment = k.bb * turned + k.xb.transpose() * moved;
+        add(&mut nodes[i - 1], -moment, DVec3::ZERO);
+        forces.on_gaps(j, n)[i - 1] += segment.gap_increment(section, moved, DVec3::ZERO, turned);
+        if i < n {
+            let (section, segment) = (self.section(j, i), &segments[j * n + i]);
             let k = at_constant_force(segment, section);
             let nodes = forces.on_nodes(j, n);
-            if n > 1 {
-                let moment = k.ab * turned + k.xa.transpose() * moved;
-                add(&mut nodes[n - 2], -moment, k.xx * moved + k.xb * turned);
-            }
-            // A tip that is only pinned rotates freely.
-            let moment = k.bb * turned + k.xb.transpose() * moved;
-            add(&mut nodes[n - 1], -moment, DVec3::ZERO);
-            forces.on_gaps(j, n)[n - 1] +=
-                segment.gap_increment(section, moved, DVec3::ZERO, turned);
-            let (g_x, _, g_b) = segment.gradient(section);
-            let load = self.load(state, j, n);
-            forces.energy += (g_x - load.force).dot(moved) + (g_b - load.moment).dot(turned);
-            let [a, b] = [turned.to_array(), moved.to_array()];
-            forces.tips.push([a[0], a[1], a[2], b[0], b[1], b[2]]);
+            let moment = k.aa * turned - k.xa.transpose() * moved;
+            add(&mut nodes[i - 1], -moment, DVec3::ZERO);
+            add(
+                &mut nodes[i],
+                k.xb.transpose() * moved - k.ab.transpose() * turned,
+                k.xx * moved - k.xa * turned,
+            );
+            forces.on_gaps(j, n)[i] += segment.gap_increment(section, -moved, turned, DVec3::ZERO);
         }
+        let [moment, force] = self.unbalanced(state, j, i);
+        forces.energy -= force.dot(moved) + moment.dot(turned);
+    }
+
+    /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
+    /// tip neighbours are displaced alike, and what turns there is held.
+    fn add_response_of_ties(&self, state: &State, increments: &Field, forces: &mut Forces) {
+        let n = self.segments();
+        let by = |j: usize, i: usize| increments[j].get(i - 1).copied().unwrap_or([0.0; 6]);
+        let last = if self.leaf.joined() { n } else { n + 1 };
+        for (g, i) in (0..self.rods() - 1).flat_map(|g| (1..last).map(move |i| (g, i))) {
+            let both = [by(g, i), by(g + 1, i)];
+            if both == [[0.0; 6]; 2] {
+                continue;
+            }
+            let pull = self.spring(g, i) * (shift(&both[1]) - shift(&both[0]));
+            let mut on = [[DVec3::ZERO, pull], [DVec3::ZERO, -pull]];
+            if self.tied() {
+                let tissue = self.tissue_response(state, (g, i), &both);
+                for (on, tissue) in on.iter_mut().zip(tissue) {
+                    (on[0], on[1]) = (on[0] + tissue[0], on[1] + tissue[1]);
+                }
+            }
+            for (j, [moment, force]) in [g, g + 1].into_iter().zip(on) {
+                add(&mut forces.on_nodes(j, n)[i - 1], moment, force);
+            }
+        }
+    }
+
+    /// The changes of the forces on all grips, as in [`DiscreteLeaf::grip_reactions`]: of the loads,
+    /// of coupling and tissue, and of the forces in the segments on either side.
+    pub fn grip_force_rates(
+        &self,
+        state: &State,
+        rate: &LeafRate,
+        response: &Response,
+    ) -> Vec<DVec3> {
+        let n = self.segments();
+        let mut loads = Forces::zeros(self.rods());
+        for j in 0..self.rods() {
+            self.add_load_changes(state, j, rate, &mut loads);
+        }
+        self.add_tissue_changes(state, &self.each_of(rate), &mut loads);
+        self.add_response_of_ties(state, &response.nodes, &mut loads);
+        let mut rates = vec![DVec3::ZERO; self.leaf.scenario().grips.len()];
+        for held in &self.grips {
+            let (j, i) = (held.rod, held.node);
+            let carried = |segment: usize| response.carried[j * n + segment];
+            let mut force = shift(&loads.nodes[j][i - 1]) - carried(i - 1);
+            if i < n {
+                force += carried(i);
+            }
+            rates[held.grip] += force;
+        }
+        rates
     }
 
     /// The change of the force on the holder of the tip, as in [`DiscreteLeaf::reaction`]: of

@@ -41,6 +41,14 @@ pub(in crate::leaf::derivative) fn rest_rates(
 }
 
 impl DiscreteLeaf {
+    /// The weighted leaves of a rate on this grid.
+    pub(in crate::leaf::derivative) fn each_of(&self, rate: &LeafRate) -> Vec<(f64, DiscreteLeaf)> {
+        let leaves = rate.leaves.iter();
+        leaves
+            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
+            .collect()
+    }
+
     /// The change of the loads that rod `j` has of its own on its node `i`.
     pub(in crate::leaf::derivative) fn own_load_rate(
         &self,
@@ -59,16 +67,6 @@ impl DiscreteLeaf {
             .iter()
             .map(|(weight, leaf)| *weight * on(leaf))
             .sum()
-    }
-
-    /// The discrete leaves of neighbouring scenarios with their weights.
-    pub(in crate::leaf::derivative) fn neighbours(
-        &self,
-        rate: &LeafRate,
-    ) -> Vec<(f64, DiscreteLeaf)> {
-        let each = rate.leaves.iter();
-        each.map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
-            .collect()
     }
 
     /// Adds the changes of the loads that veins have of their own, from the weighted leaves of
@@ -96,7 +94,7 @@ impl DiscreteLeaf {
     }
 
     /// Adds the effect of the changes of the tissue, and of its natural state, and of loads of
-    /// single veins.
+    /// single veins: from the weighted leaves of which they are the sum.
     pub(in crate::leaf::derivative) fn add_tissue_changes(
         &self,
         state: &State,

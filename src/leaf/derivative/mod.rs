@@ -26,8 +26,8 @@ pub struct LeafRate<'s> {
     tip_force: DVec3,
     tip_moment: DVec3,
     held: Option<HeldRate>,
-    /// The leaves that differ in the number, with their weights, if they have tissue or loads of
-    /// single veins.
+    /// The leaves that differ in the number, with their weights, if they have tissue, loads of
+    /// single veins, or grips.
     leaves: Vec<(f64, Leaf)>,
 }
 
@@ -114,7 +114,11 @@ impl<'s> LeafRate<'s> {
             tip_force: vector(|s| s.tip_force, scale.force()),
             tip_moment: vector(|s| s.tip_moment, scale.moment()),
             held: HeldRate::new(leaf, terms),
-            leaves: match leaf.has_tissue() || terms.iter().any(|(_, s)| s.has_own_loads()) {
+            leaves: match leaf.has_tissue()
+                || terms
+                    .iter()
+                    .any(|(_, s)| s.has_own_loads() || !s.grips.is_empty())
+            {
                 true => leaves(leaf, terms),
                 false => Vec::new(),
             },
@@ -173,7 +177,7 @@ impl DiscreteLeaf {
     /// with these segments.
     pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
         let mut forces = Forces::zeros(self.rods());
-        let neighbours = self.neighbours(rate);
+        let neighbours = self.each_of(rate);
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
@@ -189,9 +193,8 @@ impl DiscreteLeaf {
             }
         }
         self.add_tissue_changes(state, &neighbours, &mut forces);
-        if let Some(held) = &rate.held {
-            self.add_tip_motion(state, segments, held, &mut forces);
-        }
+        let motion = self.held_motion(rate, &neighbours);
+        self.add_held_motion(state, segments, motion, &mut forces);
         forces
     }
 

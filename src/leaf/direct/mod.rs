@@ -13,7 +13,7 @@ use super::state::{Field, Increment};
 use super::system::System;
 use crate::memory;
 use condensed::Condensed;
-use sparse::{Sparse, Symbolic};
+use sparse::{Cholesky, Sparse, Symbolic};
 use std::sync::{Arc, OnceLock};
 use unknowns::{Unknowns, entries};
 
@@ -52,6 +52,7 @@ pub struct Factors {
 enum Kind {
     Condensed(Condensed),
     Sparse(Sparse),
+    Cholesky(Cholesky),
 }
 
 /// Why a matrix could not be factorised.
@@ -161,6 +162,22 @@ impl DirectSolver {
         self.factorize_bordered(system, shift, &[])
     }
 
+    /// Factorises the matrix assembled in `system` plus `shift` times its mass matrix; `None` if it
+    /// is not positive definite.
+    pub fn factorize_definite(
+        &self,
+        system: &System,
+        shift: f64,
+    ) -> Result<Option<Factors>, DirectError> {
+        if self.condenses {
+            let factors = self.factorize(system, shift)?;
+            return Ok((factors.negative() == 0).then_some(factors));
+        }
+        let symbolic = self.symbolic(system)?;
+        let cholesky = symbolic.factorize_definite(system, &self.unknowns, shift)?;
+        Ok(cholesky.map(|cholesky| self.factors(Kind::Cholesky(cholesky))))
+    }
+
     /// As [`DirectSolver::factorize`], by the sparse factorisation, whose pivots tell the signs of
     /// eigenvalues closer to zero where veins are stiff.
     pub fn factorize_sparse(&self, system: &System, shift: f64) -> Result<Factors, DirectError> {
@@ -211,6 +228,7 @@ impl Factors {
         match &self.kind {
             Kind::Condensed(condensed) => condensed.negative(),
             Kind::Sparse(sparse) => sparse.negative(),
+            Kind::Cholesky(_) => 0,
         }
     }
 
@@ -219,6 +237,7 @@ impl Factors {
         match &mut self.kind {
             Kind::Condensed(condensed) => condensed.solve(&self.unknowns, b),
             Kind::Sparse(sparse) => sparse.solve(b),
+            Kind::Cholesky(cholesky) => cholesky.solve(b),
         }
     }
 
@@ -228,6 +247,7 @@ impl Factors {
         match &mut self.kind {
             Kind::Condensed(condensed) => condensed.solve_once(&self.unknowns, b),
             Kind::Sparse(sparse) => sparse.solve(b),
+            Kind::Cholesky(cholesky) => cholesky.solve(b),
         }
     }
 

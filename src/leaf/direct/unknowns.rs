@@ -222,25 +222,32 @@ pub fn lower_triangle(
     size: usize,
     entries: &[[usize; 2]],
 ) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
-    let mut ends = vec![0; size + 1];
-    entries.iter().for_each(|[column, _]| ends[column + 1] += 1);
-    for column in 0..size {
-        ends[column + 1] += ends[column];
-    }
-    let mut sorted = vec![(0, 0); entries.len()];
-    for (k, &[column, row]) in entries.iter().enumerate() {
-        sorted[ends[column]] = (row, k);
-        ends[column] += 1;
-    }
+    // Sorted by rows and then, in this order, by columns: the rows of each column ascend.
+    let sorted = |by: usize, order: &mut dyn Iterator<Item = usize>| {
+        let mut ends = vec![0; size + 1];
+        entries.iter().for_each(|entry| ends[entry[by] + 1] += 1);
+        for k in 0..size {
+            ends[k + 1] += ends[k];
+        }
+        let mut sorted = vec![0; entries.len()];
+        for k in order {
+            let end = &mut ends[entries[k][by]];
+            sorted[*end] = k;
+            *end += 1;
+        }
+        (sorted, ends)
+    };
+    let (by_rows, _) = sorted(1, &mut (0..entries.len()));
+    let (sorted, ends) = sorted(0, &mut by_rows.into_iter());
     let (mut starts, mut rows) = (vec![0], Vec::<usize>::new());
     let mut places = vec![0; entries.len()];
     let mut begin = 0;
     for &end in &ends[..size] {
-        let column = &mut sorted[begin..end];
+        let column = &sorted[begin..end];
         begin = end;
-        column.sort_unstable();
         let start = rows.len();
-        for &(row, k) in &*column {
+        for &k in column {
+            let row = entries[k][1];
             if rows[start..].last() != Some(&row) {
                 rows.push(row);
             }

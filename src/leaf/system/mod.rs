@@ -82,6 +82,8 @@ pub struct System {
     gaps: Vec<DVec3>,
     /// The blocks between neighbouring rods, gap after gap, nodes 1 to n; empty without tissue.
     across: Vec<NodeBlock>,
+    /// Nodes (from 0) that grips hold, with the components that are: these have no momentum.
+    gripped: Vec<(usize, usize, Range<usize>)>,
     /// Spatial dead moment on the tip of a single rod, as of the last assembly.
     pub(super) moment: DVec3,
 }
@@ -133,6 +135,13 @@ impl System {
             tip: None,
             gaps,
             across: vec![Default::default(); if leaf.tied() { (rods - 1) * n } else { 0 }],
+            gripped: (0..rods)
+                .flat_map(|j| leaf.grips_of(j))
+                .map(|held| {
+                    let first = if held.rotation.is_some() { 0 } else { 3 };
+                    (held.rod, held.node - 1, first..6)
+                })
+                .collect(),
             moment: DVec3::ZERO,
         }
     }
@@ -330,8 +339,13 @@ impl System {
             std::array::from_fn(|c| mass[c / 3] * v[c])
         };
         let rods = increments.iter().enumerate();
-        rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
-            .collect()
+        let mut momentum: Field = rods
+            .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
+            .collect();
+        for (j, i, held) in &self.gripped {
+            momentum[*j][*i][held.clone()].fill(0.0);
+        }
+        momentum
     }
 
     /// Largest rotation and largest displacement of the last solution; infinite if one is not a

@@ -31,7 +31,7 @@ pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout, packs: &mu
             for segment in before.into_iter().chain([&old[i]]) {
                 let stretch = segment.stretch.into_iter().fold(0.0_f64, f64::max);
                 let bend = segment.bend.into_iter().fold(0.0_f64, f64::max);
-                let arm = 0.5 * segment.rest_length;
+                let arm = 0.5 * segment.rest_length[0];
                 mass += 2.0 * stretch / (4.0 - ROTATING);
                 inertia += 2.0 * (bend + stretch * arm * arm) / ROTATING;
             }

@@ -121,8 +121,8 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         let section = leaf.section(j, i);
         // A time-dependent factor is applied in each step.
         let rest = physics.constant_rest.unwrap_or(1.0);
-        node.rest_length = section.rest_strain.x * section.ds;
         for c in 0..3 {
+            node.rest_length[c] = section.rest_strain[c] * section.ds;
             node.stretch[c] = 1.0 / (section.compliance[c] * section.ds);
             node.bend[c] = section.couple_stiffness[c] / section.ds;
             node.rest_turn[c] = rest * section.rest_curvature[c] * section.ds;

@@ -49,7 +49,8 @@ fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
     for (j, i) in leaf.each(0..=leaf.segments()) {
         let k = state.base(j) + i;
-        all[k].0 += leaf.load(state, j, i).force;
+        let load = leaf.load(state, j, i);
+        all[k] = (all[k].0 + load.force, all[k].1 + load.moment);
         if i < leaf.segments() {
             let section = leaf.section(j, i);
             let segment = leaf.strained_segment(state, j, i);
@@ -73,8 +74,11 @@ fn forces_are_those_of_the_element() {
     let round = alike.replace("2.0, axial", "0.7, axial");
     let round = round.replace("shear_3 = 70.0", "shear_3 = 50.0");
     let round = round.replace(&format!("{bend_2}, bend_3 = 0.7, "), "");
+    // Veins that tissue ties have rest strains in all directions.
+    let tissue = "tissue = { along = 3.0, across = 2.0, normal = 1.0, fold = 0.2 }";
+    let tied = LEAF.replace("coupling = { x = 3.0, y = 1.0, z = 2.0 }", tissue);
     for n in SEGMENTS {
-        for toml in [LEAF, &alike, &round] {
+        for toml in [LEAF, &alike, &round, &tied] {
             forces_are_those(&discrete(toml, n));
         }
     }

@@ -32,8 +32,8 @@ pub fn unstrained(leaf: &DiscreteLeaf, near: &State) -> Option<State> {
     let mut system = System::new(&leaf);
     let mut held = |&rate: &f64| held(&leaf, &mut system, near, rate);
     let found = HOLDS.iter().find_map(&mut held);
-    let tip_held = leaf.leaf.held.is_some();
-    found.or_else(|| meeting(&leaf).filter(|_| !tip_held))
+    let is_held = leaf.leaf.is_held();
+    found.or_else(|| meeting(&leaf).filter(|_| !is_held))
 }
 
 /// The equilibrium with springs of this `rate`, if there is one.

@@ -139,7 +139,7 @@ pub enum RelaxError {
     Memory(#[from] TooMuch),
     /// Grips, which this method or question does not take into account.
     #[error(
-        "[[grip]]: {what} does not take grips along veins into account: relax and map do; leave them out, or hold the tip by [tip]"
+        "[[grip]]: {what} does not take grips along veins into account, as relaxation and following do; leave them out, or hold the tip by [tip]"
     )]
     Grips {
         /// The method or the question.

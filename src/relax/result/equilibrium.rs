@@ -229,6 +229,12 @@ pub struct Sensitivity {
     /// Bound on the error of its force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_reaction_error: Option<f64>,
+    /// Derivatives of what the grips feel.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub grip_reactions: Vec<GripReaction>,
+    /// Bound on the error of their forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grip_reactions_error: Option<f64>,
     /// Fractions of the length that the nodes of all grids have in common.
     #[serde(skip)]
     pub stations: Vec<f64>,

@@ -14,10 +14,10 @@ use crate::leaf::{DiscreteLeaf, Forces, Leaf, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::result::equilibrium::Sensitivity;
-use crate::relax::result::reaction::Reaction;
+use crate::relax::result::reaction::{GripReaction, Reaction};
 use crate::relax::sensitivity::parameter::Parameter;
 use crate::relax::transfer::level::Level;
-use crate::scenario::Scenario;
+use crate::scenario::{Grip, Hold, Scenario};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -39,8 +39,9 @@ type Known<'n, 'a> = (
 );
 
 /// Derivatives on one grid, in the leaf's units: of the tips, the energy, the eigenvalues (numbers
-/// as x), the reaction (force, then moments), and the positions.
-type Changes = [Vec<DVec3>; 5];
+/// as x), the reaction (force, then moments), the positions, and the grips' reactions (of each the
+/// force and the moment).
+type Changes = [Vec<DVec3>; 6];
 
 /// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
 /// are its grids from coarse to fine. Left out are numbers for which the scenario has no
@@ -55,7 +56,7 @@ pub(crate) fn sensitivities(
         return Vec::new();
     };
     let leaf = &finest.leaf.leaf;
-    let differences = modes > 0 || is_clamped(leaf);
+    let differences = modes > 0 || is_clamped(leaf) || has_clamped_grips(leaf);
     let known: Vec<Known> = (numbers.iter())
         .filter_map(|(key, number)| {
             let near = if differences { number.nearby() } else { None };
@@ -65,7 +66,7 @@ pub(crate) fn sensitivities(
     let rates: Vec<LeafRate> = (known.iter())
         .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
         .collect();
-    let mut found: Vec<[Series; 5]> = rates.iter().map(|_| Default::default()).collect();
+    let mut found: Vec<[Series; 6]> = rates.iter().map(|_| Default::default()).collect();
     let mut eigenvalues: Vec<f64> = Vec::new();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
@@ -103,7 +104,7 @@ pub(crate) fn sensitivities(
 fn sensitivity(
     (key, value): (&str, f64),
     (leaf, stations): (&Leaf, &[f64]),
-    [tips, energy, eigenvalues, reaction, positions]: [(Vec<DVec3>, Option<f64>); 5],
+    [tips, energy, eigenvalues, reaction, positions, grips]: [(Vec<DVec3>, Option<f64>); 6],
     squared: &[f64],
 ) -> Sensitivity {
     let scale = leaf.scale;
@@ -122,6 +123,11 @@ fn sensitivity(
         force: *force * scale.force(),
         moments: is_clamped(leaf).then(|| of(moments, scale.moment())),
     });
+    let grip = |(change, grip): (&[DVec3], &Grip)| GripReaction {
+        force: change[0] * scale.force(),
+        moment: (grip.held == Hold::Clamped).then(|| change[1] * scale.moment()),
+    };
+    let on_grips = grips.0.chunks(2).zip(&leaf.scenario().grips).map(grip);
     Sensitivity {
         key: key.to_owned(),
         value,
@@ -136,6 +142,10 @@ fn sensitivity(
             .filter(|_| held.is_some())
             .map(|error| error * scale.force()),
         reaction: held,
+        grip_reactions: on_grips.collect(),
+        grip_reactions_error: (grips.1)
+            .filter(|_| !grips.0.is_empty())
+            .map(|error| error * scale.force()),
         positions: places.map(|rod| of(rod, scale.length)).collect(),
         positions_error: positions.1.map(|error| error * scale.length),
         stations: stations.to_vec(),
@@ -144,6 +154,11 @@ fn sensitivity(
 
 fn is_clamped(leaf: &Leaf) -> bool {
     (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some())
+}
+
+fn has_clamped_grips(leaf: &Leaf) -> bool {
+    let mut grips = leaf.scenario().grips.iter();
+    grips.any(|grip| grip.held == Hold::Clamped)
 }
 
 /// A grid on which derivatives are computed.
@@ -172,7 +187,7 @@ impl Grid<'_> {
         // In the scenario's unit of time, as their derivatives are.
         let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
-        let held = leaf.leaf.held.is_some();
+        let (tip_held, held) = (leaf.leaf.held.is_some(), leaf.leaf.is_held());
         if forces.len() > MOST_DIRECT && modes.is_empty() && moment == DVec3::ZERO && !held {
             return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
         }
@@ -193,11 +208,12 @@ impl Grid<'_> {
                 self.tips().map(tip).collect(),
                 vec![DVec3::X * (forces.energy + work)],
                 of_modes.map(|value| DVec3::X * value).collect(),
-                match held {
+                match tip_held {
                     true => self.reaction(near.as_ref(), change),
                     false => Vec::new(),
                 },
                 self.positions(rate, response),
+                self.on_grips(near.as_ref(), change),
             ]
         });
         Some((eigenvalues, changes.collect()))
@@ -218,6 +234,28 @@ impl Grid<'_> {
             );
         }
         all
+    }
+
+    /// The changes of force and moment on every grip.
+    fn on_grips(
+        &self,
+        near: Option<&Nearby>,
+        (rate, response): (&LeafRate, &Response),
+    ) -> Vec<DVec3> {
+        let Level { leaf, state } = self.level;
+        if !leaf.has_grips() {
+            return Vec::new();
+        }
+        let forces = leaf.grip_force_rates(state, rate, response);
+        let clamped = near.filter(|_| has_clamped_grips(&leaf.leaf));
+        let moments = clamped.map_or(vec![DVec3::ZERO; forces.len()], |near| {
+            near.grip_moment_rates(self.level)
+        });
+        forces
+            .into_iter()
+            .zip(moments)
+            .flat_map(<[_; 2]>::from)
+            .collect()
     }
 
     /// Displacements of the nodes that all grids have, rod after rod.
@@ -244,7 +282,7 @@ impl Grid<'_> {
         let changes = |forces: &Forces| -> Changes {
             let tips = self.tips().map(|k| tip(forces, k)).collect();
             let energy = vec![DVec3::X * forces.energy];
-            [tips, energy, Vec::new(), Vec::new(), Vec::new()]
+            [tips, energy, Vec::new(), Vec::new(), Vec::new(), Vec::new()]
         };
         Some(forces.iter().map(changes).collect())
     }

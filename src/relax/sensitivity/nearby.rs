@@ -1,4 +1,4 @@
-//! Derivatives of eigenvalues, and of the moments on a clamp, by finite differences between
+//! Derivatives of eigenvalues, and of the moments on clamps, by finite differences between
 //! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
@@ -82,12 +82,28 @@ impl Nearby {
 
     /// The derivatives of the moments of the rods on a clamp.
     pub fn clamp_moment_rates(&self, level: &Level) -> Vec<DVec3> {
-        let first = level.leaf.reaction(&level.state).1;
+        self.rates_of(level, |leaf, state| leaf.reaction(state).1)
+    }
+
+    /// The derivatives of the moments on grips about their middles.
+    pub fn grip_moment_rates(&self, level: &Level) -> Vec<DVec3> {
+        self.rates_of(level, |leaf, state| {
+            let reactions = leaf.grip_reactions(state).into_iter();
+            reactions.map(|[_, moment]| moment).collect()
+        })
+    }
+
+    fn rates_of(
+        &self,
+        level: &Level,
+        vectors: impl Fn(&DiscreteLeaf, &State) -> Vec<DVec3>,
+    ) -> Vec<DVec3> {
+        let first = vectors(&level.leaf, &level.state);
         let mut rates = vec![DVec3::ZERO; first.len()];
         for near in &self.0 {
-            let moments = near.leaf.reaction(&near.state).1;
-            for ((rate, moment), first) in rates.iter_mut().zip(moments).zip(&first) {
-                *rate += near.weight * (moment - *first);
+            let found = vectors(&near.leaf, &near.state);
+            for ((rate, vector), first) in rates.iter_mut().zip(found).zip(&first) {
+                *rate += near.weight * (vector - *first);
             }
         }
         rates

@@ -145,10 +145,10 @@ fn response(
         }
         rhs.iter_mut().flatten().for_each(|force| *force = [0.0; 6]);
     }
-    // A held tip moves with its holder.
-    for (rod, tip) in response.nodes.iter_mut().zip(&load.tips) {
-        let last = rod.last_mut().into_iter().flatten();
-        last.zip(tip).for_each(|(sum, value)| *sum += value);
+    // Held nodes move with their holders.
+    for (rod, moved) in response.nodes.iter_mut().zip(&load.moved) {
+        let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());
+        nodes.for_each(|(sum, value)| *sum += value);
     }
     let mut numbers = response.nodes.iter().flatten().flatten();
     let finite = numbers.all(|value| value.is_finite());

@@ -197,6 +197,16 @@ impl Vein {
 }
 
 impl Vein {
+    /// u0 at the fraction `x` of the blade's length.
+    fn rest_curvature(&self, x: f64) -> [f64; 3] {
+        let [slope, second] = self.slopes(x);
+        // On a cylinder at the angle phi, tan(phi) = y', to its principal direction.
+        let curvature = self.outline.curvature.as_ref();
+        let curvature = curvature.map_or(0.0, |of| of.at(x)[0]) / (1.0 + slope * slope);
+        let sideways = second / slope.hypot(1.0).powi(3);
+        [curvature * slope, curvature, sideways]
+    }
+
     /// The properties of a vein at a fraction of its length, by their numbers.
     fn properties(&self, sigma: f64) -> [f64; MOST] {
         let x = self.place(sigma);
@@ -208,12 +218,9 @@ impl Vein {
         } = self.material.at(sigma);
         let mass_density = self.material.mass_density.as_ref();
         let density = mass_density.map_or(0.0, |it| it.at(sigma));
-        let [slope, second] = self.slopes(x);
+        let [twist, bend, sideways] = self.rest_curvature(x);
         let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
         let across = SHEAR_FACTOR * shear * h * t;
-        // On a cylinder at the angle phi, tan(phi) = y', to its principal direction.
-        let curvature = self.outline.curvature.as_ref();
-        let curvature = curvature.map_or(0.0, |of| of.at(x)[0]) / (1.0 + slope * slope);
         [
             shear * flat / 3.0,
             young * flat / 12.0,
@@ -221,9 +228,9 @@ impl Vein {
             young * h * t,
             across,
             across,
-            curvature * slope,
-            curvature,
-            second / slope.hypot(1.0).powi(3),
+            twist,
+            bend,
+            sideways,
             density * heavy * t,
             0.5 * density * heavy * t * (heavy * heavy + t * t) / 12.0,
         ]
@@ -307,7 +314,13 @@ impl BladePart {
 
     /// A property at a fraction of the length.
     pub fn at(&self, property: BladeProperty, sigma: f64) -> f64 {
-        self.properties(sigma)[property.number()]
+        match (&self.source, property) {
+            // Natural leaves are integrated with these.
+            (Source::Vein(vein), BladeProperty::Rest(axis)) => {
+                vein.rest_curvature(vein.place(sigma))[axis]
+            }
+            _ => self.properties(sigma)[property.number()],
+        }
     }
 
     /// Fractions inside (0, 1) where the slope of a property may jump.

@@ -165,7 +165,7 @@ impl CaseAt {
     /// respect to all numbers. `None` if solving for each number takes no more work.
     pub fn tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
         let leaf = &self.at.levels[0].leaf;
-        let symmetric = leaf.leaf.held.is_none() && leaf.tip_moment() == DVec3::ZERO;
+        let symmetric = !leaf.leaf.is_held() && leaf.tip_moment() == DVec3::ZERO;
         let tip = |component: &Component| match component.what {
             Compared::Result(Quantity::Tip(axis)) => Some(axis),
             _ => None,
@@ -245,6 +245,10 @@ impl CaseAt {
                 let force = self.at.best(|_, level| level.leaf.reaction(&level.state).0);
                 force[axis] * self.force()
             }
+            Quantity::Grip(grip, axis) => {
+                let force = |_, level: &Level| level.leaf.grip_reactions(&level.state)[grip][0];
+                self.at.best(force)[axis] * self.force()
+            }
             Quantity::Frequency(mode) => {
                 self.eigenvalue(mode).max(0.0).sqrt() * self.unit(Kind::Frequency)
             }
@@ -282,6 +286,13 @@ impl CaseAt {
             }
             Quantity::Reaction(axis) => {
                 let force = |k: usize, level: &Level| level.leaf.reaction_rate(rate, &responses[k]);
+                self.at.best(force)[axis] * self.force()
+            }
+            Quantity::Grip(grip, axis) => {
+                let force = |k: usize, level: &Level| {
+                    let Level { leaf, state } = level;
+                    leaf.grip_force_rates(state, rate, &responses[k])[grip]
+                };
                 self.at.best(force)[axis] * self.force()
             }
             Quantity::Frequency(mode) => {

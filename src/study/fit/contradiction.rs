@@ -19,7 +19,7 @@ pub(super) fn misses<'s>(stats: &'s Statistics) -> impl Iterator<Item = &'s Comp
         let size = match component.what {
             Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
             Compared::Result(Quantity::Frequency(_)) => data.max(model),
-            Compared::Result(Quantity::Reaction(_)) => f64::INFINITY,
+            Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => f64::INFINITY,
         };
         let beyond = component.what.kind() == Kind::Length && data > BEYOND * longest;
         beyond || (component.observed - component.model).abs() > MISSED * size

@@ -45,7 +45,7 @@ use std::time::Instant;
 
 use super::{Base, VaryError};
 use crate::limit::Limit;
-use crate::relax::{Options, RelaxError, check_tolerance, without_grips, without_wind};
+use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use free::Coordinate;
 use least_squares::{ASSUMED, Weighting};
 use minima::{Beginning, Minima};
@@ -108,7 +108,6 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance).map_err(RelaxError::from)?;
     }
-    without_grips(base.scenario(), "a fit")?;
     without_wind(base.scenario(), "a fit")?;
     let coordinates = coordinates(request)?;
     let options = Options {

@@ -11,7 +11,7 @@ use super::case::{CaseAt, Component};
 use super::data::{Data, Measured, Origin};
 use super::experiments::{self, Case};
 use super::free::Coordinate;
-use super::quantity::Kind;
+use super::quantity::{Kind, Quantity};
 use super::words::digits;
 use crate::newton::Work;
 use crate::relax::{Grids, Lost, NestedEquilibrium, Options};
@@ -100,13 +100,24 @@ impl<'a> Model<'a> {
                 );
                 return Err(FitError::Data(why));
             }
-            let of_a_holder = |m: &&Measured| m.quantity.kind() == Kind::Force;
+            let of_a_holder = |m: &&Measured| matches!(m.quantity, Quantity::Reaction(_));
             if let Some(measured) = case.measured().find(of_a_holder)
                 && base.scenario().held_tip.is_none()
             {
                 let why = format!(
                     "{} is what the holder of a tip feels, and the scenario's tip is free: add \
                      [tip] with held = \"pinned\" or \"clamped\"",
+                    measured.quantity
+                );
+                return Err(FitError::Data(why));
+            }
+            let grips = base.scenario().grips.len();
+            let of_no_grip =
+                |m: &&Measured| matches!(m.quantity, Quantity::Grip(grip, _) if grip >= grips);
+            if let Some(measured) = case.measured().find(of_no_grip) {
+                let why = format!(
+                    "{} is what a grip feels, counted from 1, and the scenario has {grips} of \
+                     [[grip]]",
                     measured.quantity
                 );
                 return Err(FitError::Data(why));
@@ -125,7 +136,7 @@ impl<'a> Model<'a> {
             options: options.clone(),
             cases: Arc::new(cases),
             grids: Grids::AsNeeded,
-            linear: is_linear(coordinates) && base.scenario().tissue.is_none(),
+            linear: is_linear(coordinates) && !base.scenario().depends_on_natural_leaf(),
             changes: Arc::default(),
         })
     }

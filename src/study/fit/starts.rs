@@ -260,7 +260,7 @@ pub(super) fn misfit(model: &Model, point: &Point) -> f64 {
     for component in point.components() {
         let size = match component.what {
             Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
-            Compared::Result(Quantity::Reaction(_)) => force,
+            Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => force,
             Compared::Result(Quantity::Frequency(_)) => frequency,
         };
         let part = (component.model - component.observed) / size.max(f64::MIN_POSITIVE);

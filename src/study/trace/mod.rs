@@ -3,15 +3,17 @@
 mod law;
 mod result;
 mod run;
+mod show;
 
 pub use law::Law;
-pub use result::{PointKind, Trace, TraceBranch, TracePoint, TraceShow};
+pub use result::{PointKind, Trace, TraceBranch, TracePoint};
 pub use run::trace;
 pub(super) use run::traced;
+pub use show::TraceShow;
 
 use super::vary::{Base, Vary};
 use crate::refusal::RefusedOption;
-use crate::relax::{RelaxError, without_grips, without_wind};
+use crate::relax::{RelaxError, without_wind};
 use crate::scenario::Key;
 use crate::study::{Target, VaryError};
 
@@ -62,7 +64,6 @@ pub enum TraceError {
 impl TraceRequest {
     /// Validates the request before it is run.
     pub(super) fn check(&self) -> Result<(), TraceError> {
-        without_grips(self.base.scenario(), "following a branch")?;
         without_wind(self.base.scenario(), "following a branch")?;
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));

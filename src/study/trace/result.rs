@@ -4,12 +4,12 @@ use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::law::Law;
+use super::show::TraceShow;
 use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 use crate::undulation::Undulation;
-use crate::words;
 
 /// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -38,6 +38,9 @@ pub struct Trace {
     /// Whether the tips are held.
     #[serde(skip)]
     pub held: bool,
+    /// Number of grips along veins.
+    #[serde(skip)]
+    pub grips: usize,
     /// Segments per rod of the finest grid on which branches were followed.
     pub segments: usize,
     /// Required accuracy of the tips, relative to the longest rod.
@@ -91,8 +94,11 @@ pub struct TracePoint {
     /// The reaction at held tips.
     #[serde(rename = "tip_reaction", skip_serializing_if = "Option::is_none")]
     pub reaction: Option<DVec3>,
-    /// Bound on the error of the tips, or, if they are held, of the midpoints of the rods:
-    /// within the tolerance.
+    /// The forces on the grips.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub grip_reactions: Vec<DVec3>,
+    /// Bound on the error of the tips, or, if they are held, of the midpoints of the rods, and
+    /// of both with grips: within the tolerance.
     pub error: Option<f64>,
     /// Potential energy.
     pub energy: f64,
@@ -115,50 +121,17 @@ impl TracePoint {
     pub fn force_on_tip(&self, axis: usize) -> f64 {
         self.reaction.map_or(self.value, |reaction| -reaction[axis])
     }
-}
 
-words! {
-    /// What the figure of a trace shows against the number that varies.
-    pub enum TraceShow {
-        /// A coordinate of the tip; of the first one if they are free.
-        TipX = "x",
-        /// Its y.
-        TipY = "y",
-        /// Its z.
-        TipZ = "z",
-        /// A component of the reaction at held tips.
-        ReactionX = "reaction_x",
-        /// Its y.
-        ReactionY = "reaction_y",
-        /// Its z.
-        ReactionZ = "reaction_z",
-        /// The potential energy.
-        Energy = "energy",
-        /// The mean twist of the veins, in radians.
-        Twist = "twist",
-    }
-}
-
-impl TraceShow {
-    /// Whether it exists for held tips only.
-    pub fn is_reaction(self) -> bool {
-        use TraceShow::{ReactionX, ReactionY, ReactionZ};
-        matches!(self, ReactionX | ReactionY | ReactionZ)
-    }
-
-    /// Its value at a point.
-    pub fn of(self, point: &TracePoint) -> f64 {
-        let tip = |axis: usize| point.tips.first().map_or(f64::NAN, |tip| tip[axis]);
-        let reaction = |axis: usize| point.reaction.map_or(f64::NAN, |force| force[axis]);
-        match self {
-            TraceShow::TipX => tip(0),
-            TraceShow::TipY => tip(1),
-            TraceShow::TipZ => tip(2),
-            TraceShow::ReactionX => reaction(0),
-            TraceShow::ReactionY => reaction(1),
-            TraceShow::ReactionZ => reaction(2),
-            TraceShow::Energy => point.energy,
-            TraceShow::Twist => point.undulation.twist(),
+    /// What the figure shows of it; NaN if the leaf has no such thing.
+    pub fn shown(&self, what: TraceShow) -> f64 {
+        let component =
+            |vector: Option<&DVec3>, axis: usize| vector.map_or(f64::NAN, |it| it[axis]);
+        match what {
+            TraceShow::Tip(axis) => component(self.tips.first(), axis),
+            TraceShow::Reaction(axis) => component(self.reaction.as_ref(), axis),
+            TraceShow::Grip { grip, axis } => component(self.grip_reactions.get(grip), axis),
+            TraceShow::Energy => self.energy,
+            TraceShow::Twist => self.undulation.twist(),
         }
     }
 }

@@ -76,6 +76,7 @@ pub fn traced(
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
         held: scenario.held_tip.is_some(),
+        grips: scenario.grips.len(),
         joined: scenario.joined,
         segments: wanted.unwrap_or(2 * (rest.shape.stations.len() - 1)),
         tolerance,
@@ -309,6 +310,8 @@ impl Run<'_, '_> {
     fn point(&self, point: usize, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
+        let held = self.request.base.scenario().held_tip.is_some();
+        let forces = refined.reactions.iter().map(|force| *force * scale.force());
         TracePoint {
             point,
             kind,
@@ -321,8 +324,8 @@ impl Run<'_, '_> {
                 }
             },
             tips: self.family.tips(&refined.tips),
-            reaction: (self.request.base.scenario().held_tip.is_some())
-                .then_some(refined.reaction * scale.force()),
+            reaction: forces.clone().next().filter(|_| held),
+            grip_reactions: forces.skip(usize::from(held)).collect(),
             error: Some(refined.error * scale.length),
             energy: refined.energy * scale.moment(),
             index,

@@ -204,8 +204,8 @@ impl Base {
             }),
             value,
             unit,
-            // The natural leaf, in which tissue has no force, depends on shapes at rest otherwise.
-            linear: keys.is_linear() && self.scenario().tissue.is_none(),
+            // The natural leaf depends on shapes at rest otherwise.
+            linear: keys.is_linear() && !self.scenario().depends_on_natural_leaf(),
         }
     }
 

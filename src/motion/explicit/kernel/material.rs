@@ -8,8 +8,8 @@ use std::sync::Arc;
 pub struct Node {
     /// H/ds.
     pub stretch: [f64; 3],
-    /// ds times the rest stretch: the rest strain is v0 = (stretch, 0, 0).
-    pub rest_length: f64,
+    /// ds v0.
+    pub rest_length: [f64; 3],
     /// A/ds.
     pub bend: [f64; 3],
     /// ds u0, times its factor if that is constant.
@@ -38,8 +38,8 @@ pub struct Material {
     /// H2/ds, and the excess of H1/ds and H3/ds over it.
     pub shear: [f64; BLOCK],
     pub stretch_excess: [[f64; BLOCK]; 2],
-    /// H1/ds times the rest length: minus the force along d1 without strains.
-    pub rest_force: [f64; BLOCK],
+    /// H v0: minus the force where the segment has no length.
+    pub rest_force: [[f64; BLOCK]; 3],
     /// A2/ds, and the excess of A1/ds and A3/ds over it.
     pub bend: [f64; BLOCK],
     pub bend_excess: [[f64; BLOCK]; 2],
@@ -66,13 +66,14 @@ impl Material {
         let round = |node: &Node| {
             let [_, bend_2, bend_3] = node.bend;
             let [_, shear_2, shear_3] = node.stretch;
-            bend_2 == bend_3 && shear_2 == shear_3 && node.rest_turn[1..] == [0.0, 0.0]
+            let straight = [&node.rest_turn, &node.rest_length].map(|rest| rest[1..] == [0.0, 0.0]);
+            bend_2 == bend_3 && shear_2 == shear_3 && straight == [true; 2]
         };
         Material {
             round: nodes.iter().all(round),
             shear: gather(&|node| node.stretch[1]),
             stretch_excess: [0, 2].map(|c| gather(&|node| node.stretch[c] - node.stretch[1])),
-            rest_force: gather(&|node| node.stretch[0] * node.rest_length),
+            rest_force: [0, 1, 2].map(|c| gather(&|node| node.stretch[c] * node.rest_length[c])),
             bend: gather(&|node| node.bend[1]),
             bend_excess: [0, 2].map(|c| gather(&|node| node.bend[c] - node.bend[1])),
             rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),

@@ -172,7 +172,7 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
     let (shear, bend) = (own(&material.shear), own(&material.bend));
     let stretch_excess = cut(&material.stretch_excess, (0, count));
     let bend_excess = cut(&material.bend_excess, (0, count));
-    let rest_force = own(&material.rest_force);
+    let rest_force = cut(&material.rest_force, (0, count));
     let rest_moment = cut(&material.rest_moment, (0, count));
     let rest_turn = cut(&material.rest_turn, (0, count));
     let mut force = cut_mut(&mut block.n, (WIDTH, count));
@@ -246,19 +246,20 @@ fn loops<S: Simd, const ROUND: bool, const DAMPED: bool, const CHANGES: bool>(
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
         let shear = Lanes::load(simd, shear, at);
         let [excess_1, excess_3] = [0, 1].map(|c| Lanes::load(simd, stretch_excess[c], at));
-        let rest_force = Lanes::load(simd, rest_force, at);
         let directors = directors((a + b, aw + bw), twice);
         let n = if ROUND {
             let [d1, ..] = directors;
+            let rest_force = Lanes::load(simd, rest_force[0], at);
             m = d1.mul_add(two_sigma * extra.x, m);
             d1.mul_add(excess_1 * d1.dot(dx) - rest_force, dx.scale(shear))
         } else {
             m = m + extra.scale(two_sigma).along(directors);
             let v = dx.onto(directors);
+            let rest_force = load(&rest_force);
             let mut extra = Vectors::new(
-                excess_1 * v.x - rest_force,
-                Lanes::splat(simd, 0.0),
-                excess_3 * v.z,
+                excess_1 * v.x - rest_force.x,
+                -rest_force.y,
+                excess_3 * v.z - rest_force.z,
             );
             if let Some(((last, earlier), _)) = &mut past {
                 let rate = rate((last, earlier), (v, at), rates, law.remember);

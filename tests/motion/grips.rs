@@ -1,0 +1,60 @@
+//! Grips hold veins while they move.
+
+use leafdyn::simulate;
+use leafdyn_testing::motion::{BOTH, Scheme, at, gripped_veins, moving, rest, run};
+use leafdyn_testing::*;
+
+/// Where a rod of this length, with `grip`, is after it was shaken by its weight: its nodes.
+fn shaken(scheme: Scheme, length: f64, segments: usize, grip: &str) -> Vec<DVec3> {
+    let text = format!(
+        r#"
+        {ROD}
+        {grip}
+        dynamics = {{ density = 1.0, rotary_inertia = 0.01, external_damping = 0.5, duration = 1.5, start = "released" }}
+        "#
+    );
+    let gravity = "dynamics.gravity={ at = [0.0, 0.4, 1.5], value = [[0.0, 0.0, 0.0], [0.5, 1.0, -3.0], [0.0, -1.0, 2.0]] }";
+    let made = base(&text, &format!("leaf.length={length:?}; {gravity}"));
+    let options = simulate::Options {
+        step: Some(1e-3),
+        ..moving(scheme, Some(segments))
+    };
+    run(made.scenario(), &options).positions
+}
+
+/// What is beyond a clamp in the middle of a vein moves as a cantilever that begins there, and what
+/// is before it as one whose tip is clamped.
+#[test]
+fn a_clamp_in_the_middle_divides_a_motion() {
+    for scheme in BOTH {
+        let grip = "grip = [{ vein = 1, at = 0.5, held = \"clamped\" }]";
+        let whole = shaken(scheme, 2.0, 16, grip);
+        let beyond = shaken(scheme, 1.0, 8, "");
+        let tip = "tip = { held = \"clamped\", position = [1.0, 0.0, 0.0] }";
+        let before = shaken(scheme, 1.0, 8, tip);
+        assert!(beyond[8].distance(DVec3::X) > 0.03, "{:?}", beyond[8]);
+        for i in 0..=8 {
+            let off = whole[i].distance(before[i]);
+            assert!(off < 1e-9, "{scheme:?}, before, {i}: {off:e}");
+            let off = (whole[8 + i] - DVec3::X).distance(beyond[i]);
+            assert!(off < 1e-9, "{scheme:?}, beyond, {i}: {off:e}");
+        }
+    }
+}
+
+/// Held nodes stay where they are, and a leaf at rest in its grips stays at rest.
+#[test]
+fn nothing_moves_in_grips_at_rest() {
+    let leaf = Leaf::new(&gripped_veins());
+    let state = rest(&gripped_veins(), 8);
+    for scheme in BOTH {
+        let now = at(scheme, &leaf, &state, 1e-3, 0.5).state;
+        let moved = largest(now.x.iter().zip(&state.x).map(|(a, b)| a.distance(*b)));
+        assert!(moved < 1e-10, "{scheme:?}: {moved:e}");
+        for (j, i) in [(0, 2), (0, 3), (0, 4), (2, 6)] {
+            let k = state.base(j) + i;
+            let off = now.x[k].distance(state.x[k]);
+            assert!(off < 1e-12, "{scheme:?}, vein {j}, node {i}: {off:e}");
+        }
+    }
+}
