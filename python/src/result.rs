@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::relax::{Equilibrium, GripReaction, Mode, Sensitivity};
-use leafdyn::scenario::Scenario;
+use leafdyn::relax::{Equilibrium, GripReaction, Mode, Sensitivity, Stresses};
+use leafdyn::scenario::{Scenario, Stress};
 use leafdyn_program::files::{self, Document, FileError, Kind, Written};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::intern;
@@ -261,6 +261,16 @@ impl Leaf {
     /// A quantity at all stations of all rods, by its name.
     fn nodes<'py>(&self, py: Python<'py>, quantity: &str) -> Array<'py> {
         nodes(py, &self.shown(py).shape.rods, quantity)
+    }
+
+    /// The largest stresses in the sections at all stations of all rods, if these are given.
+    fn stresses<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let of = |stresses: &Stresses| {
+            let rod = |rod: &Vec<Stress>| rod.iter().map(|it| it.to_array()).collect();
+            let rods: Vec<Vec<[f64; 3]>> = stresses.rods.iter().map(rod).collect();
+            curves(py, &rods)
+        };
+        self.shown(py).stress.as_ref().map(of).transpose()
     }
 
     /// All nodes of the finest grid.

@@ -40,6 +40,21 @@ def test_shapes_and_kinds() -> None:
     assert leaf.negative_eigenvalues == 0
 
 
+def test_stresses_of_a_section() -> None:
+    vein = {**fan(1), "section": {"shape": "circle", "diameter": 0.2, "young": 1e4}}
+    vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}
+    del vein["stiffness"]
+    leaf = leafdyn.relax(vein)
+    assert leaf.stresses is not None
+    assert leaf.stresses.shape == (1, len(leaf.stations), 3)
+    stress = leaf.to_dict()["stress"]
+    assert (stress["vein"], stress["sigma"]) == (1, 0.0)
+    assert leaf.stresses[0, 0].tolist() == [stress["normal"], stress["shear"], stress["equivalent"]]
+    # Bent by its weight.
+    assert np.isclose(stress["normal"], 0.5 * 32 / (np.pi * 0.2**3), rtol=1e-2)
+    assert leafdyn.relax(fan(1), set={"leaf.fan": [0.0]}).stresses is None
+
+
 def test_a_held_tip_pushes_back() -> None:
     vein = {**fan(1), "tip": {"held": "pinned", "position": [0.9, 0.0, 0.0]}}
     vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}

@@ -36,6 +36,7 @@ pub use crate::relax::result::equilibrium::{
 };
 pub use crate::relax::result::margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use crate::relax::result::reaction::{GripReaction, Reaction};
+pub use crate::relax::result::stress::Stresses;
 pub(crate) use crate::relax::sensitivity::parameter::Parameter;
 pub(crate) use crate::relax::settle::segments::check_segments;
 pub(crate) use crate::relax::settle::start::start;

@@ -15,6 +15,7 @@ use crate::relax::result::plausible;
 use crate::relax::result::reaction::Reaction;
 use crate::relax::result::report::neutral_directions;
 use crate::relax::result::stations::SAME;
+use crate::relax::result::stress::Stresses;
 use crate::relax::settle::segments::coarsest;
 use crate::relax::stability::index::index_near;
 use crate::scenario::{Scenario, longest};
@@ -234,6 +235,7 @@ fn shoot(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
+        stress: Stresses::of(scenario, &stations, &rods),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),

@@ -42,7 +42,7 @@ pub(super) struct Sides {
 
 impl Sides {
     /// Those of the hole.
-    fn hole(self) -> Option<Sides> {
+    pub fn hole(self) -> Option<Sides> {
         let inside = |side: f64, wall: f64| (side - 2.0 * wall).max(0.0);
         self.wall.map(|wall| Sides {
             width: inside(self.width, wall),
@@ -110,7 +110,7 @@ impl Sides {
     }
 
     /// Where the torsion constant of a rectangle lies between its bounds.
-    fn between(self, wall: f64) -> f64 {
+    pub fn between(self, wall: f64) -> f64 {
         let (long, short) = (
             self.width.max(self.thickness),
             self.width.min(self.thickness),

@@ -18,6 +18,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use super::moduli::Moduli;
 use super::outline::{Outline, Sides};
 use super::{Profile, ascending};
 
@@ -244,6 +245,11 @@ impl Radii {
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
         Some((section.sides(sigma).enclosed() / PI).sqrt())
+    }
+
+    /// The moduli of the section of a rod at a fraction of its length.
+    pub(super) fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
+        Some(self.0.get(rod)?.sides(sigma).moduli())
     }
 }
 

@@ -24,6 +24,9 @@ const SUSPICIOUS: f64 = 5.0;
 /// Multiple of the acceleration of gravity, and part of it, by which a weight contradicts a mass.
 const CONTRADICTS: f64 = 10.0;
 
+/// Part by which two statements of a weight differ in rounding, and their angle in radians.
+const SAME_WEIGHT: f64 = 0.01;
+
 /// The acceleration of gravity in units of length of these names per second squared, and its range
 /// in any of them.
 const ACCELERATIONS: [(&str, f64); 4] = [("m", 9.81), ("cm", 981.0), ("mm", 9810.0), ("in", 386.1)];
@@ -35,7 +38,8 @@ const DEGREES: f64 = 15.0;
 
 /// What is probably not what was intended, one short sentence each.
 pub fn slips(scenario: &Scenario) -> Vec<String> {
-    let heavy = too_long(scenario).or_else(|| weight_of_another_mass(scenario));
+    let heavy = two_weights(scenario).or_else(|| too_long(scenario));
+    let heavy = heavy.or_else(|| weight_of_another_mass(scenario));
     let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
     let angles = [in_degrees(scenario), held_in_degrees(scenario)];
     angles.into_iter().chain(lengths).flatten().collect()
@@ -48,6 +52,7 @@ pub fn obstacle(scenario: &Scenario) -> Option<String> {
         held_in_degrees,
         in_degrees,
         thicker_than_long,
+        two_weights,
         weight_of_another_mass,
     ];
     slips.into_iter().find_map(|slip| slip(scenario))
@@ -128,6 +133,43 @@ fn thicker_than_long(scenario: &Scenario) -> Option<String> {
         j + 1,
         four_digits(side(j)),
         four_digits(rod.length)
+    ))
+}
+
+/// A weight per length besides an acceleration that pulls the mass: they add up, and state either the
+/// same weight twice or two weights.
+fn two_weights(scenario: &Scenario) -> Option<String> {
+    let g = DVec3::from_array(scenario.g);
+    let weights = |vein: usize| {
+        let given = DVec3::from_array(scenario.weight(vein).even);
+        (
+            vein,
+            given,
+            g * scenario.dynamics.density[vein].integral(1.0),
+        )
+    };
+    let both = (0..scenario.rods.len()).map(weights);
+    let mut both = both.filter(|(_, given, _)| g != DVec3::ZERO && *given != DVec3::ZERO);
+    let (vein, given, pulled) = both.next()?;
+    let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
+    let angle = given.angle_between(pulled);
+    let states = match given.distance(pulled) <= SAME_WEIGHT * pulled.length() {
+        true => format!(
+            "state the same weight, {other} per length of vein {}, which then counts twice",
+            vein + 1
+        ),
+        false if angle > SAME_WEIGHT => format!(
+            "contradict each other: as weights per length of vein {}, {one} and {other}, they are {:.0} degrees apart",
+            vein + 1,
+            angle.to_degrees()
+        ),
+        false => format!(
+            "contradict each other: they state the weights {one} and {other} per length of vein {}",
+            vein + 1
+        ),
+    };
+    Some(format!(
+        "load.gravity and load.g {states}; they add up: give one of them, and other loads along veins as load.distributed"
     ))
 }
 

@@ -84,6 +84,26 @@ fn sections_in_other_units_are_named() {
     assert!(of_section(true, "section.diameter=14.0; load.gravity=[0, 0, 0]").is_empty());
 }
 
+/// A weight per length and an acceleration add up: both state the same weight, or contradict each
+/// other by a factor or in direction. Nothing is said where only one is given.
+#[test]
+fn weights_that_are_given_twice_are_named() {
+    // The mean of the squares of the diameters is 0.0084, the weight 6.472e-5 per length.
+    let table = "
+        load.g=[0, 0, -981] => contradict each other: they state the weights 0.0001 and 0.00006472 per length of vein 1
+        load.g=[0, 0, -981]; load.gravity=[0, 0, -6.46e-5] => state the same weight, 0.00006472 per length of vein 1, which then counts twice
+        load.g=[0, 0, -981]; load.gravity=[6.47e-5, 0, 0] => they are 90 degrees apart
+        load.g=[0, 0, -981]; load.gravity=[0, 0, 6.47e-5] => they are 180 degrees apart
+        load.g=[0, 0, -981]; load.gravity=[0, 0, 0] =>
+        load.g=[0, 0, 0] =>
+    ";
+    for (entries, part) in pairs(table) {
+        let said = of_section(true, entries);
+        assert_eq!(said.is_empty(), part.is_empty(), "{entries}: {said:?}");
+        assert!(said.concat().contains(part), "{entries}: {said:?}");
+    }
+}
+
 /// Angles of a clamped tip in degrees; rings and twists in radians are meant.
 #[test]
 fn angles_of_a_held_tip_in_degrees_are_named() {

@@ -32,6 +32,7 @@ mod section;
 mod sensitivities;
 mod soft_leaves;
 mod stiffness;
+mod stress;
 mod threads;
 mod tissue;
 mod turning;

@@ -30,8 +30,8 @@ function decode(leaf) {
     const { low, size } = leaf.points;
     points = Float32Array.from(steps, (step, i) => low[i % 3] + (step / 65535) * size);
   }
-  const state = leaf.state ? new Float32Array(bytes(leaf.state)) : null;
-  return { ...leaf, stations, points, state };
+  const [state, stress] = [leaf.state, leaf.stress].map((numbers) => (numbers ? new Float32Array(bytes(numbers)) : null));
+  return { ...leaf, stations, points, state, stress };
 }
 
 /// The largest size of many numbers. (A function takes only so many arguments as its stack holds.)
@@ -49,7 +49,7 @@ const withUnit = (name, unit) => (unit ? `${name} / ${unit}` : name);
 const [Q, V, U, N, M] = [0, 4, 7, 10, 13];
 const hypot = Math.hypot;
 
-/// What veins can be coloured by. `of` has the state of a node from offset `s` on; the three numbers of its `group`
+/// What veins can be coloured by. `of` has the state of a node from offset `s` on, and `along` the leaf; the three numbers of its `group`
 /// are of one kind, and tell what is no more than rounding.
 const QUANTITIES = [
   { name: "vein" },
@@ -61,13 +61,15 @@ const QUANTITIES = [
   { name: "shear force", group: N, unit: forceUnit, of: (x, s) => hypot(x[s + N + 1], x[s + N + 2]) },
   { name: "bending moment", group: M, unit: momentUnit, of: (x, s) => hypot(x[s + M + 1], x[s + M + 2]) },
   { name: "twisting moment", group: M, unit: momentUnit, of: (x, s) => x[s + M], signed: true },
+  { name: "equivalent stress", unit: momentUnit && `(${forceUnit}/${lengthUnit}²)`, along: (leaf) => leaf.stress },
 ];
 const GEOMETRY = [
   { name: "vein" },
   { name: "curvature", unit: lengthUnit && `(1/${lengthUnit})`, along: curvature },
   { name: "height z", unit: lengthUnit, along: (leaf) => Float32Array.from({ length: leaf.points.length / 3 }, (_, i) => leaf.points[3 * i + 2]), signed: true },
 ];
-const quantities = view.leaves.length && view.leaves[0].state ? QUANTITIES : GEOMETRY;
+const [first] = view.leaves;
+const quantities = first && first.state ? QUANTITIES.filter(({ along }) => !along || along(first)) : GEOMETRY;
 
 /// The values of a quantity at all nodes of a leaf.
 function valuesOf(leaf, quantity) {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::figure::veins::{node_stride, tamed};
-use leafdyn::relax::RodShape;
+use leafdyn::relax::{Equilibrium, Shape};
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
 const STATE: usize = 16;
@@ -61,6 +61,9 @@ pub struct Leaf {
     /// [`STATE`] numbers per node.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,
+    /// The equivalent stress at each node, if sections are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stress: Option<String>,
 }
 
 /// Positions: in full, or rounded to 65,536 steps over their bounding box.
@@ -117,8 +120,13 @@ pub struct Curve {
 
 impl Leaf {
     /// A leaf in full, with strains and forces.
-    pub fn full(label: String, stations: &[f64], rods: &[RodShape], view: &View) -> Self {
+    pub fn full(label: String, leaf: &Equilibrium, view: &View) -> Self {
+        let Shape { stations, rods, .. } = &leaf.shape;
         let shown = || view.drawn.iter().map(|&number| &rods[number - 1].nodes);
+        let stress = leaf.stress.as_ref().map(|of| {
+            let shown = view.drawn.iter().flat_map(|&number| &of.rods[number - 1]);
+            floats(shown.map(|stress| stress.equivalent))
+        });
         let points = shown().flat_map(|nodes| {
             let points = nodes.iter().map(|node| node.position);
             tamed(points, view.longest)
@@ -133,11 +141,12 @@ impl Leaf {
         Leaf {
             label,
             nodes: stations.len(),
-            stations: Some(stations.into()),
+            stations: Some(stations.clone()),
             points: Points::Full {
                 f32: vectors(points),
             },
             state: Some(floats(state)),
+            stress,
             ..Leaf::default()
         }
     }

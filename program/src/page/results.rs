@@ -31,9 +31,7 @@ impl Viewed for Equilibrium {
     fn fill(&self, view: &mut View, _: &Units) {
         view.verdict = verdict(self);
         view.success = self.outcome.is_success();
-        let shape = &self.shape;
-        let leaf = Leaf::full("at rest".into(), &shape.stations, &shape.rods, view);
-        view.leaves.push(leaf);
+        view.leaves.push(Leaf::full("at rest".into(), self, view));
         if self.stability.mode_shapes {
             let modes = self.stability.modes.iter().flatten().enumerate();
             view.modes = modes
@@ -78,10 +76,9 @@ impl Viewed for Equilibria {
             let kind = equilibrium_of_index(leaf.stability.negative_eigenvalues);
             let energy = short(leaf.energy.unwrap_or(f64::NAN));
             let label = format!("{}. {kind}, energy {energy}", k + 1);
-            let shape = &leaf.shape;
             view.leaves.push(Leaf {
                 summary: leaf.summary(),
-                ..Leaf::full(label, &shape.stations, &shape.rods, view)
+                ..Leaf::full(label, leaf, view)
             });
         }
     }

@@ -37,6 +37,10 @@ pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io
         Array("m", 3, along(&|node| node.m)),
     ];
     arrays.extend(radius(shape.rods.len(), &shape.stations, radii));
+    arrays.extend(equilibrium.stress.as_ref().map(|of| {
+        let stresses = of.rods.iter().flatten().map(|stress| stress.equivalent);
+        Array("equivalent_stress", 1, stresses.collect())
+    }));
     let points: Vec<Vec<DVec3>> = (shape.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
         .collect();

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::table::{append_csv, csv_without_header, header};
 use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
+use leafdyn::scenario::Stress;
 use leafdyn::shape::weights;
 
 /// Nodes of the finest grid that a cubic interpolates.
@@ -16,15 +17,31 @@ const CUBIC: usize = 4;
 /// resultants are components along the directors.
 const HEADER: &str = "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3";
 
-/// `centerlines.csv`: one row per rod and station.
+/// `centerlines.csv`: one row per rod and station; the largest stresses there come last, if
+/// sections are given.
 pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
-    let rows = shape.rods.iter().zip(1..).flat_map(|(rod, number)| {
-        let nodes = shape.stations.iter().zip(&rod.nodes);
-        nodes.map(move |(sigma, node)| (number, *sigma, sigma * rod.length, columns(node)))
+    let stresses = equilibrium.stress.as_ref();
+    let rows = shape.rods.iter().enumerate().flat_map(|(j, rod)| {
+        let nodes = shape.stations.iter().zip(&rod.nodes).enumerate();
+        nodes.map(move |(i, (sigma, node))| {
+            let stress = stresses.map(|of| of.rods[j][i].to_array());
+            (
+                j + 1,
+                *sigma,
+                sigma * rod.length,
+                columns(node),
+                stress.as_slice().as_flattened().to_vec(),
+            )
+        })
     });
-    out.write_all(&header(HEADER))?;
-    append_csv::<(usize, _, _, _)>(rows, out)
+    let names: &[&str] = if stresses.is_some() {
+        &Stress::NAMES
+    } else {
+        &[]
+    };
+    out.write_all(&header(&[&[HEADER], names].concat().join(",")))?;
+    append_csv::<(usize, _, _, _, _)>(rows, out)
 }
 
 /// Names of the columns. Modes and rods are numbered from 1; displacements and

@@ -12,6 +12,7 @@ use crate::report::words::{shooting, verdict};
 use glam::DVec3;
 use leafdyn::largest::largest;
 use leafdyn::relax::{Equilibrium, Event, Mode, Outcome, Path, Sensitivity};
+use leafdyn::scenario::Stress;
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
@@ -54,6 +55,7 @@ impl Reported for Equilibrium {
                 format!("({force}) on the holder of grip {}", number + 1),
             ));
         }
+        lines.extend(stress(self).map(|stress| ("stress", stress)));
         lines.extend(waves(self).map(|waves| ("waves", waves)));
         lines.push(("error", error(self)));
         lines.extend(modes(self).map(|modes| ("modes", modes)));
@@ -158,6 +160,24 @@ fn error(equilibrium: &Equilibrium) -> String {
             _ => "not known".into(),
         },
     }
+}
+
+/// The largest stress in the sections of a leaf at rest.
+fn stress(equilibrium: &Equilibrium) -> Option<String> {
+    let of = (equilibrium.stress.as_ref()).filter(|_| equilibrium.outcome.is_at_rest())?;
+    let Stress {
+        normal,
+        shear,
+        equivalent,
+    } = of.largest;
+    let (vein, sigma) = (of.vein, brief(of.sigma));
+    let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
+    let error = OF_FORCES * error * equivalent;
+    let [normal, shear, equivalent] =
+        [normal, shear, equivalent].map(|it| brief(rounded_to(it, error)));
+    Some(format!(
+        "at most {equivalent} in vein {vein} at {sigma} of its length: normal {normal}, shear {shear}"
+    ))
 }
 
 /// Part of the height and the length of waves to which these are told: they are measured at

@@ -32,6 +32,50 @@ fn a_leaf_comes_to_rest_and_is_written_down() {
     assert_eq!(summary["tip"], json!(tip));
 }
 
+/// The largest stress is that of a row of the table; without sections there is none.
+#[test]
+fn stresses_are_told_where_sections_are_given() {
+    let place = Workplace::new();
+    let text = "
+        name = 'rod'
+        leaf = { rods = 1, length = 10, fan = [0] }
+        section = { shape = 'circle', diameter = 0.2, young = 3e4 }
+        load = { tip_force = [0, 0, -1e-3] }
+    ";
+    fs::write(place.path("rod.toml"), text).unwrap();
+    let line = "stress   at most 12.73";
+    let run = place.ok("relax rod.toml --write json,csv,html,vtk");
+    run.says(&[
+        line,
+        " in vein 1 at 0 of its length: normal 12.73",
+        ", shear 0.0424",
+    ]);
+    let stress = &place.json("out/rod/summary.json")["stress"];
+    assert_eq!(
+        (&stress["vein"], &stress["sigma"]),
+        (&json!(1), &json!(0.0))
+    );
+    let csv = place.read("out/rod/centerlines.csv");
+    let (header, base) = (csv.lines().next().unwrap(), csv.lines().nth(1).unwrap());
+    assert!(header.ends_with(",m3,normal_stress,shear_stress,equivalent_stress"));
+    let cells: Vec<f64> = base
+        .split(',')
+        .skip(22)
+        .map(|it| it.parse().unwrap())
+        .collect();
+    let told = ["normal", "shear", "equivalent"].map(|name| stress[name].as_f64().unwrap());
+    assert_eq!(cells, told);
+    contains(&place.read("out/rod/view.html"), &["\"stress\": \""]);
+    contains(
+        &place.read("out/rod/leaf.vtp"),
+        &["Name=\"equivalent_stress\""],
+    );
+    let none = place.ok("relax leaf.toml --write json,html");
+    assert!(!none.out.contains("stress"));
+    assert_eq!(place.json("out/small/summary.json")["stress"], Value::Null);
+    assert!(!place.read("out/small/view.html").contains("\"stress\": \""));
+}
+
 #[test]
 fn json_is_alone_on_standard_output() {
     let place = Workplace::new();

@@ -167,6 +167,14 @@ class Equilibrium(Viewed):
         return self._core.nodes("moments")
 
     @cached_property
+    def stresses(self) -> Array | None:
+        """The largest normal, shear and equivalent (von Mises) stress in the sections, shape (N, K + 1, 3).
+
+        Force per area; none where stiffnesses are given in place of `[section]` or `[blade]`.
+        """
+        return self._core.stresses()
+
+    @cached_property
     def curves(self) -> Array:
         """Centerlines at all nodes of the finest grid, for drawing: shape (N, M + 1, 3)."""
         return self._core.curves()
@@ -326,6 +334,7 @@ _LATER = (
     "curvatures",
     "forces",
     "moments",
+    "stresses",
     "curves",
     "curve_stations",
     "_reaction",

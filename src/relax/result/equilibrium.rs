@@ -7,6 +7,7 @@ use crate::relax::request::method::Method;
 use crate::relax::result::blade::BladeReport;
 use crate::relax::result::margin::Margin;
 use crate::relax::result::reaction::{GripReaction, Reaction};
+use crate::relax::result::stress::Stresses;
 use crate::relax::saddle::Saddle;
 use crate::shape;
 use crate::shape::RodShape;
@@ -324,6 +325,9 @@ pub struct Equilibrium {
     /// What follows from its outline, if it is a blade.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blade: Option<BladeReport>,
+    /// The largest stresses in its sections, if these are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stress: Option<Stresses>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
     /// The model that was solved.

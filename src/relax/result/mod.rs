@@ -7,3 +7,4 @@ pub mod plausible;
 pub mod reaction;
 pub mod report;
 pub mod stations;
+pub mod stress;

@@ -10,6 +10,7 @@ use crate::relax::request::problem::Problem;
 use crate::relax::result::blade::BladeReport;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::result::reaction::{grip_reactions, reaction};
+use crate::relax::result::stress::Stresses;
 use crate::relax::transfer::level::{Level, flat};
 use crate::relax::transfer::strains;
 use crate::scenario::{Scenario, obstacle};
@@ -69,6 +70,7 @@ pub fn equilibrium(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
+        stress: Stresses::of(scenario, &stations, &rods),
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),

@@ -4,6 +4,7 @@ use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Leaf};
 use crate::relax::accuracy::dense_output::{Section, integrated_between, mean};
 use crate::relax::result::equilibrium::{Equilibrium, Outcome, Shape};
+use crate::relax::result::stress::Stresses;
 use crate::relax::transfer::strains;
 use crate::scenario::Scenario;
 use crate::shape::equally_spaced;
@@ -115,6 +116,7 @@ impl Equilibrium {
         for (rod, nodes) in self.shape.rods.iter_mut().zip(rods) {
             rod.nodes = nodes;
         }
+        self.stress = Stresses::of(scenario, &to, &self.shape.rods);
         self.shape.stations = to;
         if let Some(error) = &mut self.accuracy.error_estimate {
             *error += between;
