@@ -39,6 +39,7 @@ mod tissue;
 mod turning;
 mod values;
 mod vectors;
+mod veins;
 mod wind;
 
 pub use blade::{Blade, BladePart, BladeProperty};

@@ -139,18 +139,14 @@ fn thicker_than_long(scenario: &Scenario) -> Option<String> {
 /// A weight per length besides an acceleration that pulls the mass: they add up, and state either the
 /// same weight twice or two weights.
 fn two_weights(scenario: &Scenario) -> Option<String> {
-    let g = DVec3::from_array(scenario.g);
     let weights = |vein: usize| {
-        let given = DVec3::from_array(scenario.weight(vein).even);
-        (
-            vein,
-            given,
-            g * scenario.dynamics.density[vein].integral(1.0),
-        )
+        let weight = scenario.weight(vein);
+        let given = DVec3::from_array(weight.even);
+        let (g, mass) = weight.of_mass?;
+        let pulled = DVec3::from_array(g) * mass.integral(1.0);
+        (given != DVec3::ZERO).then_some((vein, given, pulled))
     };
-    let both = (0..scenario.rods.len()).map(weights);
-    let mut both = both.filter(|(_, given, _)| g != DVec3::ZERO && *given != DVec3::ZERO);
-    let (vein, given, pulled) = both.next()?;
+    let (vein, given, pulled) = (0..scenario.rods.len()).find_map(weights)?;
     let (one, other) = (four_digits(given.length()), four_digits(pulled.length()));
     let angle = given.angle_between(pulled);
     let states = match given.distance(pulled) <= SAME_WEIGHT * pulled.length() {

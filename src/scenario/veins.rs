@@ -1,0 +1,152 @@
+//! The veins of a leaf: from numbers, from sections, or from a blade.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::blade::{Blade, BladeProperty, Parts, blade};
+use super::entries::Entries;
+use super::error::Result;
+use super::item::Item;
+use super::key::Key;
+use super::material;
+use super::section::{Property, Section};
+use super::{Profile, Radii, Rod};
+
+/// What the stiffnesses of the veins follow from.
+pub(super) enum Made {
+    /// Numbers.
+    Stiffnesses,
+    Sections(Vec<Arc<Section>>),
+    Blade(Arc<Blade>, Parts),
+}
+
+impl Made {
+    pub fn from(entries: &Entries, rods: usize) -> Result<Made> {
+        if let Some(blade) = blade(entries, rods)? {
+            let parts = blade.parts();
+            return Ok(Made::Blade(Arc::new(blade), parts));
+        }
+        Ok(match material::sections(entries, rods)? {
+            Some(sections) => Made::Sections(sections),
+            None => Made::Stiffnesses,
+        })
+    }
+
+    pub fn blade(&self) -> Option<&Arc<Blade>> {
+        match self {
+            Made::Blade(blade, _) => Some(blade),
+            _ => None,
+        }
+    }
+
+    pub fn radii(&self) -> Radii {
+        match self {
+            Made::Sections(sections) => Radii::of(sections.clone()),
+            _ => Radii::default(),
+        }
+    }
+
+    /// What sections or a blade determine of all veins; `None` if numbers are given.
+    pub fn profiles(&self, property: Property) -> Option<Vec<Profile>> {
+        match self {
+            Made::Stiffnesses => None,
+            Made::Sections(sections) => Some(material::profiles(sections, property)),
+            Made::Blade(_, parts) => Some(parts.profiles(property.into())),
+        }
+    }
+}
+
+/// Whether the tips are joined: those of a blade are if it ends in a point.
+pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> Result<bool> {
+    let item = entries.item(Key::Joined)?;
+    let Some(blade) = blade else {
+        return item.switch();
+    };
+    if !entries.is_given(Key::Joined) {
+        return Ok(blade.is_pointed());
+    }
+    let joined = item.switch()?;
+    item.ensure(
+        !joined || blade.is_pointed(),
+        "the blade has a width at its tip (blade.width): let it end at 0, or leave this out",
+    )?;
+    Ok(joined)
+}
+
+pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
+    let quantity = |key| entries.item(key)?.quantity(rods);
+    let triple = |keys: [Key; 3], of: fn(usize) -> Property| -> Result<[Vec<Profile>; 3]> {
+        let one = |axis: usize| match made.profiles(of(axis)) {
+            Some(profiles) => Ok(profiles),
+            None => quantity(keys[axis]),
+        };
+        Ok([one(0)?, one(1)?, one(2)?])
+    };
+    let rest_of_blade = |axis: usize| match made {
+        Made::Blade(blade, parts) if axis == 2 || blade.curvature().is_some() => {
+            Some(parts.profiles(BladeProperty::Rest(axis)))
+        }
+        _ => None,
+    };
+    let rest = |axis: usize| match rest_of_blade(axis) {
+        Some(profiles) => Ok(profiles),
+        None => quantity(Key::REST[axis]),
+    };
+    let (length, base, directions) = match made {
+        Made::Blade(blade, parts) => (
+            parts.lengths(),
+            parts.bases(),
+            parts.directions(blade.elevation),
+        ),
+        _ => {
+            let angle = angles(entries.item(Key::Fan)?, rods)?.into_iter();
+            let each = angle.zip(entries.item(Key::Elevation)?.one_each(rods)?);
+            (
+                entries.item(Key::Length)?.one_each(rods)?,
+                entries.item(Key::Base)?.vectors(rods)?,
+                each.map(|(angle, elevation)| [angle, elevation, 0.0])
+                    .collect(),
+            )
+        }
+    };
+    let couple = triple(Key::COUPLE, Property::Couple)?;
+    let force = triple(Key::FORCE, Property::Force)?;
+    let rest = [rest(0)?, rest(1)?, rest(2)?];
+    let stretch = quantity(Key::RestStretch)?;
+    let pick = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
+    Ok((0..rods)
+        .map(|rod| {
+            let [angle, elevation, roll] = directions[rod];
+            Rod {
+                length: length[rod],
+                base: base[rod],
+                angle,
+                elevation,
+                roll,
+                couple_stiffness: pick(&couple, rod),
+                force_stiffness: pick(&force, rod),
+                rest_curvature: pick(&rest, rod),
+                rest_stretch: stretch[rod].clone(),
+            }
+        })
+        .collect())
+}
+
+/// Base angles phi_n of the rods n = 1..N (paper, section 2.4 (c)).
+fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
+    let step = PI / (3.0 * rods as f64);
+    // -pi/3 + 2 pi n / (3N) = step (2n - N); with n - 1/2 the fan is exactly antisymmetric.
+    let fan = |odd: f64| {
+        (1..=rods)
+            .map(|n| step * (2.0 * n as f64 - odd - rods as f64))
+            .collect()
+    };
+    match item.value.as_str() {
+        Some("paper") => Ok(fan(0.0)),
+        Some("symmetric") => Ok(fan(1.0)),
+        None if item.value.is_array() => item.one_each(rods),
+        _ => Err(item.refuse(format_args!(
+            "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
+        ))),
+    }
+}
