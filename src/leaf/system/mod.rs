@@ -19,7 +19,7 @@ use super::state::{Field, Increment, shift, turn};
 use crate::lanes::{Four, GROUP, widest_arch};
 use crate::largest::larger;
 use crate::rod::NodeBlock;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
