@@ -170,13 +170,18 @@ fn stress(equilibrium: &Equilibrium) -> Option<String> {
         shear,
         equivalent,
     } = of.largest;
-    let (vein, sigma) = (of.vein, brief(of.sigma));
+    let place = match of.sigma {
+        0.0 => "at its base".into(),
+        1.0 => "at its tip".into(),
+        sigma => format!("at {} of its length", brief(sigma)),
+    };
     let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
     let error = OF_FORCES * error * equivalent;
     let [normal, shear, equivalent] =
         [normal, shear, equivalent].map(|it| brief(rounded_to(it, error)));
     Some(format!(
-        "at most {equivalent} in vein {vein} at {sigma} of its length: normal {normal}, shear {shear}"
+        "at most {equivalent} in vein {} {place}: normal {normal}, shear {shear}",
+        of.vein
     ))
 }
 

@@ -47,7 +47,7 @@ fn stresses_are_told_where_sections_are_given() {
     let run = place.ok("relax rod.toml --write json,csv,html,vtk");
     run.says(&[
         line,
-        " in vein 1 at 0 of its length: normal 12.73",
+        " in vein 1 at its base: normal 12.73",
         ", shear 0.0424",
     ]);
     let stress = &place.json("out/rod/summary.json")["stress"];
