@@ -155,6 +155,12 @@ mod tests {
         let mut without = scenario();
         without.gravity = [0.0; 3];
         assert_eq!(count(&without), [0, 0]);
+        // A mass that is pulled, and weights of single veins.
+        let mut pulled = without.clone();
+        pulled.g = [0.0, 0.0, -9.81];
+        assert_eq!(count(&pulled), [4, 1]);
+        without.own_gravity = vec![[0.0, 0.0, -1.0]; 5];
+        assert_eq!(count(&without), [4, 1]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ impl Setting {
         Setting {
             units: scenario.units.clone(),
             length: leafdyn::scenario::longest(&scenario.rods),
-            gravity: DVec3::from_array(scenario.gravity).try_normalize(),
+            gravity: weight(scenario).try_normalize(),
         }
     }
 
@@ -65,6 +65,21 @@ impl Setting {
     pub fn unit(&self) -> &str {
         self.units.length.as_deref().unwrap_or("L")
     }
+}
+
+/// The direction of the weight of all veins.
+fn weight(scenario: &Scenario) -> DVec3 {
+    if scenario.g == [0.0; 3] && scenario.own_gravity.is_empty() {
+        return DVec3::from_array(scenario.gravity);
+    }
+    let of_vein = |vein: usize| {
+        let weight = scenario.weight(vein);
+        let pulled = (weight.of_mass).map_or(DVec3::ZERO, |(g, mass)| {
+            DVec3::from_array(g) * mass.integral(1.0)
+        });
+        scenario.rods[vein].length * (DVec3::from_array(weight.even) + pulled)
+    };
+    (0..scenario.rods.len()).map(of_vein).sum()
 }
 
 /// A name with its unit, if that is known.
