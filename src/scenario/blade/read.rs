@@ -1,8 +1,9 @@
 //! Reads the table `[blade]`.
 
+use super::given::Blade;
+use super::material::Material;
 use super::spline::Spline;
 use super::vein::Outline;
-use super::{Blade, Material};
 use crate::scenario::Profile;
 use crate::scenario::entries::Entries;
 use crate::scenario::error::Result;

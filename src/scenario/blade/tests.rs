@@ -1,8 +1,8 @@
 //! What is read of a blade, refused, and written again; and the veins that follow from it.
 
-use super::*;
 use crate::natural::Natural;
-use crate::scenario::{Entries, Scenario};
+use crate::scenario::{Entries, Profile, Scenario};
+use glam::DVec3;
 use leafdyn_testing::pairs;
 use serde_json::json;
 

@@ -1,7 +1,7 @@
 //! The veins of a blade, and the tissue between two, as profiles along them.
 
+use super::material::{Local, Material};
 use super::spline::{Spline, quintic};
-use super::{Local, Material};
 use crate::scenario::gauss::GAUSS;
 use crate::scenario::{Profile, Property, ascending};
 use std::sync::Arc;
