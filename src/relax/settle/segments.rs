@@ -15,6 +15,10 @@ use crate::relax::settle::methods::moment;
 const COARSEST_OF_LOOSE: usize = 4;
 const LOOSE: f64 = 1e-3;
 
+/// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
+/// of 86 were too low by a factor of two.
+const COARSEST_OF_BLADES: usize = 16;
+
 /// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
 /// tip moment alone determine it, and the largest allowed at rest on the coarsest grid of a
 /// loose tolerance.
@@ -81,7 +85,10 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         Some(rate) => rate * leaf.length(0),
         None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
     };
-    let mut segments = least;
+    let mut segments = match leaf.scenario().blade {
+        Some(_) => least.max(COARSEST_OF_BLADES),
+        None => least,
+    };
     while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
         segments *= 2;
     }
