@@ -258,6 +258,40 @@ mod tests {
         );
     }
 
+    /// Whatever force a strip carries, its increment without a motion leads to that of its strains, for
+    /// which the condensed loads are the loads; by a motion it changes as that does.
+    #[test]
+    fn the_force_carried_becomes_that_of_the_strains() {
+        let (strip, ends) = strained();
+        let strains = strip.force(&ends);
+        let same = flat(strip.condensed_loads(&ends, strains));
+        for (one, other) in same.into_iter().zip(flat(loads(&strip, &ends))) {
+            assert!((one - other).abs() < 1e-13, "{one} {other}");
+        }
+        let wrong = strains + DVec3::new(3.0, -2.0, 1.0);
+        let none = [DVec3::ZERO; 2];
+        let change = strip.force_increment(&ends, wrong, DVec3::ZERO, none);
+        // The part without stiffness, along d3, is not carried.
+        let d3 = rotation::midpoint(ends.q[0], ends.q[1]) * DVec3::Z;
+        assert!((wrong + change - strains).cross(d3).length() < 1e-13);
+        for k in 0..12 {
+            let increment = DVec3::AXES[k % 3];
+            let mut turns = none;
+            let dx = match k % 6 / 3 {
+                0 => {
+                    turns[k / 6] = increment;
+                    DVec3::ZERO
+                }
+                _ => increment * if k < 6 { -1.0 } else { 1.0 },
+            };
+            let found = strip.force_increment(&ends, strains, dx, turns);
+            let expected = DVec3::from_array(
+                [0, 1, 2].map(|c| slope(|h| strip.force(&moved(&ends, k, h))[c])),
+            );
+            assert!(found.distance(expected) < 1e-8, "{k}: {found} {expected}");
+        }
+    }
+
     /// In spatial increments the derivatives of moments are unsymmetric by half of their moment.
     #[test]
     fn the_hessian_is_the_symmetric_part_of_the_derivative_of_the_loads() {
