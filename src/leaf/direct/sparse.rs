@@ -131,8 +131,8 @@ impl Symbolic {
         values
     }
 
-    /// Factorises the matrix plus `shift` times the mass matrix if it is positive definite: in two
-    /// thirds of the time of a factorisation that chooses its pivots. `None` if it is not.
+    /// Factorises the matrix plus `shift` times the mass matrix if it is positive definite, without
+    /// a search for pivots. `None` if it is not.
     pub fn factorize_definite(
         self: &Arc<Self>,
         system: &System,
