@@ -97,6 +97,7 @@
 #![warn(missing_docs)]
 
 mod branch;
+pub mod clock;
 mod homotopy;
 mod lanes;
 pub mod largest;

@@ -1,8 +1,8 @@
 //! Limits of the time of a run, and its cancellation.
 
+use crate::clock::Instant;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 /// When a run gives up, at rest or not: at a deadline, or when it is cancelled. It is
 /// checked in every step, so that a run may end slightly later.

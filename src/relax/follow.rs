@@ -127,7 +127,7 @@ fn observed(
 }
 
 /// A state of a level in the units of another leaf, with the base rotations of that leaf.
-fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
+pub(super) fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
     state.x.iter_mut().for_each(|x| *x *= length);

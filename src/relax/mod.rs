@@ -3,6 +3,7 @@
 
 pub(crate) mod accuracy;
 mod follow;
+mod follower;
 mod grids;
 mod loading;
 mod nested;
@@ -49,6 +50,7 @@ pub use crate::shape::{NodeState, RodShape};
 pub use crate::shooting::Correction;
 pub use crate::words::UnknownWord as UnknownMethod;
 pub(crate) use follow::{Grids, Lost};
+pub use follower::{Followed, Follower};
 pub(crate) use nested::NestedEquilibrium;
 pub use path::{Event, Happening, Path, Route, Stage};
 pub(crate) use rest::relax_on_grids;

@@ -1,5 +1,6 @@
 //! The builder of a relaxation for users of the library.
 
+use crate::clock::Instant;
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{Options, Progress, RelaxError};
 use crate::relax::result::equilibrium::Equilibrium;
@@ -7,7 +8,7 @@ use crate::relax::solve::relax;
 use crate::scenario::Scenario;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A relaxation to be run, with the defaults of scenario and program for what is not set. Made
 /// by [`Scenario::relaxation`].

@@ -1,6 +1,7 @@
 //! From a scenario to rest on nested grids: the problem, the start, rest on one grid, finer ones,
 //! the decision on stability, and the result.
 
+use crate::clock::Instant;
 use crate::leaf::{Grid, Leaf};
 use crate::relax::grids::{follow, solve};
 use crate::relax::loading::arrival::{arrive, guess, load_slowly};
@@ -20,7 +21,6 @@ use crate::relax::stability::decide::{Decision, Verdict, decide};
 use crate::relax::stability::eigenvalues;
 use crate::relax::stability::eigenvalues::List;
 use crate::scenario::Scenario;
-use std::time::Instant;
 
 /// A leaf that rests so near to the arcs from which it starts (lengths, radians), after so few
 /// steps of Newton's method without softened rods, rests where slow loading leads: so did all of
@@ -130,7 +130,7 @@ fn rest_again(problem: &Problem, grid: Grid, effort: &mut Effort) -> Option<Nest
 
 /// The result, with the stability of a leaf at rest decided and its modes: requested modes are
 /// not counted in the time of the solution, unless stability depends on them.
-fn decided(
+pub(super) fn decided(
     problem: &Problem,
     found: Found,
     clock: Instant,

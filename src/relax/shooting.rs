@@ -1,5 +1,6 @@
 //! Shooting: a boundary-value solution as a result of the same type as a relaxation's.
 
+use crate::clock::Instant;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Work;
@@ -24,7 +25,6 @@ use crate::shooting;
 use crate::shooting::{Reason, Solution, Start};
 use crate::undulation::Undulation;
 use glam::DVec3;
-use std::time::Instant;
 
 /// Smallest number of segments between stations.
 const SEGMENTS: usize = 32;

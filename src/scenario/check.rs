@@ -176,7 +176,7 @@ fn dynamics(
         Some(item) => {
             if let Some(key) = mass {
                 let path = key.path();
-                let why = format_args!("{path} is given, too: leave one of them out");
+                let why = format!("{path} is given, too: leave one of them out");
                 return Err(item.refuse(why));
             }
             Some(item.quantity(rods.len())?)

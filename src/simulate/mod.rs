@@ -35,12 +35,13 @@ pub use error::{MOST_SECONDS, Refused};
 pub use record::{Frame, Imbalance, Moment, Record, Still};
 pub use stills::{film, stills};
 
+use crate::clock::Instant;
 use crate::refusal::RefusedOption;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
-use crate::relax;
+use crate::relax::{self, Equilibrium, Follower, RelaxError};
 use crate::scenario::{Scenario, slips};
 use crate::words;
 
@@ -95,6 +96,41 @@ pub struct Simulation {
 impl Simulation {
     /// The leaf at time 0.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let from = |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, tolerance);
+        Simulation::from(scenario, options, &from)
+    }
+
+    /// The same from where a leaf is that followed another scenario, without velocity: what it is
+    /// released from, or where its stable equilibria end.
+    pub fn released(
+        follower: &Follower,
+        scenario: &Scenario,
+        options: &Options,
+    ) -> Result<Self, Refused> {
+        let from = |leaf: &Leaf, grid: &Grid| Ok(follower.state_on(leaf, grid));
+        Simulation::from(scenario, options, &from)
+    }
+
+    /// Brings the leaf from where it is now to rest under this scenario, with which the
+    /// `follower` goes on.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn land(
+        &mut self,
+        follower: &mut Follower,
+        scenario: &Scenario,
+    ) -> Result<Equilibrium, RelaxError> {
+        let now = self.method.snapshot();
+        follower.settle_from(scenario, (self.grid.clone(), now.state))
+    }
+
+    fn from(
+        scenario: &Scenario,
+        options: &Options,
+        state: &dyn Fn(&Leaf, &Grid) -> Result<State, Refused>,
+    ) -> Result<Self, Refused> {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)
         {
@@ -107,7 +143,7 @@ impl Simulation {
         let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
-        let state = start::state(&leaf, &grid, tolerance)?;
+        let state = state(&leaf, &grid)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let doubt = doubt::unstable(&discrete, &physics, &state);
         let rigid = discrete.least_compliance() == 0.0;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use super::judge::{common, differences};
+use crate::clock::Instant;
 use crate::limit::Limit;
 use crate::numbers::power_of_ten;
 use crate::relax::{
@@ -102,7 +103,7 @@ pub fn equilibria(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Equilibria, RelaxError> {
     without_wind(scenario, "the search for all shapes")?;
-    let clock = std::time::Instant::now();
+    let clock = Instant::now();
     let mut all = Equilibria {
         scenario: scenario.name.clone(),
         found: Vec::new(),

@@ -5,7 +5,7 @@
 //! The reference is determined by two independent methods: the relaxed leaf,
 //! and the solution of the boundary-value problem that starts from it.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::leaf::{Grid, Leaf};
 use crate::limit::Limit;

@@ -1,6 +1,6 @@
 //! Computation of a boundary.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use glam::DVec3;
 

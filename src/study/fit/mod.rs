@@ -40,8 +40,8 @@ pub use result::{
     FitWork,
 };
 
+use crate::clock::Instant;
 use std::cell::Cell;
-use std::time::Instant;
 
 use super::{Base, VaryError};
 use crate::limit::Limit;

@@ -1,6 +1,7 @@
 //! One cell: the reference, and each method's answer with its verdict.
 
-use std::time::{Duration, Instant};
+use crate::clock::Instant;
+use std::time::Duration;
 
 use crate::limit::Limit;
 use crate::relax::{self, Method, Options, Outcome};

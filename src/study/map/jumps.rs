@@ -4,8 +4,9 @@
 //! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
 //! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
+use crate::clock::Instant;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::Serialize;

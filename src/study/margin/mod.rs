@@ -3,10 +3,10 @@
 mod barrier;
 mod pushes;
 
+use crate::clock::Instant;
 use std::f64::consts::PI;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use rayon::prelude::*;
 

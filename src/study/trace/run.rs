@@ -1,7 +1,7 @@
 //! Computation of a trace.
 
+use crate::clock::Instant;
 use std::collections::VecDeque;
-use std::time::Instant;
 
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};

@@ -1,0 +1,319 @@
+//! A leaf at rest that follows its scenario, as numbers of it change by little or much: along its
+//! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
+
+use crate::clock::Instant;
+use crate::homotopy::Homotopy;
+use crate::leaf::{Grid, Leaf, LeafRate, State};
+use crate::relax::follow::{Grids, Lost, rescaled};
+use crate::relax::grids;
+use crate::relax::nested::NestedEquilibrium;
+use crate::relax::request::options::{Options, Progress, RelaxError, rests_in_wind};
+use crate::relax::request::problem::Problem;
+use crate::relax::rest::{decided, relax_on_grids};
+use crate::relax::result::equilibrium::Equilibrium;
+use crate::relax::sensitivity::Linearized;
+use crate::relax::settle::effort::Effort;
+use crate::relax::transfer::prolong::transfer;
+use crate::scenario::Scenario;
+use std::sync::Arc;
+
+/// The shortest step of the way, as a part of it.
+const SHORTEST: f64 = 1.0 / 256.0;
+
+/// How much shorter a step is made that fails.
+const SHORTENED: f64 = 0.25;
+
+/// Grids on which the next equilibrium is predicted.
+const PREDICTING: usize = 2;
+
+/// The finest of the grids that are tried where coarser ones have no equilibrium any more: folds lie
+/// elsewhere on each of them.
+const FINEST: usize = 128;
+
+/// Equilibria on two grids that are no farther apart, in lengths, are one.
+const SAME: f64 = 0.02;
+
+/// A leaf at rest, which can follow.
+///
+/// ```
+/// use leafdyn::relax::{Followed, Follower, Options};
+/// use leafdyn::scenario::Scenario;
+///
+/// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+/// let weight = scenario.gravity[2];
+/// let (_, follower) = Follower::begin(&scenario, &Options::default())?;
+/// let mut follower = follower.expect("the leaf is at rest");
+/// let heavier = |part: f64| {
+///     let mut scenario = scenario.clone();
+///     scenario.gravity[2] = weight * (1.0 + part);
+///     Ok(scenario)
+/// };
+/// let Followed::There(heavy) = follower.follow(&heavier)? else {
+///     panic!("it bends further");
+/// };
+/// assert_eq!(heavy.stable(), Some(true));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Follower {
+    scenario: Arc<Scenario>,
+    options: Options,
+    at: NestedEquilibrium,
+    /// Segments of the coarsest grid away from folds.
+    usual: usize,
+}
+
+/// Where a leaf is that was to follow.
+pub enum Followed {
+    /// In the equilibrium into which the one before has changed.
+    There(Box<Equilibrium>),
+    /// Its stable equilibria end at this part of the way, where it stays: from there it has to move
+    /// on, to another one.
+    Left {
+        /// From 0, where it began, to 1.
+        part: f64,
+    },
+}
+
+impl Follower {
+    /// Brings a leaf to rest as [`relax`](crate::relax::relax) does; none can follow if it is not, or at
+    /// a saddle.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn begin(
+        scenario: &Scenario,
+        options: &Options,
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
+        let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
+        let follower = Follower {
+            scenario: Arc::new(scenario.clone()),
+            options: options.clone(),
+            usual: at.levels.first().map_or(0, |level| level.leaf.segments()),
+            at,
+        };
+        Ok((leaf, rests.then_some(follower)))
+    }
+
+    /// The scenario of the equilibrium in which it is.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Follows the scenarios that `along` has from 0, the present one, to 1.
+    ///
+    /// # Errors
+    /// The first of `along`, and requests that cannot be met.
+    pub fn follow<E: From<RelaxError>>(
+        &mut self,
+        along: &dyn Fn(f64) -> Result<Scenario, E>,
+    ) -> Result<Followed, E> {
+        let clock = Instant::now();
+        let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
+        loop {
+            let scenario = Arc::new(along(way.next())?);
+            rests_in_wind(&scenario, &self.options)?;
+            let last = way.next() == 1.0;
+            match self.step(Arc::clone(&scenario), last) {
+                Ok(found) => {
+                    (self.at, self.scenario) = (found, scenario);
+                    if last {
+                        self.coarsen();
+                        return Ok(Followed::There(Box::new(self.equilibrium(clock))));
+                    }
+                    way.advance(2.0 * way.length());
+                }
+                Err(_) if way.shorten(SHORTENED) => {}
+                Err(_) if self.refine() => {}
+                Err(_) => return Ok(Followed::Left { part: way.part }),
+            }
+        }
+    }
+
+    /// Goes on without the coarsest grid, and with a finer one if that is the last; false if it is
+    /// fine enough.
+    fn refine(&mut self) -> bool {
+        let mut at = self.at.grids();
+        if let [only] = &at.levels[..] {
+            let finer = only.leaf.segments() < FINEST;
+            let tolerance = self.tolerance(&self.scenario);
+            let next = finer.then(|| grids::on_next_grid(None, only, tolerance));
+            let Some(next) = next.flatten() else {
+                return false;
+            };
+            at = at.with(next);
+        }
+        if at.levels[1].leaf.segments() > FINEST {
+            return false;
+        }
+        let levels = at.levels[1..].to_vec();
+        self.at = at.on(levels);
+        true
+    }
+
+    /// Goes back to the usual grids, if the equilibrium exists on these.
+    fn coarsen(&mut self) {
+        let finest = &self.at.levels[0].leaf;
+        if finest.segments() <= self.usual {
+            return;
+        }
+        let leaf = finest.leaf.clone();
+        let grid = Grid::new(self.usual, leaf.kinks());
+        let Ok(found) = self.near(&leaf, grid) else {
+            return;
+        };
+        let finest = |at: &NestedEquilibrium| at.levels.last().map(|level| level.state.clone());
+        let apart = finest(&self.at).zip(finest(&found));
+        let same = apart.is_some_and(|(a, b)| a.shift_to(&b) < SAME);
+        if same && found.is_stable() {
+            self.at = found;
+        }
+    }
+
+    /// Comes to rest under another scenario from where it is, and leaves its branch where it must.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn settle(&mut self, scenario: &Scenario) -> Result<Equilibrium, RelaxError> {
+        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+        let grid = self.grid(&leaf);
+        let state = self.state_on(&leaf, &grid);
+        self.settle_from(scenario, (grid, state))
+    }
+
+    /// The same from this state on a grid; where that leads nowhere, as a relaxation begins.
+    pub(crate) fn settle_from(
+        &mut self,
+        scenario: &Scenario,
+        guess: (Grid, State),
+    ) -> Result<Equilibrium, RelaxError> {
+        rests_in_wind(scenario, &self.options)?;
+        let clock = Instant::now();
+        let scenario = Arc::new(scenario.clone());
+        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let problem = Problem::new(&leaf, &self.options, self.tolerance(&scenario));
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        let begun = NestedEquilibrium::begun(&problem);
+        if let Ok(found) = grids::follow(&problem, begun, vec![guess], &mut effort)
+            && found.is_stable()
+        {
+            let (at, result) = decide(&problem, found, clock, &mut effort);
+            (self.at, self.scenario) = (at, scenario);
+            return Ok(result);
+        }
+        let (result, follower) = Follower::begin(&scenario, &self.options)?;
+        if let Some(follower) = follower {
+            *self = follower;
+        }
+        Ok(result)
+    }
+
+    /// The present equilibrium as a result.
+    fn equilibrium(&mut self, clock: Instant) -> Equilibrium {
+        let leaf = Leaf::in_units(Arc::clone(&self.scenario), self.scenario.scale());
+        let problem = Problem::new(&leaf, &self.options, self.tolerance(&self.scenario));
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        effort.work = self.at.work;
+        let (at, result) = decide(&problem, self.at.grids(), clock, &mut effort);
+        self.at = at;
+        result
+    }
+
+    fn tolerance(&self, scenario: &Scenario) -> f64 {
+        self.options.tolerance.unwrap_or(scenario.tolerance)
+    }
+
+    /// The equilibrium of a scenario nearby, if it is the continuation of the present one and stable.
+    fn step(&self, scenario: Arc<Scenario>, last: bool) -> Result<NestedEquilibrium, Lost> {
+        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let near = self.at.coarsest(PREDICTING.min(self.at.levels.len()));
+        let near = near.unwrap_or_else(|| self.at.grids());
+        let found = match self.is_like(&leaf) {
+            true => {
+                let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
+                let rate = LeafRate::new(&near.levels[0].leaf.leaf, &terms);
+                let mut responses = Vec::new();
+                for level in &near.levels {
+                    let mut linear = Linearized::new(level, self.tolerance(&scenario));
+                    let forces = linear.forces(level, std::slice::from_ref(&rate));
+                    let response = linear.responses(level, &forces);
+                    let response = response.and_then(|all| all.into_iter().next());
+                    responses.push(response.ok_or(Lost::Elsewhere)?);
+                }
+                let grids = match last {
+                    true => Grids::AsNeeded,
+                    false => Grids::These,
+                };
+                near.follow(scenario, &responses, (&self.options, grids))?
+            }
+            false => self.near(&leaf, self.grid(&leaf))?,
+        };
+        match last && !found.is_stable() {
+            true => Err(Lost::Elsewhere),
+            false => Ok(found),
+        }
+    }
+
+    /// The equilibrium of a leaf whose nodes lie elsewhere: from where this one is, on a grid, without
+    /// leaving its valley.
+    fn near(&self, leaf: &Leaf, grid: Grid) -> Result<NestedEquilibrium, Lost> {
+        let problem = Problem {
+            whole: Some(leaf),
+            ..Problem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
+        };
+        let guess = self.state_on(leaf, &grid);
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        let begun = NestedEquilibrium::begun(&problem);
+        let found = grids::follow(&problem, begun, vec![(grid, guess)], &mut effort);
+        Ok(found.map_err(|_| Lost::Elsewhere)?.after(effort.work))
+    }
+
+    /// Whether the scenario of a leaf differs from the present one in numbers alone that leave the
+    /// nodes, and what is held and tied, where they are.
+    fn is_like(&self, leaf: &Leaf) -> bool {
+        let (own, other) = (&*self.scenario, leaf.scenario());
+        let held = |of: &Scenario| of.held_tip.as_ref().map(|tip| tip.clamps.is_some());
+        let grips = own.grips.iter().zip(&other.grips);
+        own.rods.len() == other.rods.len()
+            && own.joined == other.joined
+            && own.tissue.is_some() == other.tissue.is_some()
+            && own.wind.is_none()
+            && other.wind.is_none()
+            && held(own) == held(other)
+            && own.grips.len() == other.grips.len()
+            && { grips }.all(|(a, b)| (a.vein, a.at, a.held) == (b.vein, b.at, b.held))
+            && self.at.levels[0].leaf.leaf.kinks() == leaf.kinks()
+    }
+
+    /// A grid like the coarsest of its own, with nodes where this leaf needs them.
+    fn grid(&self, leaf: &Leaf) -> Grid {
+        let own = &self.at.levels[0].leaf;
+        match own.leaf.kinks() == leaf.kinks() {
+            true => own.grid.clone(),
+            false => Grid::new(own.segments(), leaf.kinks()),
+        }
+    }
+
+    /// Its state on a grid of a leaf with as many rods, in the units of that leaf.
+    pub(crate) fn state_on(&self, leaf: &Leaf, grid: &Grid) -> State {
+        let level = &self.at.levels[0];
+        let mut state = rescaled(level, level.state.clone(), leaf);
+        state = transfer(&level.leaf, &state, grid);
+        leaf.hold_tips(&mut state);
+        state
+    }
+}
+
+/// The result of an equilibrium, and the grids on which its stability is known.
+fn decide(
+    problem: &Problem,
+    found: NestedEquilibrium,
+    clock: Instant,
+    effort: &mut Effort,
+) -> (NestedEquilibrium, Equilibrium) {
+    let (result, at) = decided(problem, Ok(found), clock, effort);
+    (at, result)
+}

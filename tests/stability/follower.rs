@@ -1,0 +1,142 @@
+//! A leaf that follows its scenario: along its branch, to the fold and no further, and from there in
+//! motion to where a relaxation leads.
+
+use leafdyn::relax::{Followed, Follower, RelaxError};
+use leafdyn::simulate::{self, Simulation};
+use leafdyn::study::{Base, Keys, PointKind, trace};
+use leafdyn_testing::*;
+
+const TOLERANCE: f64 = 1e-6;
+
+fn options() -> Options {
+    Options {
+        tolerance: Some(TOLERANCE),
+        ..Options::default()
+    }
+}
+
+/// Stiff sideways, so that it falls in its plane.
+const COLUMN: &str = "stiffness.bending_3=10.0";
+
+/// A column beyond its Euler load, and a force across that keeps it on one side.
+fn column(across: f64) -> Scenario {
+    rod(&format!("{COLUMN}; load.tip_force=[-2.8, 0.0, {across:?}]"))
+}
+
+fn begin(scenario: &Scenario) -> Follower {
+    let (_, follower) = Follower::begin(scenario, &options()).unwrap();
+    follower.expect("the leaf is at rest")
+}
+
+fn follow(follower: &mut Follower, ends: [f64; 2]) -> Followed {
+    let at = |part: f64| Ok::<_, RelaxError>(column(ends[0] + part * (ends[1] - ends[0])));
+    follower.follow(&at).unwrap()
+}
+
+fn there(followed: Followed) -> Equilibrium {
+    match followed {
+        Followed::There(leaf) => *leaf,
+        Followed::Left { part } => panic!("left at {part}"),
+    }
+}
+
+/// Where it ends is where a trace finds the fold; there it snaps, and it takes another fold to
+/// come back.
+#[test]
+fn a_column_snaps_at_its_fold_and_comes_back_at_another() {
+    let request = branch::request(
+        base(ROD, &format!("{COLUMN}; load.tip_force=[-2.8, 0.0, 0.5]")),
+        "load.tip_force[2]=0.5..-0.5",
+        TOLERANCE,
+        2000,
+    );
+    let trace = trace(&request, &mut |_, _, _| {}).unwrap();
+    let mut critical = trace.branches[0].critical();
+    let (_, fold) = critical.find(|(_, it)| it.kind == PointKind::Fold).unwrap();
+    assert!((-0.5..0.0).contains(&fold.value), "{}", fold.value);
+
+    let mut follower = begin(&column(0.5));
+    let up = there(follow(&mut follower, [0.5, 0.5 * fold.value]));
+    assert!(up.tips[0].z > 0.3, "{}", up.tips[0]);
+    let Followed::Left { part } = follow(&mut follower, [0.5 * fold.value, -0.5]) else {
+        panic!("it stays up beyond the fold")
+    };
+    let left = 0.5 * fold.value + part * (-0.5 - 0.5 * fold.value);
+    let step = (0.5 + fold.value).abs().max(0.1) / 128.0;
+    assert!((left - fold.value).abs() < step, "{left}, {}", fold.value);
+
+    let below = column(-0.5);
+    let mut motion =
+        Simulation::released(&follower, &below, &simulate::Options::default()).unwrap();
+    let first = motion.frame().tips(true)[0];
+    assert!(first.z > 0.3, "it begins where it was: {first}");
+    while !motion.done() {
+        motion.next_frame().unwrap();
+    }
+    let down = motion.land(&mut follower, &below).unwrap();
+    let relaxed = below.relaxation().tolerance(TOLERANCE).run().unwrap();
+    let error = 2.0 * TOLERANCE * relaxed.shape.longest();
+    assert!(down.tips[0].distance(relaxed.tips[0]) < error);
+    assert_eq!(down.stable(), Some(true));
+
+    let still = there(follow(&mut follower, [-0.5, -0.5 * fold.value]));
+    assert!(still.tips[0].z < -0.3, "{}", still.tips[0]);
+}
+
+/// In one step or in several, each leaf is where a relaxation finds it, within the bars of both.
+#[test]
+fn leaves_of_all_kinds_follow_to_where_they_rest() {
+    let cases = [
+        ("paper/fig04", "", "scale:load.gravity", [1.0, 0.3]),
+        ("paper/fig04", "", "leaf.length", [1.0, 1.1]),
+        (
+            "paper/fig08",
+            "leaf.rods=5",
+            "stiffness.torsion",
+            [1.0, 0.5],
+        ),
+        ("measured/grass", "", "section.young", [1.0, 0.5]),
+        (
+            "measured/across",
+            "grip[0].move=[0, 0, 0]; grip[1].move=[0, 0, 0]",
+            "grip[1].move[1]",
+            [0.0, 0.05],
+        ),
+        ("measured/blade", "", "load.g[2]", [1.0, 0.2]),
+        ("measured/clip", "", "load.point[0].at", [1.0, 0.8]),
+        ("study/saddle", "", "blade.thickness", [1.0, 2.0]),
+    ];
+    for (name, overrides, key, [from, to]) in cases {
+        let base = base_of(name, overrides);
+        let keys: Keys = key.parse().unwrap();
+        let given = base.number(&keys).unwrap_or(1.0);
+        let unit = if given == 0.0 { 1.0 } else { given };
+        let at = |value: f64| base.at(&[(&keys, unit * value)]).unwrap().scenario;
+        let relaxed = at(to).relaxation().tolerance(TOLERANCE).run().unwrap();
+        for steps in [1, 5] {
+            let mut follower = begin(&at(from));
+            let mut found = None;
+            for k in 0..steps {
+                let along = |t: f64| {
+                    let part = (k as f64 + t) / steps as f64;
+                    Ok::<_, RelaxError>(at(from + part * (to - from)))
+                };
+                found = Some(there(follower.follow(&along).unwrap()));
+            }
+            let found = found.unwrap();
+            let off = Difference::between(&found.shape.rods, &relaxed.shape.rods).position;
+            let bars = [&found, &relaxed].map(|leaf| leaf.accuracy.error_estimate.unwrap());
+            println!(
+                "{name} {key} in {steps}: {off:.1e} of {:.1e}",
+                bars[0] + bars[1]
+            );
+            assert!(off <= bars[0] + bars[1], "{name} {key}");
+            assert_eq!(found.stable(), Some(true));
+        }
+    }
+}
+
+fn base_of(name: &str, overrides: &str) -> Base {
+    let base = Base::read(&path(name), &entries(overrides));
+    base.unwrap_or_else(|error| panic!("{error}"))
+}
