@@ -13,6 +13,7 @@ use crate::relax::rest::{decided, relax_on_grids};
 use crate::relax::result::equilibrium::Equilibrium;
 use crate::relax::sensitivity::Linearized;
 use crate::relax::settle::effort::Effort;
+use crate::relax::transfer::level::Level;
 use crate::relax::transfer::prolong::transfer;
 use crate::scenario::Scenario;
 use std::sync::Arc;
@@ -93,6 +94,16 @@ impl Follower {
             at,
         };
         Ok((leaf, rests.then_some(follower)))
+    }
+
+    /// How it is to come to rest from now on, and which of its modes are wanted.
+    pub fn options(&mut self, options: &Options) {
+        self.options = options.clone();
+    }
+
+    /// The leaf on its grids.
+    pub(crate) fn levels(&self) -> &[Level] {
+        &self.at.levels
     }
 
     /// The scenario of the equilibrium in which it is.

@@ -113,6 +113,16 @@ impl Dynamics {
         mean_of(&self.density)
     }
 
+    /// The unit of time, sqrt(rho L^4/A), of these rods.
+    pub fn natural_time(&self, rods: &[Rod]) -> f64 {
+        time(Scale::of(rods), &self.density)
+    }
+
+    /// The external damping that is critical for the lowest mode of a clamped vein.
+    pub fn critical_damping(&self, rods: &[Rod]) -> f64 {
+        critical_damping(&self.density, self.natural_time(rods))
+    }
+
     /// The default for rods of these densities.
     pub(super) fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
         let scale = Scale::of(rods);
@@ -123,7 +133,7 @@ impl Dynamics {
         Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
             polar_excess: 0.0,
-            external_damping: 2.0 * LOWEST_FREQUENCY * mean_of(&density) / time,
+            external_damping: critical_damping(&density, time),
             density,
             internal_damping: 0.0,
             duration,
@@ -136,6 +146,11 @@ impl Dynamics {
             rest: Schedule::constant(1.0),
         }
     }
+}
+
+/// That is critical for the lowest mode of a clamped rod of the mean density.
+fn critical_damping(density: &[Profile], time: f64) -> f64 {
+    2.0 * LOWEST_FREQUENCY * mean_of(density) / time
 }
 
 /// Mean of the mid-rod values; exact if all are equal.

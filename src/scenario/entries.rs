@@ -188,6 +188,13 @@ impl Entries {
         Some(self.rows[which])
     }
 
+    /// The whole value of a key, in each of its tables.
+    pub(crate) fn parts(&self, key: Key) -> impl Iterator<Item = Part> {
+        let (table, _) = key.parts();
+        let rows = self.rows(table).unwrap_or(1);
+        (0..rows).map(move |row| Part::of_row(key, row))
+    }
+
     /// Refuses a part of a table that is not there.
     fn check_row(&self, part: Part) -> std::result::Result<(), String> {
         let (table, _) = part.key.parts();

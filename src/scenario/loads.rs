@@ -54,6 +54,23 @@ impl Scenario {
         }
     }
 
+    /// The same leaf without weight, loads and wind; what is held of it stays where it is.
+    pub fn unloaded(&self) -> Scenario {
+        let none = [0.0; 3];
+        Scenario {
+            gravity: none,
+            own_gravity: Vec::new(),
+            g: none,
+            distributed: None,
+            points: Vec::new(),
+            tip_force: none,
+            tip_moment: none,
+            wind: None,
+            dynamics: self.dynamics.clone().with_loads(none, none, none),
+            ..self.clone()
+        }
+    }
+
     /// Whether veins have loads of their own besides the gravity that all share.
     pub fn has_own_loads(&self) -> bool {
         let weights = !self.own_gravity.is_empty() || self.g != [0.0; 3];

@@ -316,6 +316,13 @@ impl Frame {
         &self.positions[rod * nodes..(rod + 1) * nodes]
     }
 
+    /// The centerlines of all rods.
+    pub fn curves(&self) -> Vec<Vec<DVec3>> {
+        (0..self.rods)
+            .map(|rod| self.centerline(rod).to_vec())
+            .collect()
+    }
+
     /// The shared tip alone, or one tip per rod.
     pub fn tips(&self, joined: bool) -> Vec<DVec3> {
         let ends = self.positions.chunks(self.positions.len() / self.rods);

@@ -37,9 +37,9 @@ pub use map::{
     MapShow, map,
 };
 pub use margin::{MarginError, MarginProgress, relax_with_margin};
-pub use sensitivity::{SensitivityError, relax_with_sensitivities};
+pub use sensitivity::{SensitivityError, relax_with_sensitivities, sensitivities_of};
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
     TraceRequest, TraceShow, trace,
 };
-pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};
+pub use vary::{Base, Keys, Knob, Knobs, Number, Target, Varied, Vary, VaryError};

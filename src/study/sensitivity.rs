@@ -2,8 +2,8 @@
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
-    Equilibrium, Options, Parameter, Progress, RelaxError, relax_on_grids, sensitivities,
-    without_wind,
+    Equilibrium, Follower, Options, Parameter, Progress, RelaxError, Sensitivity, relax_on_grids,
+    sensitivities, without_wind,
 };
 
 /// Why there are no derivatives.
@@ -34,14 +34,8 @@ pub fn relax_with_sensitivities(
     }
     let scenario = base.scenario();
     without_wind(scenario, "a derivative")?;
-    let values = keys.iter().map(|keys| Ok((keys, base.value(keys)?)));
-    let values = values.collect::<Result<Vec<(&Keys, f64)>, VaryError>>()?;
-    let numbers: Vec<(String, Parameter)> = (values.chunks(1).zip(keys))
-        .map(|(own, keys)| {
-            let number = base.parameter(own, 0, keys.unit(scenario));
-            (keys.to_string(), number)
-        })
-        .collect();
+    let values = values(base, keys)?;
+    let numbers = numbers(base, &values);
     let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
@@ -60,6 +54,39 @@ pub fn relax_with_sensitivities(
         false => Vec::new(),
     });
     Ok(leaf)
+}
+
+/// The same derivatives of a leaf that follows, and is where `base` has it.
+pub fn sensitivities_of(
+    follower: &Follower,
+    base: &Base,
+    keys: &[Keys],
+) -> Result<Vec<Sensitivity>, SensitivityError> {
+    let scenario = base.scenario();
+    without_wind(scenario, "a derivative")?;
+    let values = values(base, keys)?;
+    let numbers = numbers(base, &values);
+    Ok(sensitivities(
+        follower.levels(),
+        &numbers,
+        scenario.tolerance,
+        0,
+    ))
+}
+
+/// Each of the keys with its number.
+fn values<'k>(base: &Base, keys: &'k [Keys]) -> Result<Vec<(&'k Keys, f64)>, VaryError> {
+    keys.iter()
+        .map(|keys| Ok((keys, base.value(keys)?)))
+        .collect()
+}
+
+/// These numbers by their names.
+fn numbers<'v>(base: &'v Base, values: &'v [(&'v Keys, f64)]) -> Vec<(String, Parameter<'v>)> {
+    let unit = |keys: &Keys| keys.unit(base.scenario());
+    let each = values.chunks(1);
+    each.map(|own| (own[0].0.to_string(), base.parameter(own, 0, unit(own[0].0))))
+        .collect()
 }
 
 /// Whether of so many groups of veins that turn about their base without resistance fewer do after

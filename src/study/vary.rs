@@ -25,8 +25,10 @@
 //! ```
 
 mod base;
+mod numbers;
 
 pub use base::{Base, Varied};
+pub use numbers::Number;
 
 use std::fmt;
 use std::ops::RangeInclusive;

@@ -1,5 +1,4 @@
-// What the page was given, and the numbers along the veins that follow from it.
-const view = JSON.parse(document.getElementById("data").textContent);
+// The numbers along the veins that follow from the `view` of a page.
 const find = (id) => document.getElementById(id);
 
 function bytes(base64) {

@@ -16,9 +16,11 @@ const STATE: usize = 16;
 pub struct View {
     /// `leaf`, `motion`, `trace` or `equilibria`.
     pub kind: &'static str,
+    /// The name of the scenario.
     pub title: String,
-    /// The result in a phrase, and whether it is a success.
+    /// The result in a phrase.
     pub verdict: String,
+    /// Whether it is a success.
     pub success: bool,
     /// Names and texts of its numbers.
     pub summary: Vec<(&'static str, String)>,
@@ -26,16 +28,21 @@ pub struct View {
     pub units: [Option<String>; 2],
     /// Gravity per length of vein.
     pub gravity: [f64; 3],
+    /// The length of the longest vein.
     pub longest: f64,
+    /// Whether the tips share one point.
     pub joined: bool,
-    /// The number of veins, and the numbers from 1, lengths and colours of those that are
-    /// drawn.
+    /// The number of veins.
     pub rods: usize,
+    /// The numbers, from 1, of those that are drawn.
     pub drawn: Vec<usize>,
+    /// Their lengths.
     pub lengths: Vec<f64>,
+    /// Their colours.
     pub colors: Vec<String>,
     /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
     pub leaves: Vec<Leaf>,
+    /// Its modes, if their shapes were requested.
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
@@ -44,8 +51,9 @@ pub struct View {
 /// A shape of the leaf.
 #[derive(Default, Serialize)]
 pub struct Leaf {
-    /// A short description, and the numbers of this leaf alone.
+    /// A short description.
     pub label: String,
+    /// The numbers of this leaf alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub summary: Vec<(&'static str, String)>,
     /// Its time, in a motion.

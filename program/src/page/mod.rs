@@ -28,7 +28,7 @@ use crate::figure::drawing::{Drawing, color_of_vein};
 use crate::figure::svg::{self, hex};
 use crate::figure::veins::is_drawn;
 use crate::report::{Reported, json};
-use data::View;
+pub use data::{Leaf, View};
 use glam::DVec3;
 use leafdyn::scenario::{self, Scenario, Units};
 use leafdyn::simulate::Record;
@@ -38,11 +38,13 @@ use std::io::{self, Write};
 const FRAME: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
 const THREE: &str = include_str!("three/three.min.js");
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 7] = [
+    include_str!("given.js"),
     include_str!("data.js"),
     include_str!("space.js"),
     include_str!("axes.js"),
     include_str!("chart.js"),
+    include_str!("stage.js"),
     include_str!("page.js"),
 ];
 
@@ -101,17 +103,30 @@ pub(crate) fn write<R: Viewed>(
 
 /// The page of a result of this scenario: a self-contained HTML file.
 pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
+    assemble(&view(result, scenario), &R::STILL(result, scenario))
+}
+
+/// The data of that page alone.
+pub fn view<R: Viewed>(result: &R, scenario: &Scenario) -> View {
+    let mut view = bare(scenario);
+    view.summary = result.summary();
+    result.fill(&mut view, &scenario.units);
+    view
+}
+
+/// The same without any result.
+pub fn bare(scenario: &Scenario) -> View {
     let count = scenario.rods.len();
     let drawn: Vec<usize> = (1..=count)
         .filter(|number| is_drawn(number - 1, count))
         .collect();
     let color = |&number: &usize| hex(color_of_vein(number - 1, count));
-    let mut view = View {
+    View {
         kind: "leaf",
         title: scenario.name.clone(),
         verdict: String::new(),
         success: true,
-        summary: result.summary(),
+        summary: Vec::new(),
         units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
         gravity: scenario.gravity,
         longest: scenario::longest(&scenario.rods),
@@ -123,9 +138,12 @@ pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
         leaves: Vec::new(),
         modes: Vec::new(),
         chart: None,
-    };
-    result.fill(&mut view, &scenario.units);
-    assemble(&view, &R::STILL(result, scenario))
+    }
+}
+
+/// A leaf in motion, as centerlines with nodes at these stations, for the page of its scenario.
+pub fn moving(stations: &[f64], curves: &[Vec<DVec3>], page: &View) -> Leaf {
+    Leaf::coarse(String::new(), stations, curves, page, usize::MAX)
 }
 
 fn assemble(view: &View, still: &Drawing) -> String {

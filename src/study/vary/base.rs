@@ -9,7 +9,7 @@ use crate::scenario::{self, Entries, Form, Key, Scenario};
 /// A scenario with some entries replaced, into which numbers are substituted.
 #[derive(Clone, Debug)]
 pub struct Base {
-    entries: Entries,
+    pub(super) entries: Entries,
     overrides: Vec<String>,
     knobs: Knobs,
     scenario: Scenario,
@@ -223,7 +223,7 @@ impl Base {
     }
 
     /// The scenario with these values, as TOML.
-    pub(crate) fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
+    pub fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
         let changed = self.entries.replaced(&overriding(values)).ok()?;
         Some(changed.to_toml())
     }

@@ -1,0 +1,3 @@
+// What the page was given.
+const view = JSON.parse(document.getElementById("data").textContent);
+

@@ -1,0 +1,35 @@
+// Builds dist/live.html: the page with the solver, scripts and scenarios inside.
+//   node web/build.mjs SOLVER.wasm
+// `web/build.sh` compiles the solver and calls this.
+import { mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+
+const web = dirname(fileURLToPath(import.meta.url));
+const read = (...path) => readFileSync(join(web, ...path), "utf8");
+const pages = "../program/src/page";
+const folders = ["paper", "classic", "measured", "motion", "study"];
+const scenarios = folders.flatMap((folder) =>
+  readdirSync(join(web, "../scenarios", folder))
+    .filter((name) => name.endsWith(".toml"))
+    .sort()
+    .map((name) => ({ name: `${folder}/${name}`, text: read("../scenarios", folder, name) })),
+);
+// Within a script only `</script` and `<!--` are special.
+const data = (object) => JSON.stringify(object).replaceAll("<", "\\u003c");
+const part = {
+  STYLE: read(pages, "page.css") + read("page/live.css"),
+  THREE: read(pages, "three/three.min.js"),
+  STAGE: ["data.js", "space.js", "axes.js", "chart.js", "stage.js"].map((name) => read(pages, name)).join("\n") + read("page/leaf.js"),
+  SCRIPT: ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "main.js"].map((name) => read("page", name)).join("\n"),
+  WORKER: read("page/worker.js"),
+  GALLERY: data(scenarios),
+  GIVEN: "null",
+  SOLVER: gzipSync(readFileSync(process.argv[2]), { level: 9 }).toString("base64"),
+  LICENCES: [read("../LICENSE-MIT"), read(pages, "three/LICENSE-three.txt")].join("\n\n").replaceAll("&", "&amp;").replaceAll("<", "&lt;"),
+};
+const page = read("page/live.html").replaceAll(/\{\{(\w+)\}\}/g, (_, name) => part[name]);
+mkdirSync(join(web, "dist"), { recursive: true });
+writeFileSync(join(web, "dist/live.html"), page);
+console.log(`web/dist/live.html: ${(page.length / 1e6).toFixed(2)} MB`);

@@ -1,0 +1,203 @@
+// The leaf of the live page, within the scripts of the stage: it is one, and it moves.
+let current = null;
+/// Leaves beside it, as lines, by name.
+const ghosts = new Map();
+
+const sampled = () => [current, ...[...ghosts.values()].map((ghost) => ghost.leaf)].filter(Boolean);
+const limiting = () => [current];
+
+/// Centrelines of a leaf with any number of veins.
+class Ghost {
+  constructor(leaf, color) {
+    this.leaf = leaf;
+    const { points, nodes } = leaf;
+    const pieces = points.length / 3 - points.length / 3 / nodes;
+    const ends = new Float32Array(6 * pieces);
+    let to = 0;
+    for (let i = 0; i + 1 < points.length / 3; i++) {
+      if ((i + 1) % nodes === 0) continue;
+      ends.set(points.subarray(3 * i, 3 * i + 6), to);
+      to += 6;
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(ends, 3));
+    this.color = color;
+    this.lines = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: css(color) }));
+    this.lines.visible = false;
+    this.lines.frustumCulled = false;
+  }
+
+  remove() {
+    space.scene.remove(this.lines);
+    this.lines.geometry.dispose();
+  }
+}
+
+/// Puts a leaf beside, or takes it away.
+function beside(name, given, color) {
+  if (ghosts.has(name)) ghosts.get(name).remove();
+  ghosts.delete(name);
+  if (given && space) {
+    const ghost = new Ghost(decode(given), color);
+    space.scene.add(ghost.lines);
+    ghosts.set(name, ghost);
+    grow();
+  }
+  if (current) draw(false);
+}
+
+/// The box around all that was shown; seen from where it was before.
+function grow() {
+  const now = boxOf(sampled());
+  const { box } = space;
+  const out = [0, 1, 2].some((k) => now.low[k] < box.low[k] - 1e-6 * box.extent || now.high[k] > box.high[k] + 1e-6 * box.extent);
+  if (!out) return;
+  for (let k = 0; k < 3; k++) {
+    box.low[k] = Math.min(box.low[k], now.low[k]);
+    box.high[k] = Math.max(box.high[k], now.high[k]);
+    box.middle[k] = 0.5 * (box.low[k] + box.high[k]);
+  }
+  box.extent = Math.max(...[0, 1, 2].map((k) => box.high[k] - box.low[k]));
+  const { camera, controls } = space;
+  const away = camera.position.clone().sub(controls.target);
+  controls.target.fromArray(box.middle);
+  camera.position.copy(controls.target).add(away.setLength(10 * box.extent));
+  camera.far = 30 * box.extent;
+  controls.update();
+  camera.updateMatrixWorld();
+  fitBox();
+  redraw();
+}
+
+/// The limits of the colours hold all that was shown.
+function widen() {
+  const colors = quantity();
+  if (colors.name === "vein") return;
+  const key = `${colors.name} ${shown.mode}`;
+  const before = limitsKnown.get(key);
+  limitsKnown.delete(key);
+  const now = limitsOf(colors);
+  if (!before) return;
+  const both = [Math.min(before[0], now[0]), Math.max(before[1], now[1])];
+  limitsKnown.set(key, both);
+  if (both.some((limit, k) => limit !== before[k])) shown.stale = true;
+}
+
+function draw(again) {
+  const leaf = shown.mode >= 0 && view.modes.length ? inMode(view.modes[shown.mode], Math.sin(shown.phase)) : current;
+  leaves = [leaf];
+  if (!space) return;
+  if (!shown.plain) widen();
+  const mesh = put(0, leaf, again);
+  space.panels = [{ leaf, mesh, label: "", beside: [...ghosts.values()].map((ghost) => ghost.lines) }];
+  shown.dirty = true;
+  if (again) shown.stale = true;
+  if (find("probe").open) fillProbe();
+}
+
+/// Colours that a shape without strains has, too, or those of the veins.
+function plainly(plain) {
+  if (shown.plain === plain) return;
+  const { name } = quantity();
+  shown.plain = plain;
+  if (plain) [shown.chosen, shown.quantity] = [shown.quantity, Math.max(0, GEOMETRY.findIndex((one) => one.name === name))];
+  else shown.quantity = shown.chosen;
+  shown.stale = true;
+}
+
+/// Shows a leaf at rest.
+function show(known) {
+  const [turned] = [view.gravity.some((x, k) => x !== known.view.gravity[k])];
+  Object.assign(view, known.view);
+  decoded.clear();
+  view.modes.forEach((mode) => (mode.decoded = undefined));
+  current = leafAt(0);
+  if (shown.mode < 0) plainly(false);
+  if (space) grow();
+  draw(turned);
+}
+
+/// Shows it at an instant of a motion.
+function moving(given) {
+  shown.mode = -1;
+  plainly(true);
+  current = decode(given);
+  if (space) grow();
+  draw(false);
+}
+
+/// Lets it vibrate in its first mode, or not.
+function vibrate(on) {
+  shown.mode = on && view.modes.length ? 0 : -1;
+  plainly(shown.mode >= 0);
+  shown.phase = Math.PI / 2;
+  draw(false);
+}
+
+/// A frame of the screen.
+function frame(seconds) {
+  if (shown.mode >= 0) {
+    shown.phase += (2 * Math.PI * seconds) / 1.6;
+    draw(false);
+  }
+  if (!shown.dirty || !space) return;
+  shown.dirty = false;
+  render();
+  shown.drawn = (shown.drawn || 0) + 1;
+}
+
+/// By how much, in space, the pointer was moved in the plane of the screen.
+function across(dx, dy) {
+  const { scale } = placeIn(space.panels[0]);
+  const way = [0, 1].map((k) => new THREE.Vector3().setFromMatrixColumn(space.camera.matrixWorld, k));
+  return way[0].multiplyScalar(dx / scale).add(way[1].multiplyScalar(-dy / scale)).toArray();
+}
+
+/// The direction in space that points down on the screen.
+const downward = () => new THREE.Vector3().setFromMatrixColumn(space.camera.matrixWorld, 1).negate().toArray();
+
+function leave() {
+  if (!space) return;
+  space.controls.dispose();
+  space.renderer.dispose();
+  space.renderer.forceContextLoss();
+}
+
+current = leafAt(0);
+try {
+  space = openSpace();
+} catch (reason) {
+  find("why").textContent = `Nothing can be drawn in space here (${reason.message}): the figure stands in its place.`;
+}
+find("vein").max = view.rods;
+find("vein").value = Math.min(view.rods, Number(find("vein").value));
+fillQuantities();
+if (space) {
+  look("free");
+  canvas.addEventListener("pointermove", hover);
+  canvas.addEventListener("pointerleave", hover);
+}
+draw(true);
+return {
+  view, shown, show, moving, vibrate, beside, frame, across, downward, leave, look, picture, savePicture, setTheme, redraw, nearest, Diagram, short, fillProbe, row,
+  inSpace: () => space !== null,
+  controls: () => space && space.controls,
+  camera: () => space && space.camera.position.clone().sub(space.controls.target).normalize().toArray().concat(space.camera.zoom),
+  see: ([x, y, z, zoom]) => {
+    const { camera, controls, box } = space;
+    camera.position.copy(controls.target).add(new THREE.Vector3(x, y, z).multiplyScalar(10 * box.extent));
+    camera.zoom = zoom;
+    controls.update();
+    camera.updateMatrixWorld();
+    fitBox();
+    redraw();
+  },
+  key: keyInSpace,
+  resize: () => {
+    if (space) space.stage = null;
+    redraw();
+  },
+  again: () => draw(true),
+  place: (point) => placeIn(space.panels[0])(point),
+  nodes: () => Array.from({ length: current.points.length / 3 }, (_, i) => [...current.points.subarray(3 * i, 3 * i + 3)]),
+};

@@ -1,0 +1,42 @@
+// Questions to the solver, which has a thread of its own.
+
+/// A solver in a thread; `ask` gives a promise of the answer.
+class Solver {
+  constructor(source, code) {
+    this.waiting = new Map();
+    this.count = 0;
+    this.worker = new Worker(source);
+    this.worker.onmessage = ({ data }) => {
+      const settle = this.waiting.get(data.id);
+      this.waiting.delete(data.id);
+      this.took = data.took;
+      settle(data.answer);
+    };
+    this.ready = this.post({ code });
+  }
+
+  post(message) {
+    const id = this.count++;
+    return new Promise((settle) => {
+      this.waiting.set(id, settle);
+      this.worker.postMessage({ id, ...message });
+    });
+  }
+
+  ask(question) {
+    return this.post({ question });
+  }
+}
+
+const bytesOf = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+
+/// What a stream makes of bytes.
+async function through(bytes, stream) {
+  return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+}
+
+/// The code that stands in the page.
+async function code() {
+  const packed = bytesOf(document.getElementById("solver").textContent);
+  return WebAssembly.compile(await through(packed, new DecompressionStream("gzip")));
+}

@@ -1,0 +1,197 @@
+//! What the page is told.
+
+use crate::motion::Instant;
+use base64::prelude::{BASE64_STANDARD, Engine};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Scenario;
+use leafdyn::study::{Number, PointKind, Trace};
+use leafdyn_program::page::{self, View};
+use serde::Serialize;
+
+/// An answer.
+#[derive(Serialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum Answer {
+    /// No answer, and why.
+    Refused {
+        error: String,
+    },
+    Opened {
+        known: Known,
+        sliders: Vec<Slider>,
+    },
+    /// The leaf in the equilibrium into which the one before has changed.
+    Followed(Known),
+    /// The leaf in an equilibrium that was found anew.
+    Found(Known),
+    /// The stable equilibria end at these values, and the leaf must move on.
+    Left {
+        values: Vec<(String, f64)>,
+    },
+    Moving(Instant),
+    Branch(Branch),
+    #[serde(serialize_with = "list")]
+    Equilibria(Vec<Known>),
+    #[serde(serialize_with = "list")]
+    Sensitivity(Vec<Told>),
+    Unloaded(Known),
+    Version {
+        version: &'static str,
+    },
+    /// A file, in base64.
+    File {
+        name: String,
+        content: String,
+    },
+}
+
+/// Lists are named, as all answers are objects.
+fn list<T: Serialize, S: serde::Serializer>(list: &[T], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Named<'l, T> {
+        list: &'l [T],
+    }
+    Named { list }.serialize(serializer)
+}
+
+impl Answer {
+    /// A file with this content.
+    pub fn file(name: &str, content: &[u8]) -> Answer {
+        Answer::File {
+            name: name.into(),
+            content: BASE64_STANDARD.encode(content),
+        }
+    }
+}
+
+/// A leaf at rest: as the page of a result shows it, and in numbers.
+#[derive(Serialize)]
+pub struct Known {
+    pub view: View,
+    pub tips: Vec<[f64; 3]>,
+    pub energy: Option<f64>,
+    pub error: Option<f64>,
+    pub tolerance: f64,
+    pub stable: Option<bool>,
+    pub index: Option<usize>,
+    pub neutral: usize,
+    /// Squares of the angular frequencies.
+    pub eigenvalues: Vec<f64>,
+    pub reaction: Option<[f64; 3]>,
+    pub seconds: f64,
+}
+
+impl Known {
+    /// Of a leaf.
+    pub fn new(leaf: &Equilibrium, scenario: &Scenario) -> Known {
+        let modes = leaf.stability.modes.iter().flatten();
+        Known {
+            view: page::view(leaf, scenario),
+            tips: leaf.tips.iter().map(|tip| tip.to_array()).collect(),
+            energy: leaf.energy,
+            error: leaf.accuracy.error_estimate,
+            tolerance: leaf.accuracy.tolerance,
+            stable: leaf.stable(),
+            index: leaf.stability.negative_eigenvalues,
+            neutral: leaf.stability.neutral_directions,
+            eigenvalues: modes.map(|mode| mode.eigenvalue).collect(),
+            reaction: (leaf.reaction.as_ref()).map(|reaction| reaction.force.to_array()),
+            seconds: leaf.wall_seconds,
+        }
+    }
+}
+
+/// A number that a slider can move, with a range around its value.
+#[derive(Serialize)]
+pub struct Slider {
+    key: String,
+    value: f64,
+    low: f64,
+    high: f64,
+    log: bool,
+    whole: bool,
+    description: &'static str,
+}
+
+/// How far a range goes from the value, as a factor or as a part of its size.
+const RANGE: f64 = 4.0;
+
+impl Slider {
+    /// Of a number of a scenario.
+    pub fn new(number: Number) -> Slider {
+        let Number { value, .. } = number;
+        let log = number.positive && !number.whole && value > 0.0;
+        let size = if value == 0.0 {
+            number.unit
+        } else {
+            value.abs()
+        };
+        let (low, high) = match (number.whole, log) {
+            (true, _) => (1.0, (RANGE * value).max(9.0)),
+            (_, true) => (value / RANGE, value * RANGE),
+            _ if number.positive => (0.0, RANGE * size),
+            _ => (value - 2.0 * size, value + 2.0 * size),
+        };
+        Slider {
+            key: number.keys.to_string(),
+            value,
+            low,
+            high,
+            log,
+            whole: number.whole,
+            description: number.description,
+        }
+    }
+}
+
+/// Derivatives with respect to a number.
+#[derive(Serialize)]
+pub struct Told {
+    pub key: String,
+    pub tips: Vec<[f64; 3]>,
+    pub energy: f64,
+}
+
+/// A branch of equilibria: of each point the value, the tip, the energy and the index.
+#[derive(Serialize)]
+pub struct Branch {
+    key: String,
+    log: bool,
+    complete: bool,
+    remark: Option<String>,
+    points: Vec<BranchPoint>,
+}
+
+#[derive(Serialize)]
+struct BranchPoint {
+    value: f64,
+    tip: [f64; 3],
+    energy: f64,
+    index: usize,
+    /// `fold` or `branch-point`, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind: Option<&'static str>,
+}
+
+/// The first branch of a trace.
+pub fn branch(trace: &Trace) -> Branch {
+    let points = trace.branches.first().map(|branch| &branch.points);
+    let points = points.into_iter().flatten().map(|point| BranchPoint {
+        value: point.value,
+        tip: point
+            .tips
+            .first()
+            .map_or([f64::NAN; 3], |tip| tip.to_array()),
+        energy: point.energy,
+        index: point.index,
+        kind: (point.kind != PointKind::Regular).then(|| point.kind.word()),
+    });
+    let branch = trace.branches.first();
+    Branch {
+        key: trace.keys.to_string(),
+        log: trace.log,
+        complete: trace.complete,
+        remark: trace.remark.clone().or_else(|| branch?.remark.clone()),
+        points: points.collect(),
+    }
+}

@@ -1,0 +1,448 @@
+//! A leaf on the page: opened, changed, let go, asked for what comes.
+
+use crate::answer::{Answer, Known, Slider, Told, branch};
+use crate::motion::Motion;
+use leafdyn::relax::{
+    Equilibrium, Followed, Follower, Limit, Options, RelaxError, Route, SemiImplicit, relax,
+};
+use leafdyn::scenario::{PointLoad, Scenario};
+use leafdyn::study::{
+    Base, Keys, SensitivityError, TraceRequest, Vary, VaryError, equilibria, sensitivities_of,
+    trace,
+};
+use leafdyn_program::files::{self, Document};
+use serde::Deserialize;
+use std::time::Duration;
+
+/// What a leaf on a screen needs.
+const TOLERANCE: f64 = 1e-4;
+
+/// Points of a branch that are drawn, and seconds for all that is asked in the background.
+const MOST_POINTS: usize = 400;
+const SECONDS: u64 = 20;
+
+/// Values of numbers of the scenario by their paths.
+type Values = Vec<(String, f64)>;
+
+/// What a page asks.
+#[derive(Deserialize)]
+#[serde(tag = "ask", rename_all = "lowercase")]
+enum Question {
+    /// A scenario, with the values of some of its numbers.
+    Open {
+        text: String,
+        name: String,
+        #[serde(default)]
+        values: Values,
+    },
+    /// The leaf with other values, followed there.
+    Set {
+        values: Values,
+        /// How many modes are wanted.
+        #[serde(default)]
+        modes: usize,
+        /// Where it is pulled.
+        #[serde(default)]
+        pull: Option<Pull>,
+    },
+    /// The leaf, which was left where its stable equilibria end, at rest elsewhere.
+    Settle,
+    /// The leaf let go from where it is, or from the arcs it is released from; `damped` if the
+    /// motion is not its own but that to its next equilibrium.
+    Go {
+        #[serde(default)]
+        damped: bool,
+        #[serde(default)]
+        released: bool,
+    },
+    /// An instant of that motion, so many outputs later.
+    Frame {
+        #[serde(default = "one")]
+        count: usize,
+    },
+    /// The end of the motion: the leaf at rest.
+    Land,
+    /// The branch of equilibria between two values of a number.
+    Trace {
+        key: String,
+        from: f64,
+        to: f64,
+        #[serde(default)]
+        log: bool,
+    },
+    /// All equilibria that are found.
+    Equilibria,
+    /// Derivatives of the tip.
+    Sensitivity { keys: Vec<String> },
+    /// The leaf without loads.
+    Unloaded,
+    /// One of the files that the program writes, or the scenario.
+    Write { file: String },
+    /// The version of the solver.
+    Version,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// A point of a vein, by its number from 1 and the fraction of its length, pulled by a spring whose
+/// other end is displaced.
+#[derive(Clone, Copy, Deserialize)]
+struct Pull {
+    vein: usize,
+    at: f64,
+    displacement: [f64; 3],
+}
+
+/// Stiffness of that spring: times the bending stiffness of the veins over the length cubed.
+const SPRING: f64 = 6.0;
+
+impl Pull {
+    /// The scenario with its force.
+    fn on(self, mut scenario: Scenario) -> Scenario {
+        let (scale, rods) = (scenario.scale(), scenario.rods.len());
+        let stiffness = SPRING * rods as f64 * scale.force() / scale.length;
+        let force = self.displacement.map(|x| stiffness * x);
+        let vein = self.vein.clamp(1, rods) - 1;
+        let tip = self.at >= 1.0 && scenario.joined && rods > 1;
+        if force.iter().any(|x| !x.is_finite()) || !(self.at > 0.0 && self.at <= 1.0) {
+            return scenario;
+        }
+        if tip {
+            scenario.tip_force = [0, 1, 2].map(|k| scenario.tip_force[k] + force[k]);
+            return scenario;
+        }
+        scenario.points.push(PointLoad {
+            vein,
+            at: self.at,
+            force,
+            moment: [0.0; 3],
+            mass: 0.0,
+        });
+        scenario
+    }
+}
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// The scenario, a value, or a range.
+    #[error("{0}")]
+    Vary(#[from] VaryError),
+    /// A relaxation that cannot be run.
+    #[error("{0}")]
+    Relax(#[from] RelaxError),
+    /// A derivative that does not exist.
+    #[error("{0}")]
+    Sensitivity(#[from] SensitivityError),
+    /// Anything else, in words.
+    #[error("{0}")]
+    Words(String),
+}
+
+fn refuse<T>(why: impl ToString) -> Result<T, Refusal> {
+    Err(Refusal::Words(why.to_string()))
+}
+
+/// The leaf that is open.
+struct Open {
+    base: Base,
+    values: Vec<(Keys, f64)>,
+    /// With these values, but without what pulls it.
+    scenario: Scenario,
+    leaf: Equilibrium,
+    /// None where the leaf is not at rest, or has no energy.
+    follower: Option<Follower>,
+}
+
+/// What a page has open.
+#[derive(Default)]
+pub struct Session {
+    open: Option<Open>,
+    motion: Option<Motion>,
+}
+
+impl Session {
+    /// Answers a question, both as JSON.
+    pub fn answer(&mut self, question: &[u8]) -> Vec<u8> {
+        let answer = match serde_json::from_slice(question) {
+            Ok(question) => self
+                .ask(question)
+                .unwrap_or_else(|refusal| Answer::Refused {
+                    error: refusal.to_string(),
+                }),
+            Err(error) => Answer::Refused {
+                error: format!("no such question: {error}"),
+            },
+        };
+        serde_json::to_vec(&answer).unwrap_or_default()
+    }
+
+    fn ask(&mut self, question: Question) -> Result<Answer, Refusal> {
+        match question {
+            Question::Open { text, name, values } => {
+                let open = Open::new(Base::of_text(text, name, &[])?, values)?;
+                let sliders = open.sliders();
+                let known = open.known();
+                (self.open, self.motion) = (Some(open), None);
+                return Ok(Answer::Opened { known, sliders });
+            }
+            Question::Go { damped, released } => {
+                let open = self.opened()?;
+                let motion = Motion::begin(
+                    &open.scenario,
+                    open.follower.as_ref().filter(|_| !released),
+                    damped,
+                );
+                let mut motion = motion.or_else(refuse)?;
+                let answer = Answer::Moving(motion.first());
+                self.motion = Some(motion);
+                return Ok(answer);
+            }
+            Question::Frame { count } => {
+                let Some(motion) = &mut self.motion else {
+                    return refuse("nothing moves");
+                };
+                return Ok(Answer::Moving(motion.next(count).or_else(refuse)?));
+            }
+            Question::Version => {
+                let version = env!("CARGO_PKG_VERSION");
+                return Ok(Answer::Version { version });
+            }
+            _ => {}
+        }
+        let motion = self.motion.take();
+        let open = self.opened()?;
+        match question {
+            Question::Set {
+                values,
+                modes,
+                pull,
+            } => open.set(values, modes, pull),
+            Question::Settle => open.settle(None),
+            Question::Land => open.settle(motion),
+            Question::Trace { key, from, to, log } => open.trace(&key, [from, to], log),
+            Question::Equilibria => open.equilibria(),
+            Question::Sensitivity { keys } => open.sensitivity(&keys),
+            Question::Unloaded => open.unloaded(),
+            Question::Write { file } => open.write(&file),
+            Question::Open { .. }
+            | Question::Go { .. }
+            | Question::Frame { .. }
+            | Question::Version => refuse("answered"),
+        }
+    }
+
+    fn opened(&mut self) -> Result<&mut Open, Refusal> {
+        match &mut self.open {
+            Some(open) => Ok(open),
+            None => refuse("no scenario is open"),
+        }
+    }
+}
+
+/// How leaves are relaxed: those in a wind by motion.
+fn options(scenario: &Scenario, modes: usize) -> Options {
+    let windy = scenario.wind.is_some();
+    let modes = if windy { 0 } else { modes };
+    Options {
+        tolerance: Some(TOLERANCE.max(scenario.tolerance)),
+        route: if windy {
+            Route::Release
+        } else {
+            Route::default()
+        },
+        modes,
+        mode_shapes: modes > 0,
+        ..Options::default()
+    }
+}
+
+fn keyed(values: Values) -> Result<Vec<(Keys, f64)>, Refusal> {
+    let each = values.into_iter();
+    each.map(|(key, value)| Ok((key.parse()?, value))).collect()
+}
+
+impl Open {
+    fn new(base: Base, values: Values) -> Result<Self, Refusal> {
+        let values = keyed(values)?;
+        let scenario = scenario_of(&base, &values)?;
+        let (leaf, follower) = Follower::begin(&scenario, &options(&scenario, 0))?;
+        Ok(Open {
+            base,
+            values,
+            scenario,
+            leaf,
+            follower,
+        })
+    }
+
+    fn known(&self) -> Known {
+        Known::new(&self.leaf, &self.scenario)
+    }
+
+    fn sliders(&self) -> Vec<Slider> {
+        self.base.numbers().into_iter().map(Slider::new).collect()
+    }
+
+    /// The leaf with other values: followed there if it can, or found anew.
+    fn set(&mut self, values: Values, modes: usize, pull: Option<Pull>) -> Result<Answer, Refusal> {
+        let values = keyed(values)?;
+        let bare = scenario_of(&self.base, &values)?;
+        let pulled = |scenario| match pull {
+            Some(pull) => pull.on(scenario),
+            None => scenario,
+        };
+        let scenario = pulled(bare.clone());
+        let alike = scenario.rods.len() == self.scenario.rods.len()
+            && scenario.joined == self.scenario.joined;
+        let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
+            let (leaf, follower) = Follower::begin(&scenario, &options(&scenario, modes))?;
+            (self.leaf, self.follower) = (leaf, follower);
+            (self.values, self.scenario) = (values, bare);
+            return Ok(Answer::Found(self.known()));
+        };
+        follower.options(&options(&scenario, modes));
+        let (base, before) = (&self.base, &self.values);
+        let along = |part: f64| match part == 1.0 {
+            true => Ok(scenario.clone()),
+            false => scenario_of(base, &between(base, before, &values, part)).map(pulled),
+        };
+        let followed = follower.follow::<Refusal>(&along)?;
+        let answer = match followed {
+            Followed::There(leaf) => {
+                self.leaf = *leaf;
+                Answer::Followed(Known::new(&self.leaf, &scenario))
+            }
+            Followed::Left { part } => Answer::Left {
+                values: told(&between(base, before, &values, part)),
+            },
+        };
+        (self.values, self.scenario) = (values, bare);
+        Ok(answer)
+    }
+
+    /// The leaf at rest from where it is, or from where a motion has brought it.
+    fn settle(&mut self, motion: Option<Motion>) -> Result<Answer, Refusal> {
+        let scenario = &self.scenario;
+        match (&mut self.follower, motion) {
+            (Some(follower), Some(mut motion)) => {
+                self.leaf = motion.land(follower, scenario)?;
+            }
+            (Some(follower), None) => self.leaf = follower.settle(scenario)?,
+            (None, _) => {
+                let (leaf, follower) = Follower::begin(scenario, &options(scenario, 0))?;
+                (self.leaf, self.follower) = (leaf, follower);
+            }
+        }
+        Ok(Answer::Found(self.known()))
+    }
+
+    /// The equilibria between two values of a number.
+    fn trace(&self, key: &str, [from, to]: [f64; 2], log: bool) -> Result<Answer, Refusal> {
+        let mark = if log { "log" } else { "" };
+        let vary: Vary = format!("{key}={from:?}..{to:?}{mark}").parse()?;
+        let request = TraceRequest {
+            base: self.fixed(Some(&vary.keys))?,
+            vary,
+            switch: false,
+            keep_unstable: false,
+            segments: None,
+            tolerance: Some(TOLERANCE),
+            most_points: MOST_POINTS,
+        };
+        match trace(&request, &mut |_, _, _| {}) {
+            Ok(trace) => Ok(Answer::Branch(branch(&trace))),
+            Err(why) => refuse(why),
+        }
+    }
+
+    /// The base with all present values but those of these keys.
+    fn fixed(&self, but: Option<&Keys>) -> Result<Base, Refusal> {
+        let others = self.values.iter().filter(|(keys, _)| Some(keys) != but);
+        let mut base = self.base.clone();
+        for (keys, value) in others {
+            base = base.with(keys, *value)?;
+        }
+        Ok(base)
+    }
+
+    fn equilibria(&self) -> Result<Answer, Refusal> {
+        let how = SemiImplicit::default();
+        let limit = Limit::at(leafdyn::clock::Instant::now() + Duration::from_secs(SECONDS));
+        let found = equilibria(&self.scenario, how, Some(TOLERANCE), &limit, &mut |_, _| {})?;
+        let all = found.found.iter();
+        let known = all.map(|it| Known::new(&it.equilibrium, &self.scenario));
+        Ok(Answer::Equilibria(known.collect()))
+    }
+
+    fn sensitivity(&self, keys: &[String]) -> Result<Answer, Refusal> {
+        let Some(follower) = &self.follower else {
+            return refuse("the leaf is not at rest");
+        };
+        let keys = keys.iter().map(|key| key.parse());
+        let keys = keys.collect::<Result<Vec<Keys>, VaryError>>()?;
+        let base = self.fixed(None)?;
+        let found = sensitivities_of(follower, &base, &keys)?;
+        let told = found.into_iter();
+        let told = told.map(|it| Told {
+            key: it.key,
+            tips: it.tips.iter().map(|tip| tip.to_array()).collect(),
+            energy: it.energy,
+        });
+        Ok(Answer::Sensitivity(told.collect()))
+    }
+
+    fn unloaded(&self) -> Result<Answer, Refusal> {
+        let scenario = self.scenario.unloaded();
+        let leaf = relax(&scenario, &options(&scenario, 0), &mut |_| {})?;
+        Ok(Answer::Unloaded(Known::new(&leaf, &scenario)))
+    }
+
+    fn write(&self, file: &str) -> Result<Answer, Refusal> {
+        let values: Vec<(&Keys, f64)> = self.values.iter().map(|(k, v)| (k, *v)).collect();
+        let content = match file {
+            "scenario.toml" => match values.is_empty() {
+                true => Some(self.base.text().to_owned().into_bytes()),
+                false => self.base.toml(&values).map(String::into_bytes),
+            },
+            _ => {
+                let document = Document::new(&self.leaf, &self.scenario, None);
+                files::contents(&document, file)
+            }
+        };
+        match content {
+            Some(content) => Ok(Answer::file(file, &content)),
+            None => refuse(format!("there is no file {file} of a leaf at rest")),
+        }
+    }
+}
+
+fn scenario_of(base: &Base, values: &[(Keys, f64)]) -> Result<Scenario, Refusal> {
+    let values: Vec<(&Keys, f64)> = values.iter().map(|(k, v)| (k, *v)).collect();
+    Ok(base.at(&values)?.scenario)
+}
+
+fn told(values: &[(Keys, f64)]) -> Values {
+    let each = values.iter();
+    each.map(|(keys, value)| (keys.to_string(), *value))
+        .collect()
+}
+
+/// Values on the way from some to others: one that is in neither is that of the scenario.
+fn between(base: &Base, from: &[(Keys, f64)], to: &[(Keys, f64)], part: f64) -> Vec<(Keys, f64)> {
+    let of = |values: &[(Keys, f64)], keys: &Keys| {
+        let given = values.iter().find(|(known, _)| known == keys);
+        given.map(|(_, value)| *value).or_else(|| base.number(keys))
+    };
+    let gone = from
+        .iter()
+        .filter(|(keys, _)| !to.iter().any(|(known, _)| known == keys));
+    let all = to.iter().chain(gone).map(|(keys, _)| keys);
+    let way = all.filter_map(|keys| {
+        let (a, b) = (of(from, keys)?, of(to, keys)?);
+        Some((keys.clone(), a + part * (b - a)))
+    });
+    way.collect()
+}

@@ -1,0 +1,145 @@
+//! What a page does with a leaf, without a page.
+
+use leafdyn_web::session::Session;
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn ask(session: &mut Session, question: Value) -> Value {
+    let answer = session.answer(question.to_string().as_bytes());
+    serde_json::from_slice(&answer).unwrap()
+}
+
+fn text(name: &str) -> String {
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios");
+    std::fs::read_to_string(scenarios.join(name)).unwrap()
+}
+
+fn open(session: &mut Session, name: &str) -> Value {
+    let opened = ask(
+        session,
+        json!({ "ask": "open", "text": text(name), "name": name }),
+    );
+    assert_eq!(opened["answer"], "opened", "{}", opened["error"]);
+    opened
+}
+
+const COLUMN: &str = r#"
+    name = "column"
+    leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 10.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+    load = { tip_force = [-2.8, 0.0, 0.5] }
+"#;
+
+/// Held up by a force across, which is reversed: it goes along, is left at its fold, swings over, and
+/// rests on the other side, where it stays when the force comes back.
+#[test]
+fn a_column_goes_along_snaps_and_comes_back_late() {
+    let mut session = Session::default();
+    let key = "load.tip_force[2]";
+    ask(
+        &mut session,
+        json!({ "ask": "open", "text": COLUMN, "name": "column.toml" }),
+    );
+    let set = |session: &mut Session, value: f64| {
+        ask(
+            session,
+            json!({ "ask": "set", "values": [[key, value]], "modes": 1 }),
+        )
+    };
+    let held = set(&mut session, -0.05);
+    assert_eq!(held["answer"], "followed");
+    assert!(held["tips"][0][2].as_f64().unwrap() > 0.3);
+    assert_eq!(held["eigenvalues"].as_array().unwrap().len(), 1);
+    let left = set(&mut session, -0.3);
+    assert_eq!(left["answer"], "left");
+    let fold = left["values"][0][1].as_f64().unwrap();
+    assert!((fold + 0.1113).abs() < 2e-3, "{fold}");
+    let first = ask(&mut session, json!({ "ask": "go", "damped": true }));
+    assert!(first["tip"][2].as_f64().unwrap() > 0.3);
+    let mut last = first;
+    let mut count = 0;
+    while last["ended"] != true {
+        last = ask(&mut session, json!({ "ask": "frame" }));
+        assert_eq!(last["answer"], "moving", "{}", last["error"]);
+        count += 1;
+    }
+    assert!((20..2000).contains(&count), "{count}");
+    let landed = ask(&mut session, json!({ "ask": "land" }));
+    assert_eq!(
+        (&landed["answer"], &landed["stable"]),
+        (&json!("found"), &json!(true))
+    );
+    let gap = landed["tips"][0][2].as_f64().unwrap() - last["tip"][2].as_f64().unwrap();
+    assert!(gap.abs() < 0.02, "{gap}");
+    let back = set(&mut session, 0.05);
+    assert_eq!(back["answer"], "followed");
+    assert!(back["tips"][0][2].as_f64().unwrap() < -0.3);
+}
+
+/// Whatever is asked in whatever order, there is an answer, and the leaf goes on.
+#[test]
+fn a_refused_question_leaves_the_leaf_as_it_is() {
+    let mut session = Session::default();
+    assert_eq!(
+        ask(&mut session, json!({ "ask": "land" }))["answer"],
+        "refused"
+    );
+    assert_eq!(session.answer(b"nonsense").first(), Some(&b'{'));
+    open(&mut session, "paper/fig04.toml");
+    for question in [
+        json!({ "ask": "open", "text": "name = <b>", "name": "x" }),
+        json!({ "ask": "set", "values": [["leaf.length", -1.0]] }),
+        json!({ "ask": "set", "values": [["nothing", 1.0]] }),
+        json!({ "ask": "frame" }),
+        json!({ "ask": "trace", "key": "leaf.rods", "from": 1.0, "to": 5.0 }),
+        json!({ "ask": "write", "file": "passwd" }),
+        json!({ "ask": "sensitivity", "keys": ["leaf.rods"] }),
+    ] {
+        let answer = ask(&mut session, question.clone());
+        assert_eq!(answer["answer"], "refused", "{question}");
+        assert!(!answer["error"].as_str().unwrap().is_empty());
+    }
+    let set = ask(
+        &mut session,
+        json!({ "ask": "set", "values": [["load.gravity[2]", -0.5]] }),
+    );
+    assert_eq!(set["answer"], "followed");
+    let scenario = ask(
+        &mut session,
+        json!({ "ask": "write", "file": "scenario.toml" }),
+    );
+    assert_eq!(scenario["answer"], "file");
+}
+
+/// Every scenario of the repository opens; what can rest rests; each of its numbers has a range with
+/// its value in it.
+#[test]
+fn all_scenarios_open_with_their_sliders() {
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios");
+    let mut count = 0;
+    for folder in ["paper", "classic", "measured", "motion", "study"] {
+        for file in std::fs::read_dir(scenarios.join(folder)).unwrap() {
+            let file = file.unwrap().file_name().into_string().unwrap();
+            if !file.ends_with(".toml") {
+                continue;
+            }
+            let mut session = Session::default();
+            let opened = open(&mut session, &format!("{folder}/{file}"));
+            let sliders = opened["sliders"].as_array().unwrap();
+            assert!(sliders.len() > 5, "{file}");
+            for slider in sliders {
+                let [value, low, high] = ["value", "low", "high"].map(|key| slider[key].as_f64());
+                let Some(value) = value else { continue };
+                assert!(low.unwrap() <= value && value <= high.unwrap(), "{slider}");
+            }
+            let unloaded = ask(&mut session, json!({ "ask": "unloaded" }));
+            assert_eq!(
+                unloaded["answer"], "unloaded",
+                "{file}: {}",
+                unloaded["error"]
+            );
+            count += 1;
+        }
+    }
+    assert!(count > 30);
+}
