@@ -19,7 +19,7 @@ use crate::scenario::Scenario;
 use std::sync::Arc;
 
 /// The shortest step of the way, as a part of it.
-const SHORTEST: f64 = 1.0 / 256.0;
+const SHORTEST: f64 = 1.0 / 4096.0;
 
 /// How much shorter a step is made that fails.
 const SHORTENED: f64 = 0.25;
@@ -31,8 +31,9 @@ const PREDICTING: usize = 2;
 /// elsewhere on each of them.
 const FINEST: usize = 128;
 
-/// Equilibria on two grids that are no farther apart, in lengths, are one.
-const SAME: f64 = 0.02;
+/// Equilibria on two grids that are no farther apart, in lengths, are one: beside a fold, which lies
+/// elsewhere on each, that is far.
+const SAME: f64 = 0.1;
 
 /// A leaf at rest, which can follow.
 ///
@@ -141,43 +142,41 @@ impl Follower {
         }
     }
 
-    /// Goes on without the coarsest grid, and with a finer one if that is the last; false if it is
-    /// fine enough.
+    /// Goes on without the coarsest grid, and on a finer one if that is the last; false if it is fine
+    /// enough.
     fn refine(&mut self) -> bool {
-        let mut at = self.at.grids();
-        if let [only] = &at.levels[..] {
-            let finer = only.leaf.segments() < FINEST;
-            let tolerance = self.tolerance(&self.scenario);
-            let next = finer.then(|| grids::on_next_grid(None, only, tolerance));
-            let Some(next) = next.flatten() else {
-                return false;
-            };
-            at = at.with(next);
+        if let [_, finer, ..] = &self.at.levels[..] {
+            let fine = finer.leaf.segments() <= FINEST;
+            if fine {
+                let levels = self.at.levels[1..].to_vec();
+                self.at = self.at.grids().on(levels);
+            }
+            return fine;
         }
-        if at.levels[1].leaf.segments() > FINEST {
+        let only = &self.at.levels[0].leaf;
+        only.segments() < FINEST && self.goes_on(only.leaf.clone(), only.grid.refined())
+    }
+
+    /// Whether it is in the same equilibrium on another grid, on which it then goes on.
+    fn goes_on(&mut self, leaf: Leaf, grid: Grid) -> bool {
+        let Ok(found) = self.near(&leaf, grid) else {
             return false;
+        };
+        let finest = |at: &NestedEquilibrium| at.levels.last().map(|level| level.state.clone());
+        let apart = finest(&self.at).zip(finest(&found));
+        let same = apart.is_some_and(|(a, b)| a.shift_to(&b) < SAME) && found.is_stable();
+        if same {
+            self.at = found;
         }
-        let levels = at.levels[1..].to_vec();
-        self.at = at.on(levels);
-        true
+        same
     }
 
     /// Goes back to the usual grids, if the equilibrium exists on these.
     fn coarsen(&mut self) {
-        let finest = &self.at.levels[0].leaf;
-        if finest.segments() <= self.usual {
-            return;
-        }
-        let leaf = finest.leaf.clone();
-        let grid = Grid::new(self.usual, leaf.kinks());
-        let Ok(found) = self.near(&leaf, grid) else {
-            return;
-        };
-        let finest = |at: &NestedEquilibrium| at.levels.last().map(|level| level.state.clone());
-        let apart = finest(&self.at).zip(finest(&found));
-        let same = apart.is_some_and(|(a, b)| a.shift_to(&b) < SAME);
-        if same && found.is_stable() {
-            self.at = found;
+        let coarsest = &self.at.levels[0].leaf;
+        if coarsest.segments() > self.usual {
+            let grid = Grid::new(self.usual, coarsest.leaf.kinks());
+            self.goes_on(coarsest.leaf.clone(), grid);
         }
     }
 

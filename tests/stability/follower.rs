@@ -62,8 +62,8 @@ fn a_column_snaps_at_its_fold_and_comes_back_at_another() {
         panic!("it stays up beyond the fold")
     };
     let left = 0.5 * fold.value + part * (-0.5 - 0.5 * fold.value);
-    let step = (0.5 + fold.value).abs().max(0.1) / 128.0;
-    assert!((left - fold.value).abs() < step, "{left}, {}", fold.value);
+    // On the finest of the grids that are tried, 128 segments.
+    assert!((left - fold.value).abs() < 2e-4, "{left}, {}", fold.value);
 
     let below = column(-0.5);
     let mut motion =

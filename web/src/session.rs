@@ -3,7 +3,7 @@
 use crate::answer::{Answer, Known, Slider, Told, branch};
 use crate::motion::Motion;
 use leafdyn::relax::{
-    Equilibrium, Followed, Follower, Limit, Options, RelaxError, Route, SemiImplicit, relax,
+    Equilibrium, Followed, Follower, Limit, Options, RelaxError, SemiImplicit, relax,
 };
 use leafdyn::scenario::{PointLoad, Scenario};
 use leafdyn::study::{
@@ -149,7 +149,7 @@ fn refuse<T>(why: impl ToString) -> Result<T, Refusal> {
 struct Open {
     base: Base,
     values: Vec<(Keys, f64)>,
-    /// With these values, but without what pulls it.
+    /// With these values, but without what pulls it, and with its wind.
     scenario: Scenario,
     leaf: Equilibrium,
     /// None where the leaf is not at rest, or has no energy.
@@ -242,17 +242,18 @@ impl Session {
     }
 }
 
-/// How leaves are relaxed: those in a wind by motion.
+/// The scenario in which a leaf rests: without wind, in which it moves when it is let go.
+fn calm(scenario: Scenario) -> Scenario {
+    Scenario {
+        wind: None,
+        ..scenario
+    }
+}
+
+/// How leaves are relaxed.
 fn options(scenario: &Scenario, modes: usize) -> Options {
-    let windy = scenario.wind.is_some();
-    let modes = if windy { 0 } else { modes };
     Options {
         tolerance: Some(TOLERANCE.max(scenario.tolerance)),
-        route: if windy {
-            Route::Release
-        } else {
-            Route::default()
-        },
         modes,
         mode_shapes: modes > 0,
         ..Options::default()
@@ -268,7 +269,7 @@ impl Open {
     fn new(base: Base, values: Values) -> Result<Self, Refusal> {
         let values = keyed(values)?;
         let scenario = scenario_of(&base, &values)?;
-        let (leaf, follower) = Follower::begin(&scenario, &options(&scenario, 0))?;
+        let (leaf, follower) = Follower::begin(&calm(scenario.clone()), &options(&scenario, 0))?;
         Ok(Open {
             base,
             values,
@@ -291,8 +292,8 @@ impl Open {
         let values = keyed(values)?;
         let bare = scenario_of(&self.base, &values)?;
         let pulled = |scenario| match pull {
-            Some(pull) => pull.on(scenario),
-            None => scenario,
+            Some(pull) => pull.on(calm(scenario)),
+            None => calm(scenario),
         };
         let scenario = pulled(bare.clone());
         let alike = scenario.rods.len() == self.scenario.rods.len()
@@ -325,7 +326,7 @@ impl Open {
 
     /// The leaf at rest from where it is, or from where a motion has brought it.
     fn settle(&mut self, motion: Option<Motion>) -> Result<Answer, Refusal> {
-        let scenario = &self.scenario;
+        let scenario = &calm(self.scenario.clone());
         match (&mut self.follower, motion) {
             (Some(follower), Some(mut motion)) => {
                 self.leaf = motion.land(follower, scenario)?;
@@ -371,7 +372,13 @@ impl Open {
     fn equilibria(&self) -> Result<Answer, Refusal> {
         let how = SemiImplicit::default();
         let limit = Limit::at(leafdyn::clock::Instant::now() + Duration::from_secs(SECONDS));
-        let found = equilibria(&self.scenario, how, Some(TOLERANCE), &limit, &mut |_, _| {})?;
+        let found = equilibria(
+            &calm(self.scenario.clone()),
+            how,
+            Some(TOLERANCE),
+            &limit,
+            &mut |_, _| {},
+        )?;
         let all = found.found.iter();
         let known = all.map(|it| Known::new(&it.equilibrium, &self.scenario));
         Ok(Answer::Equilibria(known.collect()))
