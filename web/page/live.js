@@ -14,6 +14,8 @@ const past = [];
 
 /// Milliseconds without a change after which it is asked what comes.
 const IDLE = 250;
+/// Milliseconds between numbers that are told.
+const TOLD = 120;
 /// Milliseconds that a frame may take with a mode.
 const FRAME = 24;
 
@@ -68,17 +70,26 @@ const press = (id, on) => find(id).setAttribute("aria-pressed", on);
 const pressed = (id) => find(id).getAttribute("aria-pressed") === "true";
 
 /// Shows a leaf at rest, in space and in numbers.
-function show(known) {
+function show(known, at = sliders.value(trail.key)) {
   if (known.view.rods !== stage.view.rods || known.view.joined !== stage.view.joined) restage(known.view);
   now.known = known;
   now.count += 1;
   stage.show(known);
-  tellLeaf(known);
-  if (trail.key) trail.add(sliders.value(trail.key), known);
+  tellSoon();
+  if (trail.key) trail.add(at, known);
   if (!stage.inSpace()) still();
 }
 
+/// Numbers that change faster than one reads are told now and then.
+function tellSoon() {
+  const wait = (now.toldAt || 0) + TOLD - performance.now();
+  clearTimeout(now.telling);
+  if (wait <= 0) tellLeaf(now.known);
+  else now.telling = setTimeout(() => tellLeaf(now.known), wait);
+}
+
 function tellLeaf(known) {
+  now.toldAt = performance.now();
   const { view } = known;
   find("title").textContent = document.title = view.title;
   find("found").textContent = view.verdict;
@@ -144,12 +155,13 @@ async function pump() {
 }
 
 async function follow(modes) {
+  const asked = sliders.value(trail.key);
   const answer = await front.ask({ ask: "set", values: [...sliders.values], modes, pull: now.pull });
   if (answer.answer === "lost") return reopen(answer.error);
   if (answer.answer === "refused") return tell(answer.error);
   tell(null);
-  if (answer.answer !== "left") return show(answer);
-  trail.gap(sliders.value(trail.key));
+  if (answer.answer !== "left") return show(answer, asked);
+  trail.gap(asked);
   find("found").textContent = "its stable equilibria end here: it moves on";
   find("lamp").className = "bad";
   await travel(true, false);

@@ -177,6 +177,6 @@ class Sliders {
 /// Numbers that one wants to move first.
 function first(all) {
   const wanted = ["load.g[2]", "load.gravity[2]", "load.tip_force[2]", "load.tip_force[0]", "rest.bend_2", "scale:rest.bend_2", "scale:rest.bend_3", "stiffness.torsion", "scale:stiffness.torsion", "stiffness.bending_2", "section.young", "blade.thickness", "blade.young", "tip.position[0]", "grip[1].move[1]", "coupling.z", "leaf.length", "blade.length"];
-  const found = wanted.map((key) => all.find((one) => one.key === key)).filter((one) => one && Number.isFinite(one.value));
-  return (found.length ? found : all).slice(0, 4);
+  const found = wanted.map((key) => all.find((one) => one.key === key)).filter((one) => one && Number.isFinite(one.value) && one.value !== 0);
+  return (found.length ? found : all.filter(({ value }) => Number.isFinite(value))).slice(0, 4);
 }

@@ -1,5 +1,5 @@
-// Builds dist/live.html: the page with the solver, scripts and scenarios inside.
-//   node web/build.mjs SOLVER.wasm
+// Makes dist/live.html: the page with the solver, scripts and scenarios inside.
+//   node web/page.mjs SOLVER.wasm
 // `web/build.sh` compiles the solver and calls this.
 import { mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
