@@ -23,6 +23,7 @@ mod measured_leaves;
 mod objectivity;
 mod order;
 mod path;
+mod point_moments;
 mod published;
 mod real_leaves;
 mod reductions;

@@ -24,7 +24,8 @@ pub struct LeafRate<'s> {
     coupling: Vec<DVec3>,
     gravity: DVec3,
     tip_force: DVec3,
-    tip_moment: DVec3,
+    /// Sigma and change of dead moments on a single rod.
+    moments: Vec<(f64, DVec3)>,
     held: Option<HeldRate>,
     /// The leaves that differ in the number, with their weights, if they have tissue, loads of
     /// single veins, or grips.
@@ -112,7 +113,7 @@ impl<'s> LeafRate<'s> {
             coupling: (0..rods - 1).map(coupling).collect(),
             gravity: vector(|s| s.gravity, scale.force() / scale.length),
             tip_force: vector(|s| s.tip_force, scale.force()),
-            tip_moment: vector(|s| s.tip_moment, scale.moment()),
+            moments: moment_rates(terms, scale.moment()),
             held: HeldRate::new(leaf, terms),
             leaves: match leaf.has_tissue()
                 || terms
@@ -132,9 +133,9 @@ impl LeafRate<'_> {
         self.rods[j].base
     }
 
-    /// Whether a dead moment on the tip changes.
-    pub fn changes_moment(&self) -> bool {
-        self.rods.len() == 1 && self.tip_moment != DVec3::ZERO
+    /// Whether dead moments change.
+    pub fn changes_moments(&self) -> bool {
+        !self.moments.is_empty()
     }
 }
 
@@ -179,7 +180,6 @@ impl DiscreteLeaf {
         let mut forces = Forces::zeros(self.rods());
         let neighbours = self.each_of(rate);
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
-        let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.sections_unchanged() {
                 self.add_section_changes(segments, j, rod, &neighbours, &mut forces);
@@ -191,6 +191,15 @@ impl DiscreteLeaf {
             if rod.base != [DVec3::ZERO; 2] {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
+        }
+        for (sigma, moment) in &rate.moments {
+            let node = self.grid.nearest(*sigma);
+            let moment = self.load_factor * *moment;
+            add(
+                &mut forces.on_nodes(0, self.segments())[node - 1],
+                moment,
+                DVec3::ZERO,
+            );
         }
         self.add_tissue_changes(state, &neighbours, &mut forces);
         let motion = self.held_motion(rate, &neighbours);
@@ -260,10 +269,6 @@ impl DiscreteLeaf {
                 add(&mut forces.nodes[j + 1][i - 1], DVec3::ZERO, -pull);
             }
             add(&mut forces.nodes[j][i - 1], DVec3::ZERO, force);
-        }
-        if self.rods() == 1 {
-            let moment = self.load_factor * rate.tip_moment;
-            add(&mut forces.nodes[j][n - 1], moment, DVec3::ZERO);
         }
     }
 
@@ -377,6 +382,17 @@ fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
         rate[1] += *weight * rotation::log(q * turned.conjugate());
     }
     rate
+}
+
+/// Sigma and derivative of every dead moment that changes, over a unit.
+fn moment_rates(terms: &[(f64, Scenario)], unit: f64) -> Vec<(f64, DVec3)> {
+    let rate = |moment: &dyn Fn(&Scenario) -> [f64; 3]| {
+        DVec3::from_array([0, 1, 2].map(|axis| change(terms, &|s| moment(s)[axis]))) / unit
+    };
+    let points = terms[0].1.points.iter().enumerate();
+    let on_points = points.map(|(k, point)| (point.at, rate(&|s| s.points[k].moment)));
+    let all = std::iter::once((1.0, rate(&|s| s.tip_moment))).chain(on_points);
+    all.filter(|(_, moment)| *moment != DVec3::ZERO).collect()
 }
 
 /// The derivative of a number of the scenario: relative to the first, so that without changes it

@@ -73,6 +73,10 @@ pub struct Explicit {
     block: Block,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
     applied: Option<Applied>,
+    /// The dead moments of a step: nodes and sizes; and rotations and angular momenta of these nodes
+    /// before it.
+    moments: Vec<(usize, DVec3)>,
+    turning: Vec<(DQuat, DVec3)>,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
@@ -122,6 +126,8 @@ impl Explicit {
             positions,
             layout,
             applied: Applied::new(&leaf, &physics, layout),
+            moments: Vec::new(),
+            turning: Vec::new(),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_weight: (0..count).map(tip_weight).sum(),
@@ -247,7 +253,8 @@ impl Explicit {
         let before_kick = self.power(&loads);
         let mut work = 0.0;
         let last = self.leaf.segments();
-        let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
+        let before = self.moving(0, last).0;
+        self.note_moments(&loads);
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
             let ahead = if last > 0.0 {
@@ -275,8 +282,8 @@ impl Explicit {
             if let Some(applied) = &self.applied {
                 force += applied.on_tips(self.layout);
             }
-            let after = keep * before.0 + force * (kick / mass);
-            energy += mass * (0.5 * (before.0 + after)).length_squared();
+            let after = keep * before + force * (kick / mass);
+            energy += mass * (0.5 * (before + after)).length_squared();
             let tip = vector(&self.next, self.layout.at(0, last)) + drift * after;
             for (p, pack) in self.packs.iter_mut().enumerate() {
                 for (k, j) in self.layout.rods_of(p).enumerate() {
@@ -292,11 +299,7 @@ impl Explicit {
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
         }
-        if loads.tip_moment != DVec3::ZERO {
-            let momentum = 0.5 * (before.1 + self.moving(0, last).1);
-            let spin = self.packs[0].spin(self.layout.place(0, last).1, rotation, momentum);
-            work += length * loads.tip_moment.dot(spin);
-        }
+        work += length * self.power_of_moments();
         if self.physics.rest_changes() {
             work += self.work.of_rest(rest, bent, length, self.widths[0]);
         }
@@ -305,6 +308,30 @@ impl Explicit {
             work,
         };
         (exchange, energy)
+    }
+
+    /// Keeps the dead moments of a step, and how their nodes turn before it.
+    fn note_moments(&mut self, loads: &Loads) {
+        self.moments.clear();
+        self.moments.extend(self.leaf.moments_of(*loads));
+        self.turning.clear();
+        for (node, _) in &self.moments {
+            let (p, at) = self.layout.place(0, *node);
+            let pack = &self.packs[p];
+            self.turning.push((pack.rotation(at), pack.moving(at).1));
+        }
+    }
+
+    /// Power of the dead moments at the mean of the angular momenta before the last kick and of
+    /// these.
+    fn power_of_moments(&self) -> f64 {
+        let power = |((node, moment), (rotation, before)): (&(usize, DVec3), &(DQuat, DVec3))| {
+            let momentum = 0.5 * (*before + self.moving(0, *node).1);
+            let (p, at) = self.layout.place(0, *node);
+            moment.dot(self.packs[p].spin(at, *rotation, momentum))
+        };
+        let nodes = self.moments.iter().zip(&self.turning);
+        nodes.map(power).sum()
     }
 
     fn law(&self, rest: f64, remember: bool) -> Law {
@@ -328,7 +355,7 @@ impl Explicit {
             loads.tip_force = DVec3::ZERO;
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (positions, leaf) = (&self.positions, &self.leaf);
+        let (positions, leaf, moments) = (&self.positions, &self.leaf, &self.moments[..]);
         let applied = self.applied.as_ref().map(Applied::loads);
         let coupled = leaf.coupled();
         let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
@@ -348,6 +375,7 @@ impl Explicit {
                 past: &mut pack.past,
                 law,
                 loads,
+                moments,
                 keep,
                 kick,
                 drift,

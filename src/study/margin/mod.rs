@@ -41,7 +41,7 @@ pub enum MarginError {
     #[error("a margin is that of a relaxed leaf: use the method semi-implicit")]
     Method,
     /// Without energy there is neither an index nor a barrier.
-    #[error("a dead moment on the tip has no potential, hence no barrier; use loads that have")]
+    #[error("a dead moment has no potential, hence no barrier; use loads that have")]
     Moment,
 }
 
@@ -85,7 +85,7 @@ pub fn relax_with_margin(
     if options.method.is_shooting() {
         return Err(MarginError::Method);
     }
-    if scenario.tip_moment != [0.0; 3] {
+    if scenario.has_moments() {
         return Err(MarginError::Moment);
     }
     without_grips(scenario, "the margin")?;
