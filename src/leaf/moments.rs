@@ -91,12 +91,18 @@ impl DiscreteLeaf {
 
     /// The sum of the dead moments on node `i` of the rod.
     pub(super) fn moment_on(&self, i: usize) -> DVec3 {
+        if !self.loads.has_moments() {
+            return DVec3::ZERO;
+        }
         let here = self.moments().filter(|(node, _)| *node == i);
         here.map(|(_, moment)| moment).sum()
     }
 
     /// The sum of the dead moments at `sigma`, by which the moment of the rod jumps there.
     pub fn moment_at(&self, sigma: f64) -> DVec3 {
+        if !self.loads.has_moments() {
+            return DVec3::ZERO;
+        }
         let here = |node: usize| (self.grid.sigma()[node] - sigma).abs() < SAME_NODE;
         let moments = self.moments().filter(|(node, _)| here(*node));
         moments.map(|(_, moment)| moment).sum()
