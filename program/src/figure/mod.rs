@@ -61,7 +61,7 @@ mod tests {
     use crate::report::sample;
     use glam::DVec3;
     use leafdyn::relax::Mode;
-    use leafdyn::scenario::Scenario;
+    use leafdyn::scenario::{Grip, Hold, Scenario, Schedule, Wind};
     use leafdyn::simulate::{Record, Stopped};
 
     fn scenario() -> Scenario {
@@ -161,6 +161,65 @@ mod tests {
         assert_eq!(count(&pulled), [4, 1]);
         without.own_gravity = vec![[0.0, 0.0, -1.0]; 5];
         assert_eq!(count(&without), [4, 1]);
+    }
+
+    #[test]
+    fn wind_is_drawn_as_it_blows() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let count = |at: &[f64], velocity: &[[f64; 3]]| {
+            let mut windy = scenario();
+            windy.wind = Some(Wind {
+                velocity: Schedule {
+                    at: at.to_vec(),
+                    value: velocity.to_vec(),
+                },
+                density: 1.2,
+                drag: 2.0,
+                width: Vec::new(),
+            });
+            [leaf(&fan, &windy), filmstrip(&record, &windy)]
+                .map(|drawing| svg::text(&drawing).matches(">wind<").count())
+        };
+        assert_eq!(count(&[0.0], &[[1.0, 0.0, 0.0]]), [4, 1]);
+        // One that changes in every picture, as soon as it blows.
+        let until = record.moments[record.stills[2].moment].time;
+        let rising = [[0.0; 3], [0.0; 3], [1.0, 0.0, 0.0]];
+        let pictures = record.stills.len();
+        assert_eq!(
+            count(&[0.0, until, until + 1e-9], &rising),
+            [0, pictures - 3]
+        );
+    }
+
+    #[test]
+    fn grips_are_drawn_where_they_hold() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let mut held = scenario();
+        let grip = |vein: usize, at: [f64; 2], held: Hold| Grip {
+            vein,
+            at,
+            held,
+            displacement: [0.0; 3],
+        };
+        let drawn = |scenario: &Scenario| {
+            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|it| svg::text(&it))
+        };
+        let free = drawn(&held);
+        held.grips = vec![
+            grip(0, [0.25, 0.5], Hold::Clamped),
+            grip(3, [0.6; 2], Hold::Pinned),
+        ];
+        for (svg, free) in drawn(&held).iter().zip(&free) {
+            for note in ["triangles: pinned", "squares: clamped"] {
+                assert!(svg.contains(note) && !free.contains(note));
+            }
+        }
+        // A stretch and both of its ends, and a point.
+        let panels = [4, record.stills.len()];
+        for (k, panels) in panels.into_iter().enumerate() {
+            let paths = |svg: &str| svg.matches("<path").count();
+            assert_eq!(paths(&drawn(&held)[k]) - paths(&free[k]), 4 * panels);
+        }
     }
 
     #[test]

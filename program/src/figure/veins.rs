@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use super::drawing::{Color, Path, Step, color_of_vein};
 use super::setting::Setting;
 use leafdyn::relax::{Equilibrium, RodShape};
+use leafdyn::scenario::{Hold, Scenario};
 use leafdyn::simulate::{Record, Still};
 
 /// Of a wider leaf only some veins are drawn: more could not be distinguished.
@@ -39,11 +40,18 @@ impl Vein {
     }
 }
 
+/// A stretch of a vein, or a point, that a grip holds.
+pub struct Gripped {
+    pub points: Vec<DVec3>,
+    pub held: Hold,
+}
+
 pub struct Veins {
     pub veins: Vec<Vein>,
     pub count: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
+    pub grips: Vec<Gripped>,
     /// Corners of the bounding box.
     pub low: DVec3,
     pub high: DVec3,
@@ -52,9 +60,10 @@ pub struct Veins {
 }
 
 impl Veins {
-    pub fn of(equilibrium: &Equilibrium) -> Self {
+    pub fn of(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
-        Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
+        let veins = Veins::through(&shape.curves, &equilibrium.tips, shape.longest());
+        veins.gripped(scenario, &shape.curve_stations, &shape.curves)
     }
 
     /// Where the veins that are drawn begin.
@@ -64,9 +73,24 @@ impl Veins {
     }
 
     /// The veins of a moving leaf at one instant.
-    pub fn at_instant(record: &Record, still: &Still) -> Self {
+    pub fn at_instant(record: &Record, still: &Still, scenario: &Scenario) -> Self {
         let tips = tips(&still.curves, record.joined);
-        Veins::through(&still.curves, &tips, record.length)
+        let veins = Veins::through(&still.curves, &tips, record.length);
+        veins.gripped(scenario, &record.stations, &still.curves)
+    }
+
+    /// With what the grips of a scenario hold, on curves through nodes at these stations.
+    fn gripped(mut self, scenario: &Scenario, stations: &[f64], curves: &[Vec<DVec3>]) -> Self {
+        for grip in &scenario.grips {
+            let curve = curves.get(grip.vein).map_or(&[][..], Vec::as_slice);
+            let points = stretch(stations, curve, grip.at);
+            let points = points.into_iter().map(|point| point / self.unit);
+            self.grips.push(Gripped {
+                points: points.filter(|&point| is_drawable(point)).collect(),
+                held: grip.held,
+            });
+        }
+        self
     }
 
     /// Veins through these points, with the longest rod as the unit. Tips are extrapolated,
@@ -99,6 +123,7 @@ impl Veins {
             count,
             dots: Vec::new(),
             tips,
+            grips: Vec::new(),
             low,
             high,
             unit,
@@ -131,6 +156,14 @@ impl Veins {
         let every = stride(self.count);
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
+        }
+        for (held, note) in [
+            (Hold::Pinned, "triangles: pinned"),
+            (Hold::Clamped, "squares: clamped"),
+        ] {
+            if self.grips.iter().any(|grip| grip.held == held) {
+                notes.push(note.into());
+            }
         }
         notes
     }
@@ -211,6 +244,27 @@ pub fn node_stride(nodes: usize, most: usize) -> usize {
 fn drawable_part(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
     let points = curve.iter().map(|&point| point / unit);
     points.take_while(|&point| is_drawable(point)).collect()
+}
+
+/// The points of a curve through nodes at these stations from one fraction of its length to another,
+/// or at one.
+fn stretch(stations: &[f64], curve: &[DVec3], [from, to]: [f64; 2]) -> Vec<DVec3> {
+    let nodes = || stations.iter().copied().zip(curve.iter().copied());
+    let at = |sigma: f64| {
+        let before = nodes().take_while(|(at, _)| *at <= sigma).last();
+        let after = nodes().find(|(at, _)| *at >= sigma);
+        match (before, after) {
+            (Some((a, x)), Some((b, y))) if b > a => Some(x.lerp(y, (sigma - a) / (b - a))),
+            (one, other) => one.or(other).map(|(_, x)| x),
+        }
+    };
+    let inside = nodes().filter(|(at, _)| from < *at && *at < to);
+    let end = if to > from { at(to) } else { None };
+    at(from)
+        .into_iter()
+        .chain(inside.map(|(_, x)| x))
+        .chain(end)
+        .collect()
 }
 
 /// Smooth pieces through every second, fourth, ... of the points, as long as the curve
@@ -306,7 +360,7 @@ mod tests {
     fn dots_are_few_enough_to_be_distinguished() {
         for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
             let leaf = sample::fan(rods, 64);
-            let mut veins = Veins::of(&leaf);
+            let mut veins = Veins::of(&leaf, &sample::scenario("fan", leaf.shape.rods.len()));
             veins.add_dots(&leaf.shape.rods);
             assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
             assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
@@ -316,10 +370,24 @@ mod tests {
     #[test]
     fn dots_away_from_the_leaf_are_in_the_box() {
         let leaf = sample::fan(3, 8);
-        let mut veins = Veins::of(&leaf);
+        let mut veins = Veins::of(&leaf, &sample::scenario("fan", leaf.shape.rods.len()));
         let mut rods = leaf.shape.rods.clone();
         rods[1].nodes[8].position.z = 3.0;
         veins.add_dots(&rods);
         assert_eq!(veins.high.z, 3.0);
+    }
+
+    #[test]
+    fn a_stretch_ends_between_nodes() {
+        let (stations, curve) = ([0.0, 0.5, 1.0], [0.0, 1.0, 3.0].map(|x| x * DVec3::X));
+        let of = |at| -> Vec<f64> {
+            let points = stretch(&stations, &curve, at).into_iter();
+            points.map(|point| point.x).collect()
+        };
+        assert_eq!(of([0.25, 0.75]), [0.5, 1.0, 2.0]);
+        assert_eq!(of([0.5, 1.0]), [1.0, 3.0]);
+        assert_eq!(of([0.75, 0.75]), [2.0]);
+        assert_eq!(of([1.0, 1.0]), [3.0]);
+        assert!(stretch(&[], &[], [0.5, 1.0]).is_empty());
     }
 }

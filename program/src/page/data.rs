@@ -26,6 +26,9 @@ pub struct View {
     pub units: [Option<String>; 2],
     /// Gravity per length of vein.
     pub gravity: [f64; 3],
+    /// What grips hold.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub grips: Vec<Gripped>,
     pub longest: f64,
     pub joined: bool,
     /// The number of veins, and the numbers from 1, lengths and colours of those that are
@@ -39,6 +42,17 @@ pub struct View {
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
+}
+
+/// A stretch of a vein, or a point, that a grip holds.
+#[derive(Serialize)]
+pub struct Gripped {
+    /// The number of the vein from 1.
+    pub vein: usize,
+    /// Fractions of its length.
+    pub at: [f64; 2],
+    /// Whether its directions are held as well.
+    pub clamped: bool,
 }
 
 /// A shape of the leaf.
