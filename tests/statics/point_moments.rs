@@ -1,5 +1,7 @@
 //! Dead moments on points of a single rod: closed forms, and shooting.
 
+use leafdyn::relax::relax;
+use leafdyn::study::relax_with_margin;
 use leafdyn_testing::*;
 
 const ROD: &str = r#"
@@ -242,4 +244,26 @@ fn the_clamp_bears_the_sum_of_the_moments() {
     let arm = tip(&leaf).cross(DVec3::new(0.2, 0.1, -0.3));
     assert!(force.distance(DVec3::new(0.2, 0.1, -0.3)) < 1e-8);
     assert!(moment.distance(sum + arm) < 1e-8, "{moment}");
+}
+
+/// Without a potential there is no energy to descend, and no barrier; nor is a count of eigenvalues
+/// stated.
+#[test]
+fn what_needs_an_energy_is_refused() {
+    let scenario = under(&[(0.5, [0.0, 0.0, 0.3])], "");
+    let named = |message: String| assert!(message.contains("load.point.moment"), "{message}");
+    let explicit = Options {
+        method: Method::Explicit { segments: None },
+        ..Options::default()
+    };
+    named(
+        relax(&scenario, &explicit, &mut |_| {})
+            .unwrap_err()
+            .to_string(),
+    );
+    let margin = relax_with_margin(&scenario, &Options::default(), &mut |_| {});
+    named(margin.unwrap_err().to_string());
+    let leaf = settle(&scenario, 1e-6);
+    assert_eq!(leaf.stability.negative_eigenvalues, None);
+    assert!(leaf.remark.unwrap().contains("no potential"));
 }

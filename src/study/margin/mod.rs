@@ -41,7 +41,9 @@ pub enum MarginError {
     #[error("a margin is that of a relaxed leaf: use the method semi-implicit")]
     Method,
     /// Without energy there is neither an index nor a barrier.
-    #[error("a dead moment has no potential, hence no barrier; use loads that have")]
+    #[error(
+        "a dead moment (load.tip_moment, load.point.moment) has no potential, hence no barrier; use loads that have"
+    )]
     Moment,
 }
 

@@ -103,5 +103,4 @@ impl TraceRequest {
     }
 }
 
-const NO_MOMENT: &str =
-    "a dead moment has no potential: there is no index to follow; use loads that have";
+const NO_MOMENT: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";

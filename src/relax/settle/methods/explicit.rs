@@ -61,8 +61,8 @@ const BUDGET: usize = 600_000_000;
 const RIGID: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
 
-const FOLLOWS: &str = "under a dead moment, which has no potential, motion need not come to \
-     rest; use semi-implicit, or shooting";
+const FOLLOWS: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
+     need not come to rest; use semi-implicit, or shooting";
 
 /// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
 /// which may drive a motion forever.
