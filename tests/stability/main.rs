@@ -7,6 +7,7 @@ mod boundary_random;
 mod eigenvalue_bars;
 mod lateral_buckling;
 mod map_jumps;
+mod margin_of_grips;
 mod margin_random;
 mod mode_shapes;
 mod modes;

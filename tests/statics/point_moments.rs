@@ -250,7 +250,8 @@ fn the_clamp_bears_the_sum_of_the_moments() {
 /// stated.
 #[test]
 fn what_needs_an_energy_is_refused() {
-    let scenario = under(&[(0.5, [0.0, 0.0, 0.3])], "");
+    let mut scenario = under(&[(0.5, [0.0, 0.0, 0.3])], "");
+    scenario.rods[0].force_stiffness[1] = Profile::Constant(80.0);
     let named = |message: String| assert!(message.contains("load.point.moment"), "{message}");
     let explicit = Options {
         method: Method::Explicit { segments: None },

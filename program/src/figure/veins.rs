@@ -157,14 +157,6 @@ impl Veins {
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
         }
-        for (held, note) in [
-            (Hold::Pinned, "triangles: pinned"),
-            (Hold::Clamped, "squares: clamped"),
-        ] {
-            if self.grips.iter().any(|grip| grip.held == held) {
-                notes.push(note.into());
-            }
-        }
         notes
     }
 
