@@ -20,6 +20,7 @@ mod lens;
 mod linear_theory;
 mod loads;
 mod measured_leaves;
+mod moment_sensitivities;
 mod objectivity;
 mod order;
 mod path;

@@ -5,10 +5,12 @@
 mod forces;
 mod held;
 mod leaves;
+mod moments;
 
 pub use crate::leaf::derivative::forces::{Forces, Response};
 use crate::leaf::derivative::held::HeldRate;
 use crate::leaf::derivative::leaves::{leaves, rest_rates};
+use crate::leaf::derivative::moments::moment_rates;
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, State, add};
@@ -132,11 +134,6 @@ impl LeafRate<'_> {
     pub fn of_base(&self, j: usize) -> [DVec3; 2] {
         self.rods[j].base
     }
-
-    /// Whether dead moments change.
-    pub fn changes_moments(&self) -> bool {
-        !self.moments.is_empty()
-    }
 }
 
 impl RodRate<'_> {
@@ -192,15 +189,7 @@ impl DiscreteLeaf {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
-        for (sigma, moment) in &rate.moments {
-            let node = self.grid.nearest(*sigma);
-            let moment = self.load_factor * *moment;
-            add(
-                &mut forces.on_nodes(0, self.segments())[node - 1],
-                moment,
-                DVec3::ZERO,
-            );
-        }
+        self.add_moment_changes(rate, &mut forces);
         self.add_tissue_changes(state, &neighbours, &mut forces);
         let motion = self.held_motion(rate, &neighbours);
         self.add_held_motion(state, segments, motion, &mut forces);
@@ -382,17 +371,6 @@ fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
         rate[1] += *weight * rotation::log(q * turned.conjugate());
     }
     rate
-}
-
-/// Sigma and derivative of every dead moment that changes, over a unit.
-fn moment_rates(terms: &[(f64, Scenario)], unit: f64) -> Vec<(f64, DVec3)> {
-    let rate = |moment: &dyn Fn(&Scenario) -> [f64; 3]| {
-        DVec3::from_array([0, 1, 2].map(|axis| change(terms, &|s| moment(s)[axis]))) / unit
-    };
-    let points = terms[0].1.points.iter().enumerate();
-    let on_points = points.map(|(k, point)| (point.at, rate(&|s| s.points[k].moment)));
-    let all = std::iter::once((1.0, rate(&|s| s.tip_moment))).chain(on_points);
-    all.filter(|(_, moment)| *moment != DVec3::ZERO).collect()
 }
 
 /// The derivative of a number of the scenario: relative to the first, so that without changes it

@@ -21,6 +21,7 @@ mod advance;
 mod applied;
 mod fictitious;
 mod kernel;
+mod moments;
 mod packs;
 mod stable;
 #[cfg(test)]
@@ -40,6 +41,7 @@ use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
 use glam::{DQuat, DVec3};
 use kernel::{Array, Block, Law, Layout, Step};
+use moments::Moments;
 use packs::{Pack, vector};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -73,10 +75,8 @@ pub struct Explicit {
     block: Block,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
     applied: Option<Applied>,
-    /// The dead moments of a step: nodes and sizes; and rotations and angular momenta of these nodes
-    /// before it.
-    moments: Vec<(usize, DVec3)>,
-    turning: Vec<(DQuat, DVec3)>,
+    /// The dead moments of a step.
+    moments: Moments,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
@@ -126,8 +126,7 @@ impl Explicit {
             positions,
             layout,
             applied: Applied::new(&leaf, &physics, layout),
-            moments: Vec::new(),
-            turning: Vec::new(),
+            moments: Moments::default(),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_weight: (0..count).map(tip_weight).sum(),
@@ -254,7 +253,7 @@ impl Explicit {
         let mut work = 0.0;
         let last = self.leaf.segments();
         let before = self.moving(0, last).0;
-        self.note_moments(&loads);
+        (self.moments).begin(self.leaf.moments_of(loads), self.layout, &self.packs);
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
             let ahead = if last > 0.0 {
@@ -299,7 +298,7 @@ impl Explicit {
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
         }
-        work += length * self.power_of_moments();
+        work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_changes() {
             work += self.work.of_rest(rest, bent, length, self.widths[0]);
         }
@@ -308,30 +307,6 @@ impl Explicit {
             work,
         };
         (exchange, energy)
-    }
-
-    /// Keeps the dead moments of a step, and how their nodes turn before it.
-    fn note_moments(&mut self, loads: &Loads) {
-        self.moments.clear();
-        self.moments.extend(self.leaf.moments_of(*loads));
-        self.turning.clear();
-        for (node, _) in &self.moments {
-            let (p, at) = self.layout.place(0, *node);
-            let pack = &self.packs[p];
-            self.turning.push((pack.rotation(at), pack.moving(at).1));
-        }
-    }
-
-    /// Power of the dead moments at the mean of the angular momenta before the last kick and of
-    /// these.
-    fn power_of_moments(&self) -> f64 {
-        let power = |((node, moment), (rotation, before)): (&(usize, DVec3), &(DQuat, DVec3))| {
-            let momentum = 0.5 * (*before + self.moving(0, *node).1);
-            let (p, at) = self.layout.place(0, *node);
-            moment.dot(self.packs[p].spin(at, *rotation, momentum))
-        };
-        let nodes = self.moments.iter().zip(&self.turning);
-        nodes.map(power).sum()
     }
 
     fn law(&self, rest: f64, remember: bool) -> Law {
@@ -355,7 +330,7 @@ impl Explicit {
             loads.tip_force = DVec3::ZERO;
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (positions, leaf, moments) = (&self.positions, &self.leaf, &self.moments[..]);
+        let (positions, leaf, moments) = (&self.positions, &self.leaf, self.moments.all());
         let applied = self.applied.as_ref().map(Applied::loads);
         let coupled = leaf.coupled();
         let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
