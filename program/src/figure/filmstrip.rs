@@ -1,13 +1,14 @@
 //! A moving leaf at several instants.
 
 use super::energy::notes;
+use crate::figure::curve::is_drawable;
 use crate::figure::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
 use crate::figure::layout::{HEADER, letters};
 use crate::figure::page::{KeyRows, NOTE_BASE, new_page};
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels, THINNER};
 use crate::figure::space::OBLIQUE;
-use crate::figure::veins::{Veins, is_drawable};
+use crate::figure::veins::Veins;
 use crate::report::numbers::short;
 use glam::DVec3;
 use leafdyn::scenario::Scenario;

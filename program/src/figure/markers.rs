@@ -62,12 +62,15 @@ pub fn tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
-/// Draws the markers of a leaf: points of a second solution, grips, the clamps and all tips,
+/// Draws the markers of a leaf: points of a second solution, moments, grips, the clamps and all tips,
 /// small if there are many.
 pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
         dot(page, place(point), radius);
+    }
+    for moment in &veins.moments {
+        moment.draw(page, veins.extent(), &place);
     }
     for grip in &veins.grips {
         grip_markers(page, grip, veins.line_width(), &place);

@@ -11,6 +11,7 @@ mod boundary_sides;
 mod chart;
 mod chart_panel;
 mod check;
+mod curve;
 pub mod drawing;
 mod energy;
 mod film;
@@ -23,6 +24,7 @@ mod leaf;
 mod map;
 mod markers;
 mod modes;
+mod moments;
 mod page;
 mod panels;
 pub mod png;
@@ -61,7 +63,7 @@ mod tests {
     use crate::report::sample;
     use glam::DVec3;
     use leafdyn::relax::Mode;
-    use leafdyn::scenario::{Grip, Hold, Scenario, Schedule, Wind};
+    use leafdyn::scenario::{Grip, Hold, PointLoad, Scenario, Schedule, Wind};
     use leafdyn::simulate::{Record, Stopped};
 
     fn scenario() -> Scenario {
@@ -218,6 +220,30 @@ mod tests {
             let paths = |svg: &str| svg.matches("<path").count();
             assert_eq!(paths(&drawn(&held)[k]) - paths(&free[k]), 4 * panels + 1);
         }
+    }
+
+    #[test]
+    fn moments_are_drawn_on_a_rod_as_they_act() {
+        let (rod, record) = (sample::fan(1, 8), sample::record(1, 8));
+        let drawn = |scenario: &Scenario| {
+            let paths = |drawing| svg::text(&drawing).matches("<path").count();
+            [leaf(&rod, scenario), filmstrip(&record, scenario)].map(paths)
+        };
+        let mut turned = sample::scenario("rod", 1);
+        let [rest, moving] = drawn(&turned);
+        turned.points = vec![PointLoad {
+            vein: 0,
+            at: 0.4,
+            force: [0.0; 3],
+            moment: [0.3, 0.2, 0.1],
+            mass: 0.0,
+        }];
+        let pictures = record.stills.len();
+        // An arc and its head in every panel.
+        assert_eq!(drawn(&turned), [rest + 8, moving + 2 * pictures]);
+        turned.points.clear();
+        turned.tip_moment = [0.0, 0.0, 0.5];
+        assert_eq!(drawn(&turned), [rest + 8, moving]);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
+use super::curve::{is_drawable, stretch};
 use super::drawing::{Color, Path, Step, color_of_vein};
+use super::moments::{Moment, moments};
 use super::setting::Setting;
 use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::{Hold, Scenario};
@@ -10,8 +12,6 @@ use leafdyn::simulate::{Record, Still};
 
 /// Of a wider leaf only some veins are drawn: more could not be distinguished.
 const MOST_VEINS: usize = 200;
-/// Points farther away than this many lengths are diverged and not drawn.
-const FARTHEST: f64 = 1e4;
 /// Largest distance of a drawn curve from the computed points, in lengths: a
 /// quarter of a pixel.
 const MAX_DEVIATION: f64 = 3e-4;
@@ -52,6 +52,7 @@ pub struct Veins {
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
     pub grips: Vec<Gripped>,
+    pub moments: Vec<Moment>,
     /// Corners of the bounding box.
     pub low: DVec3,
     pub high: DVec3,
@@ -63,7 +64,8 @@ impl Veins {
     pub fn of(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
         let veins = Veins::through(&shape.curves, &equilibrium.tips, shape.longest());
-        veins.gripped(scenario, &shape.curve_stations, &shape.curves)
+        let nodes = (&shape.curve_stations[..], &shape.curves[..]);
+        veins.loaded(scenario, scenario.tip_moment, nodes)
     }
 
     /// Where the veins that are drawn begin.
@@ -76,15 +78,27 @@ impl Veins {
     pub fn at_instant(record: &Record, still: &Still, scenario: &Scenario) -> Self {
         let tips = tips(&still.curves, record.joined);
         let veins = Veins::through(&still.curves, &tips, record.length);
-        veins.gripped(scenario, &record.stations, &still.curves)
+        let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
+        let on_tip = scenario.dynamics.tip_moment.at(time);
+        veins.loaded(scenario, on_tip, (&record.stations, &still.curves))
     }
 
-    /// With what the grips of a scenario hold, on curves through nodes at these stations.
-    fn gripped(mut self, scenario: &Scenario, stations: &[f64], curves: &[Vec<DVec3>]) -> Self {
+    /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
+    /// stations.
+    fn loaded(
+        mut self,
+        scenario: &Scenario,
+        on_tip: [f64; 3],
+        (stations, curves): (&[f64], &[Vec<DVec3>]),
+    ) -> Self {
+        self.moments = moments(scenario, on_tip, |sigma| {
+            let point = stretch(stations, curves.first()?, [sigma; 2]).pop()? / self.unit;
+            is_drawable(point).then_some(point)
+        });
         for grip in &scenario.grips {
             let curve = curves.get(grip.vein).map_or(&[][..], Vec::as_slice);
-            let points = stretch(stations, curve, grip.at);
-            let points = points.into_iter().map(|point| point / self.unit);
+            let points = stretch(stations, curve, grip.at).into_iter();
+            let points = points.map(|point| point / self.unit);
             self.grips.push(Gripped {
                 points: points.filter(|&point| is_drawable(point)).collect(),
                 held: grip.held,
@@ -124,6 +138,7 @@ impl Veins {
             dots: Vec::new(),
             tips,
             grips: Vec::new(),
+            moments: Vec::new(),
             low,
             high,
             unit,
@@ -156,6 +171,9 @@ impl Veins {
         let every = stride(self.count);
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
+        }
+        if !self.moments.is_empty() {
+            notes.push("curved arrows: moments".into());
         }
         notes
     }
@@ -207,11 +225,6 @@ pub fn longest<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f64 {
     curves.into_iter().map(length).fold(0.0, f64::max)
 }
 
-/// Whether a point, in lengths, is finite and not too far away to be drawn.
-pub fn is_drawable(point: DVec3) -> bool {
-    point.is_finite() && point.abs().max_element() < FARTHEST
-}
-
 /// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
 pub fn tamed(points: impl Iterator<Item = DVec3>, longest: f64) -> Vec<DVec3> {
     let mut last = DVec3::ZERO;
@@ -236,27 +249,6 @@ pub fn node_stride(nodes: usize, most: usize) -> usize {
 fn drawable_part(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
     let points = curve.iter().map(|&point| point / unit);
     points.take_while(|&point| is_drawable(point)).collect()
-}
-
-/// The points of a curve through nodes at these stations from one fraction of its length to another,
-/// or at one.
-fn stretch(stations: &[f64], curve: &[DVec3], [from, to]: [f64; 2]) -> Vec<DVec3> {
-    let nodes = || stations.iter().copied().zip(curve.iter().copied());
-    let at = |sigma: f64| {
-        let before = nodes().take_while(|(at, _)| *at <= sigma).last();
-        let after = nodes().find(|(at, _)| *at >= sigma);
-        match (before, after) {
-            (Some((a, x)), Some((b, y))) if b > a => Some(x.lerp(y, (sigma - a) / (b - a))),
-            (one, other) => one.or(other).map(|(_, x)| x),
-        }
-    };
-    let inside = nodes().filter(|(at, _)| from < *at && *at < to);
-    let end = if to > from { at(to) } else { None };
-    at(from)
-        .into_iter()
-        .chain(inside.map(|(_, x)| x))
-        .chain(end)
-        .collect()
 }
 
 /// Smooth pieces through every second, fourth, ... of the points, as long as the curve
@@ -367,19 +359,5 @@ mod tests {
         rods[1].nodes[8].position.z = 3.0;
         veins.add_dots(&rods);
         assert_eq!(veins.high.z, 3.0);
-    }
-
-    #[test]
-    fn a_stretch_ends_between_nodes() {
-        let (stations, curve) = ([0.0, 0.5, 1.0], [0.0, 1.0, 3.0].map(|x| x * DVec3::X));
-        let of = |at| -> Vec<f64> {
-            let points = stretch(&stations, &curve, at).into_iter();
-            points.map(|point| point.x).collect()
-        };
-        assert_eq!(of([0.25, 0.75]), [0.5, 1.0, 2.0]);
-        assert_eq!(of([0.5, 1.0]), [1.0, 3.0]);
-        assert_eq!(of([0.75, 0.75]), [2.0]);
-        assert_eq!(of([1.0, 1.0]), [3.0]);
-        assert!(stretch(&[], &[], [0.5, 1.0]).is_empty());
     }
 }
