@@ -49,11 +49,13 @@ impl Leaf {
 }
 
 impl DiscreteLeaf {
-    /// Nodes and sizes of the dead moments on points; empty if there are none.
+    /// Nodes and sizes of the dead moments on points; empty if there are none. What acts within
+    /// rounding of the base is left to its clamp.
     pub(super) fn moments_on_nodes(&self) -> Vec<(usize, DVec3)> {
         let points = self.leaf.moments_on_points();
         let some = points.filter(|(_, moment)| *moment != DVec3::ZERO);
         some.map(|(at, moment)| (self.grid.nearest(at), moment))
+            .filter(|(node, _)| *node > 0)
             .collect()
     }
 

@@ -7,7 +7,10 @@ use leafdyn_testing::*;
 #[test]
 fn moments_on_points_are_numbers_like_others() {
     for (tip, more) in [
-        ("", "load.tip_moment[1] load.tip_force[1]"),
+        (
+            "",
+            "load.tip_moment[1] load.tip_force[1] load.point[2].moment[1]",
+        ),
         (
             "tip = { held = \"clamped\", position = [0.8, 0.02, -0.1], angles = 0.2, twist = 0.3 }",
             "tip.position[0] tip.twist",
@@ -35,6 +38,10 @@ fn moments_on_points_are_numbers_like_others() {
             at = 0.5
             force = [0.1, 0.3, -0.2]
             moment = [0.0, 0.0, 0.5]
+            [[load.point]]
+            vein = 1
+            at = 1e-13
+            moment = [0.0, 0.1, 0.5]
             "#
         );
         let wanted = format!(

@@ -177,6 +177,15 @@ fn a_clamp_takes_the_moment_on_it() {
     }
 }
 
+/// What acts within rounding of the base is left to its clamp.
+#[test]
+fn a_moment_on_the_base_bends_nothing() {
+    let pulled = "load.tip_force = [0.2, 0.1, -0.3]";
+    let bare = settle(&under(&[], pulled), 1e-9);
+    let loaded = settle(&under(&[(1e-13, [0.3, -0.4, 0.5])], pulled), 1e-9);
+    assert!(distance(&bare, &loaded) < 2e-9);
+}
+
 /// Between grips the rod comes to rest as between two clamped ends.
 #[test]
 fn a_part_between_grips_is_a_rod_with_two_clamped_ends() {

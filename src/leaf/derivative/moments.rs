@@ -36,8 +36,9 @@ impl DiscreteLeaf {
     ) {
         for (sigma, moment) in &rate.moments {
             let nodes = forces.on_nodes(0, self.segments());
-            let node = &mut nodes[self.grid.nearest(*sigma) - 1];
-            add(node, self.load_factor * *moment, DVec3::ZERO);
+            if let Some(node) = self.grid.nearest(*sigma).checked_sub(1) {
+                add(&mut nodes[node], self.load_factor * *moment, DVec3::ZERO);
+            }
         }
     }
 }
