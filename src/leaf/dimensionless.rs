@@ -75,6 +75,8 @@ pub struct Loads {
     pub tip_moment: DVec3,
     /// Part of the loads that veins have of their own: zero without any.
     pub own: f64,
+    /// Part of the dead moments on points of a single rod: zero without any.
+    pub moments: f64,
 }
 
 impl std::ops::Sub for Loads {
@@ -86,6 +88,7 @@ impl std::ops::Sub for Loads {
             tip_force: self.tip_force - other.tip_force,
             tip_moment: self.tip_moment - other.tip_moment,
             own: self.own - other.own,
+            moments: self.moments - other.moments,
         }
     }
 }
@@ -99,6 +102,7 @@ impl std::ops::Mul<f64> for Loads {
             tip_force: self.tip_force * factor,
             tip_moment: self.tip_moment * factor,
             own: self.own * factor,
+            moments: self.moments * factor,
         }
     }
 }
@@ -132,6 +136,7 @@ impl Leaf {
                 tip_force: vector(scenario.tip_force, scale.force()),
                 tip_moment: vector(scenario.tip_moment, scale.moment()),
                 own: 0.0,
+                moments: 0.0,
             },
             held: scenario.held_tip.as_ref().map(|held| Held {
                 position: vector(held.position, scale.length),
@@ -147,6 +152,9 @@ impl Leaf {
         } else {
             0.0
         };
+        if leaf.moments_on_points().any(|(_, it)| it != DVec3::ZERO) {
+            leaf.loads.moments = 1.0;
+        }
         leaf
     }
 
@@ -158,7 +166,7 @@ impl Leaf {
     /// Whether all that acts on it has a potential: a dead moment has none, nor has wind. Otherwise
     /// its rest is no minimum of an energy, and no eigenvalue tells whether it is stable.
     pub fn has_potential(&self) -> bool {
-        self.loads.tip_moment == DVec3::ZERO && !self.in_wind()
+        !self.loads.has_moments() && !self.in_wind()
     }
 
     /// Whether wind acts on it.

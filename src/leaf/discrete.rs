@@ -34,6 +34,8 @@ pub struct DiscreteLeaf {
     pub(super) strips: Vec<Strip>,
     /// Forces on all nodes by loads of their veins alone; empty if there are none.
     pub(super) own_loads: Vec<DVec3>,
+    /// Nodes and sizes of the dead moments on points of a single rod.
+    pub(super) point_moments: Vec<(usize, DVec3)>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<Gripped>,
     /// Part of the loads that acts: one, except during continuation in the loads.
@@ -74,11 +76,13 @@ impl DiscreteLeaf {
             coupling,
             strips: Vec::new(),
             own_loads: Vec::new(),
+            point_moments: Vec::new(),
             grips: Vec::new(),
             load_factor: 1.0,
             loads: leaf.loads,
         };
         discrete.own_loads = discrete.own_loads_of(leaf);
+        discrete.point_moments = discrete.moments_on_nodes();
         let gripped = !leaf.scenario().grips.is_empty();
         if leaf.has_tissue() || gripped {
             let natural = discrete.natural();
@@ -227,15 +231,6 @@ impl DiscreteLeaf {
         self.coupling[g] * self.coupling_weight(i)
     }
 
-    /// Dead moment on the tip of a single rod.
-    pub fn tip_moment(&self) -> DVec3 {
-        if self.rods() == 1 {
-            self.loads.tip_moment * self.load_factor
-        } else {
-            DVec3::ZERO
-        }
-    }
-
     /// Mass of the nodes of rod `j` at unit density, per weight: rotary, translational.
     pub(super) fn mass_per_weight(&self, j: usize) -> [f64; 2] {
         let mass = self.leaf.length(j) * self.leaf.share(j);
@@ -258,7 +253,7 @@ impl DiscreteLeaf {
             let (g_x, _, g_b) = segment.gradient(self.section(j, n - 1));
             let load = self.load(state, j, n);
             force += load.force - g_x;
-            moments.push(load.moment - g_b);
+            moments.push(load.moment + self.moment_on(n) - g_b);
         }
         (force, moments)
     }

@@ -228,13 +228,15 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// Adds `sign` times the forces on points at `sigma` to the forces of the fields.
+    /// Adds `sign` times the forces and moments on points at `sigma` to those of the fields.
     fn jump(&mut self, sigma: f64, sign: f64) {
         for j in 0..self.leaf.rods() {
             let force = sign * self.leaf.force_on_points(j, sigma);
+            let moment = sign * self.leaf.moment_at(sigma);
             let fields = &mut self.fields[j / GROUP];
             for c in 0..3 {
                 fields[7 + c].0[j % GROUP] += force[c];
+                fields[10 + c].0[j % GROUP] += moment[c];
             }
         }
     }

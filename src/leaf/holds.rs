@@ -112,7 +112,7 @@ impl DiscreteLeaf {
             segment.gradient(self.section(j, i))
         };
         let load = self.load(state, j, i);
-        let (mut moment, mut force) = (load.moment, load.force);
+        let (mut moment, mut force) = (load.moment + self.moment_on(i), load.force);
         if i > 0 {
             let (g_x, _, g_b) = gradient(i - 1);
             (moment, force) = (moment - g_b, force - g_x);

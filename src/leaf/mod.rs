@@ -13,6 +13,7 @@ mod grid;
 mod holds;
 mod loads;
 mod mirror;
+mod moments;
 #[cfg(test)]
 mod not_a_number;
 mod own_loads;

@@ -8,7 +8,7 @@ use super::system::System;
 use glam::DVec3;
 
 /// Fractions of the length closer to each other than this are those of one node.
-const SAME_NODE: f64 = 1e-11;
+pub(super) const SAME_NODE: f64 = 1e-11;
 
 impl Leaf {
     /// Own load on rod `j` at `sigma`, per unit of sigma, without those on points.

@@ -62,8 +62,10 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
         energy += (weight * loads.gravity).length_squared() / inertia.mass;
         if i == n {
             energy += loads.tip_force.length_squared() / inertia.mass;
-            energy += loads.tip_moment.length_squared() / inertia.transverse;
         }
+    }
+    for (node, moment) in leaf.moments_of(loads) {
+        energy += moment.length_squared() / physics.inertia(leaf, 0, node).transverse;
     }
     0.5 * h * h * energy
 }

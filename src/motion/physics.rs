@@ -44,8 +44,9 @@ pub struct Physics {
     pub damping: f64,
     /// Internal damping: retardation time.
     pub retardation: f64,
-    /// Part of the loads of single veins.
+    /// Part of the loads of single veins, and of the dead moments on points.
     own_loads: f64,
+    moments: f64,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
     /// The loads, if they are constant.
@@ -85,6 +86,7 @@ impl Physics {
             .map(|wind| wind.velocity.clone());
         let mut physics = Physics {
             own_loads: leaf.loads.own,
+            moments: leaf.loads.moments,
             constant_loads: None,
             knots: knots(&dynamics, air.as_ref(), time),
             air,
@@ -152,6 +154,7 @@ impl Physics {
             tip_force: tip_force / force,
             tip_moment: tip_moment / self.scale.moment(),
             own: self.own_loads,
+            moments: self.moments,
         }
     }
 

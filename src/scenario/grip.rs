@@ -23,7 +23,19 @@ pub struct Grip {
     pub displacement: [f64; 3],
 }
 
+/// A grip that ends within this part of the length from the tip holds it.
+const AT_TIP: f64 = 1e-11;
+
 impl Scenario {
+    /// Whether all tips are held: as `[tip]` says, or by grips.
+    pub fn holds_all_tips(&self) -> bool {
+        let gripped = |vein: usize| {
+            let mut grips = self.grips.iter().filter(|grip| grip.vein == vein);
+            grips.any(|grip| 1.0 - grip.at[1] < AT_TIP)
+        };
+        self.held_tip.is_some() || (0..self.rods.len()).all(gripped)
+    }
+
     /// Whether tissue, which has no force in the natural leaf, or grips, which hold veins where they
     /// are in it, make a leaf depend on shapes at rest in another way than by their strains.
     pub fn depends_on_natural_leaf(&self) -> bool {

@@ -77,21 +77,26 @@ impl Scenario {
         weights || self.distributed.is_some() || !self.points.is_empty()
     }
 
+    /// Whether dead moments act at rest.
+    pub fn has_moments(&self) -> bool {
+        let on_points = || self.points.iter().any(|point| point.moment != [0.0; 3]);
+        self.tip_moment != [0.0; 3] || on_points()
+    }
+
     /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
     pub fn is_loaded_in_plane(&self) -> bool {
         let flat = |load: [f64; 3]| load[2] == 0.0;
         let even = |vein: usize| flat(self.weight(vein).even);
-        let point = |load: &PointLoad| flat(load.force) && load.moment == [0.0; 3];
         self.rods
             .iter()
             .all(|rod| flat(rod.base) && rod.elevation == 0.0)
             && (0..self.rods.len()).all(even)
             && flat(self.g)
             && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
-            && self.points.iter().all(point)
+            && self.points.iter().all(|point| flat(point.force))
             && self.grips.iter().all(|grip| flat(grip.displacement))
             && flat(self.tip_force)
-            && self.tip_moment == [0.0; 3]
+            && !self.has_moments()
             && self.wind.is_none()
     }
 

@@ -95,11 +95,11 @@ impl Scenario {
             && self.base_held == Hold::Clamped
             && !tissue
             && group.clone().all(loads)
-            && points.all(|point| along(self.force_on(point)) && point.moment == [0.0; 3])
+            && points.all(|point| along(self.force_on(point)))
             && grips.all(|grip| along(grip.displacement))
             && along(self.tip_force)
             // A dead moment has no potential.
-            && self.tip_moment == [0.0; 3]
+            && !self.has_moments()
             && held
             && coupling
             // This takes longest.

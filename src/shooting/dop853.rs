@@ -2,6 +2,7 @@
 
 use crate::largest::larger;
 use crate::shooting::equations::Equations;
+use crate::shooting::own_loads::SAME_PLACE;
 use crate::shooting::state::{RodState, STATE};
 use crate::tableau::{A, B, C, E3, E5, STAGES};
 
@@ -32,6 +33,8 @@ pub struct Integrator<'e, 'a> {
     tolerance: f64,
     pub sigma: f64,
     pub y: Vec<f64>,
+    /// Where it passed the last loads on points.
+    passed: f64,
     /// Proposed size of the next step.
     step: f64,
     /// Width of the last step.
@@ -53,6 +56,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
             equations,
             tolerance,
             sigma,
+            passed: f64::NEG_INFINITY,
             step: 0.0,
             width: 0.0,
             stages: blank(),
@@ -94,8 +98,11 @@ impl<'e, 'a> Integrator<'e, 'a> {
     /// One step towards `until`, never beyond it or a kink.
     pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
         let failed = Unbounded { sigma: self.sigma };
-        // States are those just before a load on a point, which the first step beyond it passes.
-        if self.equations.pass_points(self.sigma, &mut self.y) {
+        // States are those just before a load on a point, which the first step beyond it passes; a
+        // second stop within rounding of it does not.
+        let beyond = self.sigma - self.passed > SAME_PLACE;
+        if beyond && self.equations.pass_points(self.sigma, &mut self.y) {
+            self.passed = self.sigma;
             self.equations
                 .slopes(self.sigma, &self.y, &mut self.slopes[0]);
         }

@@ -17,6 +17,7 @@ use crate::limit::Limit;
 use crate::scenario::{Profile, Scenario, Turning, longest};
 use crate::shooting::arcs;
 use crate::shooting::arcs::Arc;
+use crate::shooting::own_loads::SAME_PLACE;
 use crate::shooting::state::{Derivatives, RodState, STATE};
 use crate::shooting::tissue::{Tangent, Tissue};
 
@@ -199,9 +200,11 @@ impl<'a> Equations<'a> {
     }
 
     /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
+    /// A kink within rounding of either is there.
     pub fn stop(&self, from: f64, to: f64) -> f64 {
-        let next = self.kinks.partition_point(|kink| *kink <= from);
-        self.kinks.get(next).map_or(to, |kink| kink.min(to))
+        let next = (self.kinks).partition_point(|kink| *kink <= from + SAME_PLACE);
+        let kink = self.kinks.get(next).copied();
+        kink.filter(|kink| *kink < to - SAME_PLACE).unwrap_or(to)
     }
 
     /// The state at the base for given forces and moments: conditions (a) and (c).
@@ -346,19 +349,19 @@ impl<'a> Equations<'a> {
         let forces = rods
             .iter()
             .enumerate()
-            .map(|(j, rod)| rod.n - self.on_tip(j));
+            .map(|(j, rod)| rod.n - self.on_tip(j)[0]);
         let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
                 let first = match (self.tip(), j) {
                     (Tip::Joint, 0) => force - self.part * self.tip_force,
                     (Tip::Joint, _) => rod.r - rods[0].r,
-                    (Tip::Free, _) => rod.n - self.part * self.tip_force - self.on_tip(j),
+                    (Tip::Free, _) => rod.n - self.part * self.tip_force - self.on_tip(j)[0],
                     (Tip::Pinned | Tip::Clamped, _) => rod.r - self.held[j].0,
                 };
                 let second = match self.tip() {
                     Tip::Clamped => difference(rod.q, self.held[j].1),
-                    _ => rod.m - self.part * self.tip_moment,
+                    _ => rod.m - self.part * self.tip_moment - self.on_tip(j)[1],
                 };
                 [first.to_array(), second.to_array()].concat()
             })
@@ -382,7 +385,7 @@ impl<'a> Equations<'a> {
             .sum();
         let points = self
             .on_points(1.0)
-            .map(|(j, force)| force.dot(RodState::read(y, j).r));
+            .map(|(j, [force, _])| force.dot(RodState::read(y, j).r));
         -self.part * work - points.sum::<f64>()
     }
 }

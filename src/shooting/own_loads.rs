@@ -6,7 +6,7 @@ use crate::shooting::equations::Equations;
 use crate::shooting::state::{RodState, STATE};
 
 /// Fractions of the length closer to each other than this are the same.
-const SAME_PLACE: f64 = 1e-11;
+pub(in crate::shooting) const SAME_PLACE: f64 = 1e-11;
 
 impl Equations<'_> {
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is
@@ -23,13 +23,14 @@ impl Equations<'_> {
         (weight + along) * (self.length / self.force)
     }
 
-    /// Passes the loads on points at `sigma`, by which forces jump, on the way to the tip; false if
+    /// Passes the loads on points at `sigma`, by which forces and moments jump, on the way to the tip; false if
     /// there are none.
     pub fn pass_points(&self, sigma: f64, y: &mut [f64]) -> bool {
         let mut any = false;
-        for (j, force) in self.on_points(sigma) {
+        for (j, [force, moment]) in self.on_points(sigma) {
             let mut rod = RodState::read(y, j);
             rod.n -= force;
+            rod.m -= moment;
             y[STATE * self.rods()] -= force.dot(rod.r);
             rod.write(y, j);
             any = true;
@@ -37,28 +38,30 @@ impl Equations<'_> {
         any
     }
 
-    /// Rods and forces of the loads on points at `sigma`.
+    /// Rods, forces and moments of the loads on points at `sigma`.
     pub(in crate::shooting) fn on_points(
         &self,
         sigma: f64,
-    ) -> impl Iterator<Item = (usize, DVec3)> {
+    ) -> impl Iterator<Item = (usize, [DVec3; 2])> {
         let points = self
             .scenario
             .points
             .iter()
             .filter(move |point| (point.at - sigma).abs() < SAME_PLACE);
         let unit = self.part / self.force;
+        let units = [unit, unit / self.length];
         points.map(move |point| {
-            (
-                point.vein,
-                unit * DVec3::from_array(self.scenario.force_on(point)),
-            )
+            let [force, moment] = [self.scenario.force_on(point), point.moment];
+            let loads = [0, 1].map(|k| units[k] * DVec3::from_array([force, moment][k]));
+            (point.vein, loads)
         })
     }
 
-    /// The force on the tip of rod `j` by loads on points.
-    pub(in crate::shooting) fn on_tip(&self, j: usize) -> DVec3 {
-        let forces = self.on_points(1.0).filter(|(rod, _)| *rod == j);
-        forces.map(|(_, force)| force).sum()
+    /// The force and the moment on the tip of rod `j` by loads on points.
+    pub(in crate::shooting) fn on_tip(&self, j: usize) -> [DVec3; 2] {
+        let here = self.on_points(1.0).filter(|(rod, _)| *rod == j);
+        here.fold([DVec3::ZERO; 2], |sum, (_, [force, moment])| {
+            [sum[0] + force, sum[1] + moment]
+        })
     }
 }

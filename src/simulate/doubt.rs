@@ -8,7 +8,6 @@ use crate::motion::Physics;
 use crate::newton::{Newton, Work};
 use crate::numbers::two_digits;
 use crate::relax::{ANY_SIGN, polish};
-use glam::DVec3;
 
 /// Largest distance of a start from the equilibrium that it is compared with, in lengths.
 const NEAR: f64 = 0.1;
@@ -25,7 +24,7 @@ const MODE_ACCURACY: f64 = 1e-9;
 pub(super) fn unstable(leaf: &DiscreteLeaf, physics: &Physics, start: &State) -> Option<String> {
     let mut leaf = leaf.clone();
     leaf.loads = physics.loads(0.0);
-    if leaf.leaf.in_wind() || leaf.loads.tip_moment != DVec3::ZERO || !physics.clamped() {
+    if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
         // Its rest is no minimum of an energy, or it has none.
         return None;
     }

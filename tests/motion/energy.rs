@@ -130,6 +130,14 @@ fn of_what_is_shaken() {
     });
 }
 
+/// Moments on points, inside the rod and on its tip, besides one that changes.
+#[test]
+fn of_a_rod_under_moments_on_points() {
+    when_shaken("rod under moments", moments_on_points(), |dynamics| {
+        dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);
+    });
+}
+
 /// Holders that stay where they are do no work.
 #[test]
 fn of_a_leaf_in_grips() {

@@ -8,8 +8,8 @@
 use leafdyn::internals::leaf::State;
 use leafdyn::scenario::Tissue;
 use leafdyn_testing::motion::{
-    BOTH, DAMPINGS, Scheme, apart, at, curling, distance, gripped_veins, limit, method, numbers,
-    ramp, rest, three_veins, twisted_rod,
+    BOTH, DAMPINGS, Scheme, apart, at, curling, distance, gripped_veins, limit, method,
+    moments_on_points, numbers, ramp, rest, three_veins, twisted_rod,
 };
 use leafdyn_testing::*;
 
@@ -77,6 +77,14 @@ fn of_a_rod_and_a_leaf_in_space_and_a_rod_that_changes_its_rest_shape() {
     rod.dynamics.external_damping = 1.5;
     rod.dynamics.internal_damping = 0.01;
     assert_order("changing rod", &rod, 0.7, equal(0.01));
+}
+
+/// With moments on points that act all the time.
+#[test]
+fn of_a_rod_under_moments_on_points() {
+    let mut rod = moments_on_points();
+    rod.dynamics.tip_force = ramp(2.0, [-5.0, 10.0, 16.0]);
+    in_space("rod under moments", rod, 0.3);
 }
 
 /// With grips along veins that are tied by coupling and tissue.

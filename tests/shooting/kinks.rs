@@ -2,6 +2,7 @@
 //! the boundary-value solution is that of the relaxation there too.
 
 use leafdyn::internals::shooting::Reason;
+use leafdyn::scenario::PointLoad;
 use leafdyn_testing::*;
 
 /// Veins that taper, with a soft joint, and curl at rest from half their length on.
@@ -209,5 +210,37 @@ fn loads_beyond_folds_of_their_path() {
         let leaf = rod(entries);
         let relaxed = settle(&leaf, TIGHT);
         agree(entries, &leaf, &relaxed, &shot_near(&leaf, &relaxed), 1e-9);
+    }
+}
+
+/// A point that is loaded is a kink; a station within rounding of it is there, and passes the load
+/// once.
+#[test]
+fn stations_a_rounding_error_from_a_point_that_is_loaded() {
+    for at in [0.37_f64, 0.3, 0.1 + 0.2, 0.58, 0.77] {
+        let mut rod = paper_leaf(1, [0.8, 1.0, 1.5], [100.0, 80.0, 60.0], 0.5);
+        rod.points = vec![PointLoad {
+            vein: 0,
+            at,
+            force: [0.2, 0.3, 1.0],
+            moment: [0.4, -0.5, 0.6],
+            mass: 0.0,
+        }];
+        let (relaxed, _) = all_agree("point", &rod);
+        for station in [at.next_down(), at, at.next_up()] {
+            let alone = shot_alone(&rod, &[0.0, station, 1.0]);
+            let off = tip_node(&alone.rods, 0).position.distance(relaxed.tips[0]);
+            assert!(off < 1e-9, "{at}: {off:e}");
+            let tip = tip_node(&alone.rods, 0);
+            assert!(tip.m.length() < 1e-9, "{at}: {}", tip.m);
+            let k = relaxed
+                .shape
+                .stations
+                .iter()
+                .position(|s| (s - at).abs() < 1e-12);
+            let before = in_lab(&relaxed.shape.rods[0].nodes[k.unwrap()]).1;
+            let found = in_lab(&alone.rods[0].nodes[1]).1;
+            assert!(found.distance(before) < 1e-7, "{at}: {found} for {before}");
+        }
     }
 }

@@ -8,6 +8,7 @@ mod eigenvalue_bars;
 mod follower;
 mod lateral_buckling;
 mod map_jumps;
+mod margin_of_grips;
 mod margin_random;
 mod mode_shapes;
 mod modes;

@@ -7,8 +7,8 @@ use leafdyn::study::relax_with_margin;
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
 
-/// A soft leaf that may have several places to rest.
-fn soft(draw: &mut Draw) -> Scenario {
+/// A soft leaf that may have several places to rest, with more.
+fn soft(draw: &mut Draw, more: impl Fn(&mut Draw, usize) -> String) -> Scenario {
     let rods = 1 + (3.0 * draw.even()) as usize;
     let coupling = match rods {
         1 => "",
@@ -23,12 +23,14 @@ fn soft(draw: &mut Draw) -> Scenario {
         rest.bend_3 = {:?}
         load = {{ gravity = [0.0, 0.0, {:?}] }}
         {coupling}
+        {}
         "#,
         10.0_f64.powf(draw.uniform(-2.0, 0.0)),
         10.0_f64.powf(draw.uniform(-2.0, -0.5)),
         draw.uniform(-2.0, 2.0),
         draw.uniform(-1.0, 1.0),
         -draw.uniform(0.0, 0.2),
+        more(draw, rods),
     ))
 }
 
@@ -55,11 +57,29 @@ fn advanced(
 /// the least, and under 1.02 of it they come to rest elsewhere.
 #[test]
 fn random_leaves_stay_below_the_push_and_leave_above_it() {
-    let (mut draw, mut tried, mut unseated) = (Draw(7), 0, 0);
-    while unseated < 10 {
+    stay_below_and_leave_above(10, Draw(7), |_, _| String::new());
+}
+
+/// The same of leaves in grips.
+#[test]
+fn random_leaves_in_grips_stay_below_the_push_and_leave_above_it() {
+    stay_below_and_leave_above(5, Draw(8), |draw, rods| {
+        let held = ["pinned", "clamped"][usize::from(draw.even() < 0.5)];
+        let way = draw.list(3, -0.1, 0.1);
+        format!("grip = [{{ vein = {rods}, at = [0.25, 0.375], held = {held:?}, move = {way:?} }}]")
+    });
+}
+
+fn stay_below_and_leave_above(
+    wanted: usize,
+    mut draw: Draw,
+    more: impl Fn(&mut Draw, usize) -> String,
+) {
+    let (mut tried, mut unseated) = (0, 0);
+    while unseated < wanted {
         tried += 1;
         assert!(tried < 80, "{unseated} of {tried}");
-        let scenario = soft(&mut draw);
+        let scenario = soft(&mut draw, &more);
         let options = at_every_node(1e-5);
         let rest = relax_with_margin(&scenario, &options, &mut |_| {}).unwrap();
         let margin = rest.margin.clone().unwrap();

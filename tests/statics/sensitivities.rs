@@ -190,11 +190,15 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
     (text, keys.collect())
 }
 
-fn keys(keys: &[&str]) -> Vec<Keys> {
+pub fn keys(keys: &[&str]) -> Vec<Keys> {
     keys.iter().map(|key| key.parse().unwrap()).collect()
 }
 
-fn derivatives(base: &Base, wanted: &[&str], options: &Options) -> (Equilibrium, Vec<Sensitivity>) {
+pub fn derivatives(
+    base: &Base,
+    wanted: &[&str],
+    options: &Options,
+) -> (Equilibrium, Vec<Sensitivity>) {
     let leaf = relax_with_sensitivities(base, &keys(wanted), options, &mut |_| {}).unwrap();
     let (remark, text) = (&leaf.remark, base.text());
     assert_eq!(leaf.outcome, Outcome::Converged, "{remark:?}\n{text}");
@@ -219,7 +223,7 @@ fn on_grips(grips: &[GripReaction]) -> impl Iterator<Item = DVec3> {
 
 /// Tips, places of the stations, energy, what the holders feel, the lowest eigenvalue and the
 /// frequencies; and how many of them are not of modes.
-fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
+pub fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
     let places = leaf.tips.iter().copied();
     let places = places.chain(nodes(&leaf.shape.rods).map(|node| node.position));
     let mut all: Vec<f64> = places.flat_map(|it| it.to_array()).collect();
@@ -236,7 +240,7 @@ fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
 
 /// The same derivatives from eight relaxations, and how far those of four are off: much
 /// where modes come close to each other.
-fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
+pub fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
     let value = base.value(key).unwrap();
     let size = if value == 0.0 { 1.0 } else { value.abs() };
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
@@ -266,7 +270,7 @@ fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn of(found: &Sensitivity) -> Vec<f64> {
+pub fn of(found: &Sensitivity) -> Vec<f64> {
     let places = found.tips.iter().chain(found.positions.iter().flatten());
     let places = places.flat_map(|it: &DVec3| it.to_array());
     places

@@ -5,7 +5,7 @@ use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Grip, Hold, Profile, Scenario, Schedule, Tissue};
+use leafdyn::scenario::{Grip, Hold, PointLoad, Profile, Scenario, Schedule, Tissue};
 use leafdyn::simulate::{self, Frame, Simulation};
 
 pub use leafdyn::simulate::Scheme;
@@ -37,6 +37,24 @@ pub fn twisted_rod() -> Scenario {
     let mut rod = paper_leaf(1, [0.9, 1.4, 0.7], [90.0, 60.0, 40.0], 0.0);
     rod.rods[0].rest_curvature = [0.8, -0.5, 0.6].map(Profile::Constant);
     rod.dynamics.external_damping = 0.0;
+    rod
+}
+
+/// The same under dead moments on points in its middle and at its tip.
+pub fn moments_on_points() -> Scenario {
+    let mut rod = twisted_rod();
+    let point = |at: f64, moment: [f64; 3]| PointLoad {
+        vein: 0,
+        at,
+        force: [0.0; 3],
+        moment,
+        mass: 0.0,
+    };
+    rod.points = vec![
+        point(0.5, [0.8, -0.6, 0.9]),
+        point(0.75, [-0.3, 0.4, 0.2]),
+        point(1.0, [0.2, 0.3, -0.4]),
+    ];
     rod
 }
 

@@ -23,7 +23,7 @@ const LINE: f64 = 19.0;
 
 pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
-    let mut veins = Veins::of(&check.relaxed);
+    let mut veins = Veins::of(&check.relaxed, scenario);
     if let Some(solution) = check.solution() {
         veins.add_dots(&solution.rods);
     }

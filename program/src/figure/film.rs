@@ -47,7 +47,7 @@ pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::R
     };
     let shown = sampled(film);
     let shapes: Vec<Veins> = (shown.iter())
-        .map(|still| Veins::at_instant(record, still))
+        .map(|still| Veins::at_instant(record, still, scenario))
         .collect();
     let bounds = common_box(shapes.iter());
     let times: Vec<f64> = (shown.iter())
@@ -56,7 +56,7 @@ pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::R
     let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
         .map_init(Palette::new, |palette, (veins, time)| {
             let text = format!("{}, t = {}", record.scenario, short(*time));
-            palette.indices(&paint(&picture(veins, bounds, setting, &text)))
+            palette.indices(&paint(&picture(veins, bounds, setting, (&text, *time))))
         })
         .collect();
     encode(&pictures, &delays(&times), out).map_err(io::Error::other)
@@ -96,13 +96,19 @@ fn delays(times: &[f64]) -> Vec<u16> {
         .collect()
 }
 
-fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> Drawing {
+fn picture(
+    veins: &Veins,
+    bounds: [DVec3; 2],
+    setting: &Setting,
+    (text, time): (&str, f64),
+) -> Drawing {
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
     let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
     let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_axes(&mut page, 36.0);
+    scene.draw_arrows(&mut page, true, time);
     scene.draw_leaf(&mut page, veins, THINNER * veins.line_width());
     let corner = DVec2::new(10.0, 17.0);
     page.label(corner, text, TEXT_SIZE, Anchor::Start, INK);
@@ -262,12 +268,14 @@ mod tests {
         assert_eq!(total(&delays), 1000);
         // Every picture shows its instant, in colours that are close enough.
         let stills = record.film.iter();
-        let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(&record, it)).collect();
+        let shapes: Vec<Veins> = stills
+            .map(|it| Veins::at_instant(&record, it, &scenario))
+            .collect();
         let bounds = common_box(shapes.iter());
         for k in [0, 50, 100] {
-            let time = short(record.moments[k].time);
-            let text = format!("{}, t = {time}", record.scenario);
-            let painted = paint(&picture(&shapes[k], bounds, &setting, &text));
+            let time = record.moments[k].time;
+            let text = format!("{}, t = {}", record.scenario, short(time));
+            let painted = paint(&picture(&shapes[k], bounds, &setting, (&text, time)));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =

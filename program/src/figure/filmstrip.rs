@@ -1,13 +1,14 @@
 //! A moving leaf at several instants.
 
 use super::energy::notes;
+use crate::figure::curve::is_drawable;
 use crate::figure::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
 use crate::figure::layout::{HEADER, letters};
 use crate::figure::page::{KeyRows, NOTE_BASE, new_page};
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels, THINNER};
 use crate::figure::space::OBLIQUE;
-use crate::figure::veins::{Veins, is_drawable};
+use crate::figure::veins::Veins;
 use crate::report::numbers::short;
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
@@ -24,7 +25,9 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let name = format!("{}: instants of the motion", record.scenario);
     let stills = record.stills.iter();
-    let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(record, it)).collect();
+    let shapes: Vec<Veins> = stills
+        .map(|it| Veins::at_instant(record, it, scenario))
+        .collect();
     let has_path = record.tips.len() == 1 && record.stills.len() > 1;
     let top = if has_path { HEADER + KEY_LINE } else { HEADER };
     let panels = SmallPanels::holding(shapes.iter(), shapes.len(), &setting, top);
@@ -57,7 +60,7 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let when = format!("t = {}", short(time));
             let caption = (letter.as_str(), when.as_str(), NOTE);
-            let scene = panels.begin(page, index, OBLIQUE, caption);
+            let scene = panels.begin(page, (index, time), OBLIQUE, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
                 if path.len() > 1 {

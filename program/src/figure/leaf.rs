@@ -18,7 +18,7 @@ use leafdyn::study::Equilibria;
 
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
-    let veins = Veins::of(leaf);
+    let veins = Veins::of(leaf, scenario);
     let panels = Panels::below(HEADER, &veins);
     let notes = notes(leaf, &veins, &setting);
     let mut drawing = new_page(LEFT, &leaf.scenario, &notes, Some(&veins));
@@ -51,7 +51,9 @@ const MOST_EQUILIBRIA: usize = 24;
 pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let shown = &all.found[..all.found.len().min(MOST_EQUILIBRIA)];
-    let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));
+    let shapes = shown
+        .iter()
+        .map(|found| Veins::of(&found.equilibrium, scenario));
     let shapes: Vec<Veins> = shapes.collect();
     let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting, HEADER);
     let name = format!("{}: equilibria, lowest energy first", all.scenario);

@@ -1,12 +1,13 @@
 //! Markers of points in a panel, of the clamp and the tips of a leaf, of points of a second
-//! solution, and of the direction of gravity.
+//! solution, of grips, and of the directions of gravity and wind.
 
 use crate::figure::drawing::{
-    Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, rectangle,
+    Anchor, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, polygon, polyline, rectangle,
 };
 use crate::figure::layout::{Cell, TICK_SIZE};
-use crate::figure::veins::Veins;
+use crate::figure::veins::{Gripped, Veins};
 use glam::{DVec2, DVec3};
+use leafdyn::scenario::Hold;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
@@ -61,12 +62,18 @@ pub fn tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
-/// Draws the markers of a leaf: points of a second solution, the clamps and all tips,
+/// Draws the markers of a leaf: points of a second solution, moments, grips, the clamps and all tips,
 /// small if there are many.
 pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
         dot(page, place(point), radius);
+    }
+    for moment in &veins.moments {
+        moment.draw(page, veins.extent(), &place);
+    }
+    for grip in &veins.grips {
+        grip_markers(page, grip, veins.line_width(), &place);
     }
     let mut bases: Vec<DVec3> = Vec::new();
     for base in veins.bases() {
@@ -85,6 +92,27 @@ pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> 
     }
 }
 
+/// Marks where a grip holds a vein: a stretch with both of its ends, or a point; pinned or clamped.
+fn grip_markers(
+    page: &mut Drawing,
+    grip: &Gripped,
+    line_width: f64,
+    place: impl Fn(DVec3) -> DVec2,
+) {
+    let points: Vec<DVec2> = grip.points.iter().map(|&point| place(point)).collect();
+    let marker = match grip.held {
+        Hold::Clamped => Marker::Square,
+        Hold::Pinned => Marker::Triangle,
+    };
+    if let [first, .., last] = points.as_slice() {
+        page.stroke(polyline(&points), Stroke::new(INK, 1.6 + line_width));
+        marker.draw(page, *first, INK);
+        marker.draw(page, *last, INK);
+    } else if let [point] = points.as_slice() {
+        marker.draw(page, *point, INK);
+    }
+}
+
 /// Marks a point of a second solution, in a colour that no vein has.
 pub fn dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.shape(circle(at, radius), DOT, None);
@@ -97,17 +125,17 @@ const END_ON: f64 = 0.2;
 /// From the sides of a panel to the middle of the arrow.
 const INSET: DVec2 = DVec2::new(28.0, 32.0);
 
-/// Draws the direction of gravity with its name in the corner of a panel that is farthest from the points
-/// `taken`. `direction` is the projection of its unit vector onto the page, `toward`
+/// Draws a direction with its name in the corner of a panel that is farthest from the points
+/// `taken`; returns where. `direction` is the projection of its unit vector onto the page, `toward`
 /// whether it points towards the viewer.
-pub fn draw_gravity(
+pub fn draw_arrow(
     page: &mut Drawing,
     cell: Cell,
-    taken: impl Iterator<Item = DVec2>,
-    direction: DVec2,
-    toward: bool,
-) {
-    let at = cell.free_corner(INSET, taken);
+    taken: &[DVec2],
+    (direction, toward): (DVec2, bool),
+    name: &str,
+) -> DVec2 {
+    let at = cell.free_corner(INSET, taken.iter().copied());
     let stroke = Stroke::new(INK, 1.3);
     if direction.length() < END_ON {
         page.stroke(circle(at, 6.0), stroke);
@@ -123,6 +151,7 @@ pub fn draw_gravity(
         page.shape(polygon(&[end, neck + across, neck - across]), INK, None);
     }
     let below = 0.5 * ARROW * direction.y.abs().max(0.4) + 11.0;
-    let name = at + DVec2::new(0.0, below);
-    page.label(name, "gravity", TICK_SIZE, Anchor::Middle, NOTE);
+    let foot = at + DVec2::new(0.0, below);
+    page.label(foot, name, TICK_SIZE, Anchor::Middle, NOTE);
+    at
 }

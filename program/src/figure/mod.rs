@@ -11,6 +11,7 @@ mod boundary_sides;
 mod chart;
 mod chart_panel;
 mod check;
+mod curve;
 pub mod drawing;
 mod energy;
 mod film;
@@ -23,6 +24,7 @@ mod leaf;
 mod map;
 mod markers;
 mod modes;
+mod moments;
 mod page;
 mod panels;
 pub mod png;
@@ -61,7 +63,7 @@ mod tests {
     use crate::report::sample;
     use glam::DVec3;
     use leafdyn::relax::Mode;
-    use leafdyn::scenario::Scenario;
+    use leafdyn::scenario::{Grip, Hold, PointLoad, Scenario, Schedule, Wind};
     use leafdyn::simulate::{Record, Stopped};
 
     fn scenario() -> Scenario {
@@ -161,6 +163,87 @@ mod tests {
         assert_eq!(count(&pulled), [4, 1]);
         without.own_gravity = vec![[0.0, 0.0, -1.0]; 5];
         assert_eq!(count(&without), [4, 1]);
+    }
+
+    #[test]
+    fn wind_is_drawn_as_it_blows() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let count = |at: &[f64], velocity: &[[f64; 3]]| {
+            let mut windy = scenario();
+            windy.wind = Some(Wind {
+                velocity: Schedule {
+                    at: at.to_vec(),
+                    value: velocity.to_vec(),
+                },
+                density: 1.2,
+                drag: 2.0,
+                width: Vec::new(),
+            });
+            [leaf(&fan, &windy), filmstrip(&record, &windy)]
+                .map(|drawing| svg::text(&drawing).matches(">wind<").count())
+        };
+        assert_eq!(count(&[0.0], &[[1.0, 0.0, 0.0]]), [4, 1]);
+        // One that changes in every picture, as soon as it blows.
+        let until = record.moments[record.stills[2].moment].time;
+        let rising = [[0.0; 3], [0.0; 3], [1.0, 0.0, 0.0]];
+        let pictures = record.stills.len();
+        assert_eq!(
+            count(&[0.0, until, until + 1e-9], &rising),
+            [0, pictures - 3]
+        );
+    }
+
+    #[test]
+    fn grips_are_drawn_where_they_hold() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let mut held = scenario();
+        let grip = |vein: usize, at: [f64; 2], held: Hold| Grip {
+            vein,
+            at,
+            held,
+            displacement: [0.0; 3],
+        };
+        let drawn = |scenario: &Scenario| {
+            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|it| svg::text(&it))
+        };
+        let free = drawn(&held);
+        held.grips = vec![
+            grip(0, [0.25, 0.5], Hold::Clamped),
+            grip(3, [0.6; 2], Hold::Pinned),
+        ];
+        for (svg, free) in drawn(&held).iter().zip(&free) {
+            assert!(svg.contains(">pinned<") && !free.contains(">pinned<"));
+        }
+        // A stretch and both of its ends, and a point; and in the key.
+        let panels = [4, record.stills.len()];
+        for (k, panels) in panels.into_iter().enumerate() {
+            let paths = |svg: &str| svg.matches("<path").count();
+            assert_eq!(paths(&drawn(&held)[k]) - paths(&free[k]), 4 * panels + 1);
+        }
+    }
+
+    #[test]
+    fn moments_are_drawn_on_a_rod_as_they_act() {
+        let (rod, record) = (sample::fan(1, 8), sample::record(1, 8));
+        let drawn = |scenario: &Scenario| {
+            let paths = |drawing| svg::text(&drawing).matches("<path").count();
+            [leaf(&rod, scenario), filmstrip(&record, scenario)].map(paths)
+        };
+        let mut turned = sample::scenario("rod", 1);
+        let [rest, moving] = drawn(&turned);
+        turned.points = vec![PointLoad {
+            vein: 0,
+            at: 0.4,
+            force: [0.0; 3],
+            moment: [0.3, 0.2, 0.1],
+            mass: 0.0,
+        }];
+        let pictures = record.stills.len();
+        // An arc and its head in every panel.
+        assert_eq!(drawn(&turned), [rest + 8, moving + 2 * pictures]);
+        turned.points.clear();
+        turned.tip_moment = [0.0, 0.0, 0.5];
+        assert_eq!(drawn(&turned), [rest + 8, moving]);
     }
 
     #[test]

@@ -22,7 +22,7 @@ const AMPLITUDE: f64 = 0.2;
 pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let name = format!("{}: modes", equilibrium.scenario);
-    let rest = Veins::of(equilibrium);
+    let rest = Veins::of(equilibrium, scenario);
     let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
     let drawn = &modes[..modes.len().min(MOST)];
     let shapes = drawn.iter().map(|mode| displaced(equilibrium, &rest, mode));
@@ -44,7 +44,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
             let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
             let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
             for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
-                let scene = panels.begin(page, VIEWS.len() * index + k, view, caption);
+                let scene = panels.begin(page, (VIEWS.len() * index + k, 0.0), view, caption);
                 let width = THINNER * veins.line_width();
                 for vein in &rest.veins {
                     let path = vein.path(|point| scene.place(point));

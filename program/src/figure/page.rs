@@ -8,6 +8,7 @@ use crate::figure::layout::{Cell, RIGHT, TEXT_SIZE, TICK_SIZE, TITLE_SIZE, WIDTH
 use crate::figure::markers::{Marker, clamp_marker, tip_marker};
 use crate::figure::veins::Veins;
 use glam::DVec2;
+use leafdyn::scenario::Hold;
 
 const TITLE_BASE: f64 = 38.0;
 /// Base line of the notes.
@@ -70,6 +71,11 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
     x -= 26.0;
     text_before(page, &mut x, "clamp");
     clamp_marker(page, DVec2::new(x - 3.0, MIDDLE));
+    if veins.grips.iter().any(|grip| grip.held == Hold::Pinned) {
+        x -= 26.0;
+        text_before(page, &mut x, "pinned");
+        Marker::Triangle.draw(page, DVec2::new(x - 3.0, MIDDLE), INK);
+    }
     x - 10.0
 }
 

@@ -84,7 +84,8 @@ fn draw_flat(
         page.stroke(vein.path(place), stroke);
     }
     leaf_markers(page, veins, place);
-    camera.draw_gravity(page, setting.gravity, cell, veins.points().map(place));
+    let arrows = setting.arrows(true, 0.0);
+    camera.draw_arrows(page, &arrows, cell, veins.points().map(place));
 }
 
 /// Starts and lengths of columns and rows, and the pixels per length of the
@@ -157,6 +158,7 @@ impl Panels {
             title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
             scene.draw_axes(page, 38.0);
+            scene.draw_arrows(page, true, 0.0);
             scene.draw_leaf(page, veins, veins.line_width());
         });
     }
@@ -176,7 +178,7 @@ mod tests {
             [0.1, 2.0, 0.0],
             [0.0; 3],
         ] {
-            let mut veins = Veins::of(&sample::fan(3, 4));
+            let mut veins = Veins::of(&sample::fan(3, 4), &sample::scenario("fan", 3));
             veins.low = DVec3::ZERO;
             veins.high = DVec3::from_array(size);
             let found = Panels::below(0.0, &veins);

@@ -1,8 +1,8 @@
-//! Settings of figures from the scenario: units of length, and gravity.
+//! Settings of figures from the scenario: units of length, gravity and wind.
 
 use glam::DVec3;
 
-use leafdyn::scenario::{Scenario, Units};
+use leafdyn::scenario::{Scenario, Schedule, Units};
 
 /// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
 /// if it names one.
@@ -12,7 +12,17 @@ pub struct Setting {
     /// The longest rod, in the scenario's unit.
     length: f64,
     /// Direction of gravity, if there is any.
-    pub gravity: Option<DVec3>,
+    gravity: Option<DVec3>,
+    /// Velocity of the air, if there is wind.
+    wind: Option<Schedule<[f64; 3]>>,
+}
+
+/// A direction that is drawn as an arrow with its name.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrow {
+    /// Of length one.
+    pub direction: DVec3,
+    pub name: &'static str,
 }
 
 /// Names of the axes as fractions of L, with what they mean.
@@ -25,7 +35,25 @@ impl Setting {
             units: scenario.units.clone(),
             length: leafdyn::scenario::longest(&scenario.rods),
             gravity: weight(scenario).try_normalize(),
+            wind: scenario.wind.as_ref().map(|wind| wind.velocity.clone()),
         }
+    }
+
+    /// The arrows of the first panel, or of a later one, which shows what may differ from the first:
+    /// the wind at this time.
+    pub fn arrows(&self, first: bool, time: f64) -> Vec<Arrow> {
+        let gravity = self.gravity.filter(|_| first).map(|direction| Arrow {
+            direction,
+            name: "gravity",
+        });
+        let wind = self.wind.as_ref();
+        let wind = wind.filter(|wind| first || !wind.is_constant());
+        let direction = wind.and_then(|wind| DVec3::from_array(wind.at(time)).try_normalize());
+        let wind = direction.map(|direction| Arrow {
+            direction,
+            name: "wind",
+        });
+        gravity.into_iter().chain(wind).collect()
     }
 
     /// The value shown for a drawn length of 1.

@@ -85,16 +85,17 @@ impl<'s> SmallPanels<'s> {
     /// Draws a leaf with its letter and title in its panel.
     pub fn draw(&self, page: &mut Drawing, index: usize, veins: &Veins, caption: [&str; 2]) {
         let [letter, text] = caption;
-        let scene = self.begin(page, index, OBLIQUE, (letter, text, NOTE));
+        let scene = self.begin(page, (index, 0.0), OBLIQUE, (letter, text, NOTE));
         scene.draw_leaf(page, veins, THINNER * veins.line_width());
     }
 
-    /// Draws a panel in which a leaf can be drawn, with its letter and a title in a colour. The
-    /// first also shows the names of the axes and gravity.
+    /// Draws a panel in which a leaf can be drawn, by its number and time, with its letter and a
+    /// title in a colour. The first also shows the names of the axes and gravity, and each the wind
+    /// if that changes.
     pub fn begin(
         &self,
         page: &mut Drawing,
-        index: usize,
+        (index, time): (usize, f64),
         view: View,
         (letter, text, color): (&str, &str, Color),
     ) -> Scene<'s> {
@@ -106,6 +107,7 @@ impl<'s> SmallPanels<'s> {
         if index == 0 {
             scene.draw_names(page, 9.0, false);
         }
+        scene.draw_arrows(page, index == 0, time);
         scene
     }
 }

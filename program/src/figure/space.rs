@@ -6,9 +6,9 @@ use crate::figure::drawing::{
 };
 use crate::figure::font::Font;
 use crate::figure::layout::{Cell, TEXT_SIZE, TICK_SIZE};
-use crate::figure::markers::{draw_gravity, leaf_markers};
+use crate::figure::markers::{draw_arrow, leaf_markers};
 use crate::figure::round::{multiples, round_step};
-use crate::figure::setting::Setting;
+use crate::figure::setting::{Arrow, Setting};
 use crate::figure::veins::{Piece, Vein, Veins};
 use glam::{DVec2, DVec3};
 
@@ -117,17 +117,20 @@ impl Camera {
         corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low
     }
 
-    /// Draws the direction of gravity, if there is any, in a corner far from `taken`.
-    pub fn draw_gravity(
+    /// Draws arrows, each in a corner far from `taken` and from the others.
+    pub fn draw_arrows(
         &self,
         page: &mut Drawing,
-        gravity: Option<DVec3>,
+        arrows: &[Arrow],
         cell: Cell,
         taken: impl Iterator<Item = DVec2>,
     ) {
-        if let Some(gravity) = gravity {
-            let direction = self.turned(gravity) / self.scale;
-            draw_gravity(page, cell, taken, direction, self.toward.dot(gravity) > 0.0);
+        let mut taken: Vec<DVec2> = taken.collect();
+        for Arrow { direction, name } in arrows {
+            let shown = self.turned(*direction) / self.scale;
+            let toward = self.toward.dot(*direction) > 0.0;
+            let at = draw_arrow(page, cell, &taken, (shown, toward), name);
+            taken.push(at);
         }
     }
 }
@@ -249,7 +252,7 @@ impl<'s> Scene<'s> {
         }
     }
 
-    /// Draws the axes with their names at this distance from the edges, and gravity.
+    /// Draws the axes with their names at this distance from the edges.
     pub fn draw_axes(&self, page: &mut Drawing, distance: f64) {
         for Edge { out, ticks, .. } in &self.edges {
             for (point, text) in ticks {
@@ -262,14 +265,16 @@ impl<'s> Scene<'s> {
         self.draw_names(page, distance, true);
     }
 
+    /// The middles of the edges that have axes.
+    fn middles(&self) -> [DVec2; 3] {
+        let middle = |edge: &Edge| self.place(0.5 * (edge.from + edge.to));
+        self.edges.each_ref().map(middle)
+    }
+
     /// Draws the names of all axes at a distance from their edges, with units if values
-    /// are shown, and outside the box the direction of gravity.
+    /// are shown.
     pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
-        let middles = self
-            .edges
-            .each_ref()
-            .map(|edge| self.place(0.5 * (edge.from + edge.to)));
-        for (edge, middle) in self.edges.iter().zip(middles) {
+        for (edge, middle) in self.edges.iter().zip(self.middles()) {
             let at = middle + label_offset(edge.out, distance);
             let name = self.setting.brief_axis(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
@@ -283,10 +288,15 @@ impl<'s> Scene<'s> {
             };
             page.centered_label(at, &name, size, anchor, INK);
         }
+    }
+
+    /// Draws the directions of gravity and of the wind at a time outside the box, or in a panel that
+    /// is not the first what may differ from it.
+    pub fn draw_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
         let taken = corners([self.low, self.high]).map(|corner| self.place(corner));
-        let taken = taken.chain(middles);
-        self.camera
-            .draw_gravity(page, self.setting.gravity, self.cell, taken);
+        let taken = taken.chain(self.middles());
+        let arrows = self.setting.arrows(first, time);
+        self.camera.draw_arrows(page, &arrows, self.cell, taken);
     }
 
     /// Draws the shadows of all veins on the floor, the pieces of the veins, those

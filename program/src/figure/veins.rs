@@ -2,15 +2,16 @@
 
 use glam::{DVec2, DVec3};
 
+use super::curve::{is_drawable, stretch};
 use super::drawing::{Color, Path, Step, color_of_vein};
+use super::moments::{Moment, moments};
 use super::setting::Setting;
 use leafdyn::relax::{Equilibrium, RodShape};
+use leafdyn::scenario::{Hold, Scenario};
 use leafdyn::simulate::{Record, Still};
 
 /// Of a wider leaf only some veins are drawn: more could not be distinguished.
 const MOST_VEINS: usize = 200;
-/// Points farther away than this many lengths are diverged and not drawn.
-const FARTHEST: f64 = 1e4;
 /// Largest distance of a drawn curve from the computed points, in lengths: a
 /// quarter of a pixel.
 const MAX_DEVIATION: f64 = 3e-4;
@@ -39,11 +40,19 @@ impl Vein {
     }
 }
 
+/// A stretch of a vein, or a point, that a grip holds.
+pub struct Gripped {
+    pub points: Vec<DVec3>,
+    pub held: Hold,
+}
+
 pub struct Veins {
     pub veins: Vec<Vein>,
     pub count: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
+    pub grips: Vec<Gripped>,
+    pub moments: Vec<Moment>,
     /// Corners of the bounding box.
     pub low: DVec3,
     pub high: DVec3,
@@ -52,9 +61,11 @@ pub struct Veins {
 }
 
 impl Veins {
-    pub fn of(equilibrium: &Equilibrium) -> Self {
+    pub fn of(equilibrium: &Equilibrium, scenario: &Scenario) -> Self {
         let shape = &equilibrium.shape;
-        Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
+        let veins = Veins::through(&shape.curves, &equilibrium.tips, shape.longest());
+        let nodes = (&shape.curve_stations[..], &shape.curves[..]);
+        veins.loaded(scenario, scenario.tip_moment, nodes)
     }
 
     /// Where the veins that are drawn begin.
@@ -64,9 +75,36 @@ impl Veins {
     }
 
     /// The veins of a moving leaf at one instant.
-    pub fn at_instant(record: &Record, still: &Still) -> Self {
+    pub fn at_instant(record: &Record, still: &Still, scenario: &Scenario) -> Self {
         let tips = tips(&still.curves, record.joined);
-        Veins::through(&still.curves, &tips, record.length)
+        let veins = Veins::through(&still.curves, &tips, record.length);
+        let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
+        let on_tip = scenario.dynamics.tip_moment.at(time);
+        veins.loaded(scenario, on_tip, (&record.stations, &still.curves))
+    }
+
+    /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
+    /// stations.
+    fn loaded(
+        mut self,
+        scenario: &Scenario,
+        on_tip: [f64; 3],
+        (stations, curves): (&[f64], &[Vec<DVec3>]),
+    ) -> Self {
+        self.moments = moments(scenario, on_tip, |sigma| {
+            let point = stretch(stations, curves.first()?, [sigma; 2]).pop()? / self.unit;
+            is_drawable(point).then_some(point)
+        });
+        for grip in &scenario.grips {
+            let curve = curves.get(grip.vein).map_or(&[][..], Vec::as_slice);
+            let points = stretch(stations, curve, grip.at).into_iter();
+            let points = points.map(|point| point / self.unit);
+            self.grips.push(Gripped {
+                points: points.filter(|&point| is_drawable(point)).collect(),
+                held: grip.held,
+            });
+        }
+        self
     }
 
     /// Veins through these points, with the longest rod as the unit. Tips are extrapolated,
@@ -99,6 +137,8 @@ impl Veins {
             count,
             dots: Vec::new(),
             tips,
+            grips: Vec::new(),
+            moments: Vec::new(),
             low,
             high,
             unit,
@@ -131,6 +171,9 @@ impl Veins {
         let every = stride(self.count);
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
+        }
+        if !self.moments.is_empty() {
+            notes.push("curved arrows: moments".into());
         }
         notes
     }
@@ -180,11 +223,6 @@ pub fn tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
 pub fn longest<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f64 {
     let length = |curve: &Vec<DVec3>| curve.windows(2).map(|w| w[0].distance(w[1])).sum();
     curves.into_iter().map(length).fold(0.0, f64::max)
-}
-
-/// Whether a point, in lengths, is finite and not too far away to be drawn.
-pub fn is_drawable(point: DVec3) -> bool {
-    point.is_finite() && point.abs().max_element() < FARTHEST
 }
 
 /// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
@@ -306,7 +344,7 @@ mod tests {
     fn dots_are_few_enough_to_be_distinguished() {
         for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
             let leaf = sample::fan(rods, 64);
-            let mut veins = Veins::of(&leaf);
+            let mut veins = Veins::of(&leaf, &sample::scenario("fan", leaf.shape.rods.len()));
             veins.add_dots(&leaf.shape.rods);
             assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
             assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
@@ -316,7 +354,7 @@ mod tests {
     #[test]
     fn dots_away_from_the_leaf_are_in_the_box() {
         let leaf = sample::fan(3, 8);
-        let mut veins = Veins::of(&leaf);
+        let mut veins = Veins::of(&leaf, &sample::scenario("fan", leaf.shape.rods.len()));
         let mut rods = leaf.shape.rods.clone();
         rods[1].nodes[8].position.z = 3.0;
         veins.add_dots(&rods);

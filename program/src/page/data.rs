@@ -28,6 +28,9 @@ pub struct View {
     pub units: [Option<String>; 2],
     /// Gravity per length of vein.
     pub gravity: [f64; 3],
+    /// What grips hold.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub grips: Vec<Gripped>,
     /// The length of the longest vein.
     pub longest: f64,
     /// Whether the tips share one point.
@@ -46,6 +49,17 @@ pub struct View {
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
+}
+
+/// A stretch of a vein, or a point, that a grip holds.
+#[derive(Serialize)]
+pub struct Gripped {
+    /// The number of the vein from 1.
+    pub vein: usize,
+    /// Fractions of its length.
+    pub at: [f64; 2],
+    /// Whether its directions are held as well.
+    pub clamped: bool,
 }
 
 /// A shape of the leaf.

@@ -28,9 +28,9 @@ use crate::figure::drawing::{Drawing, color_of_vein};
 use crate::figure::svg::{self, hex};
 use crate::figure::veins::is_drawn;
 use crate::report::{Reported, json};
-pub use data::{Leaf, View};
+pub use data::{Gripped, Leaf, View};
 use glam::DVec3;
-use leafdyn::scenario::{self, Scenario, Units};
+use leafdyn::scenario::{self, Hold, Scenario, Units};
 use leafdyn::simulate::Record;
 use leafdyn::study::Trace;
 use std::io::{self, Write};
@@ -129,6 +129,13 @@ pub fn bare(scenario: &Scenario) -> View {
         summary: Vec::new(),
         units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
         gravity: scenario.gravity,
+        grips: (scenario.grips.iter())
+            .map(|grip| Gripped {
+                vein: grip.vein + 1,
+                at: grip.at,
+                clamped: grip.held == Hold::Clamped,
+            })
+            .collect(),
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
         joined: scenario.joined,

@@ -1,4 +1,4 @@
-// The leaf in space: veins as tubes, the surface between them, the clamp and the tip.
+// The leaf in space: veins as tubes, the surface between them, the clamp, the tip, and what grips hold.
 /// Of a tube only the half that faces the reader is drawn, in so many strips: fewer where no graphics processor helps, and
 /// a flat one of thin veins.
 const SOFTWARE = drawnBySoftware();
@@ -70,9 +70,36 @@ class LeafMesh {
     const block = new THREE.CylinderGeometry(3 * radius, 3 * radius, 3 * radius, 24);
     block.rotateX(Math.PI / 2);
     this.clamp = plain(block)();
+    this.grips = this.marks(leaf);
     this.group = new THREE.Group();
-    this.group.add(this.tubes, this.surface, this.clamp, ...this.tips);
+    this.group.add(this.tubes, this.surface, this.clamp, ...this.tips, ...this.grips.map(({ mark }) => mark));
     for (const part of [this.tubes, this.surface]) part.frustumCulled = false;
+  }
+
+  /// Marks on what grips hold, at its ends and at the nodes between: blocks where veins are clamped, and cones that point at them
+  /// where they are pinned.
+  marks({ stations }) {
+    const grips = (view.grips || []).map((grip) => ({ ...grip, j: view.drawn.indexOf(grip.vein) })).filter(({ j }) => j >= 0);
+    if (grips.length === 0) return [];
+    const [block, cone] = [new THREE.CylinderGeometry(2 * radius, 2 * radius, 2.8 * radius, 4), new THREE.CylinderGeometry(1.9 * radius, 0, 3.2 * radius, 12)];
+    block.rotateX(Math.PI / 2);
+    cone.rotateX(Math.PI / 2);
+    cone.translate(0, 0, 1.6 * radius);
+    const [blocks, cones] = [block, cone].map(plain);
+    const material = new THREE.MeshLambertMaterial({ vertexColors: true });
+    return grips.flatMap(({ j, at, clamped }) => {
+      const inside = stations.filter((sigma) => sigma > at[0] && sigma < at[1]);
+      const places = [...new Set([at[0], ...inside, at[1]].map((sigma) => this.fineAt(stations, sigma)))];
+      return places.map((i) => ({ place: 3 * (j * this.fine + i), mark: (clamped ? blocks : cones)(material) }));
+    });
+  }
+
+  /// The point nearest to a fraction of the length.
+  fineAt(stations, sigma) {
+    const after = stations.findIndex((at) => at >= sigma);
+    if (after < 1) return after === 0 ? 0 : this.fine - 1;
+    const part = (sigma - stations[after - 1]) / (stations[after] - stations[after - 1]);
+    return Math.round((after - 1 + part) * this.sub);
   }
 
   /// Takes over the shape of a leaf with as many nodes.
@@ -81,6 +108,7 @@ class LeafMesh {
     this.moved = true;
     const last = (j) => 3 * (j * this.fine + this.fine - 1);
     this.tips.forEach((tip, j) => tip.position.fromArray(this.points, last(j)));
+    this.grips.forEach(({ mark, place }) => mark.position.fromArray(this.points, place));
     const membrane = this.surface.geometry;
     membrane.attributes.position.needsUpdate = true;
     if (this.surface.visible) membrane.computeVertexNormals();
@@ -168,6 +196,7 @@ class LeafMesh {
   /// The parts that have one colour each.
   theme() {
     this.clamp.material.color.set(css("--clamp"));
+    this.grips.forEach(({ mark }) => mark.material.color.set(css("--clamp")));
     this.tips.forEach((tip) => tip.material.color.set(css("--accent")));
     this.surface.material.color.set(css("--membrane"));
   }

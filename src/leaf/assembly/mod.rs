@@ -29,8 +29,7 @@ impl DiscreteLeaf {
     }
 
     fn assemble_with<const MATRIX: bool>(&self, state: &State, system: &mut System) -> Sums {
-        system.moment = self.tip_moment();
-        let (arch, moment) = (system.arch, system.moment);
+        let arch = system.arch;
         each_group(system.parallel, &mut system.groups, |g, group| {
             let rods = Rods::new(self, state, g);
             run(arch, &mut Assemble::<MATRIX> { rods, group });
@@ -41,6 +40,7 @@ impl DiscreteLeaf {
                 + self.base_energy(state),
             turn: 0.0,
         };
+        self.add_moments(system);
         each_group(system.parallel, &mut system.groups, |g, group| {
             for j in rods_of(g, self.rods()) {
                 self.clear_held_components(j, &mut group.rhs);
@@ -51,12 +51,6 @@ impl DiscreteLeaf {
         });
         if MATRIX && self.tied() {
             self.hold_across(system);
-        }
-        if moment != DVec3::ZERO {
-            let last = &mut system.groups[0].rhs[self.segments() - 1];
-            for c in 0..3 {
-                last[c].0[0] += moment[c];
-            }
         }
         for group in &system.groups {
             total.energy += group.sums.energy;
@@ -160,10 +154,9 @@ impl DiscreteLeaf {
                 }
                 let load = self.load(state, j, i + 1);
                 force = load.force - g_x;
-                moment = load.moment - g_b;
+                moment = load.moment + self.moment_on(i + 1) - g_b;
                 largest = larger(largest, component(segment.gap));
             }
-            moment += self.tip_moment();
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
             // The holder balances the remaining force on a held tip.
             let [turned, held] = self.is_gripped(j, n);
@@ -195,7 +188,7 @@ impl DiscreteLeaf {
     }
 
     /// Potential energy of a state: elastic, of the coupling, and of the loads.
-    /// The dead moment on a rod's tip has no potential and is left out.
+    /// Dead moments on a rod have no potential and are left out.
     pub fn energy(&self, state: &State) -> f64 {
         let n = self.segments();
         let mut energy = self.base_energy(state);

@@ -5,10 +5,12 @@
 mod forces;
 mod held;
 mod leaves;
+mod moments;
 
 pub use crate::leaf::derivative::forces::{Forces, Response};
 use crate::leaf::derivative::held::HeldRate;
 use crate::leaf::derivative::leaves::{leaves, rest_rates};
+use crate::leaf::derivative::moments::moment_rates;
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, State, add};
@@ -24,7 +26,8 @@ pub struct LeafRate<'s> {
     coupling: Vec<DVec3>,
     gravity: DVec3,
     tip_force: DVec3,
-    tip_moment: DVec3,
+    /// Sigma and change of dead moments on a single rod.
+    moments: Vec<(f64, DVec3)>,
     held: Option<HeldRate>,
     /// The leaves that differ in the number, with their weights, if they have tissue, loads of
     /// single veins, or grips.
@@ -112,7 +115,7 @@ impl<'s> LeafRate<'s> {
             coupling: (0..rods - 1).map(coupling).collect(),
             gravity: vector(|s| s.gravity, scale.force() / scale.length),
             tip_force: vector(|s| s.tip_force, scale.force()),
-            tip_moment: vector(|s| s.tip_moment, scale.moment()),
+            moments: moment_rates(terms, scale.moment()),
             held: HeldRate::new(leaf, terms),
             leaves: match leaf.has_tissue()
                 || terms
@@ -130,11 +133,6 @@ impl LeafRate<'_> {
     /// The rates of displacement and rotation of the base of rod `j`.
     pub fn of_base(&self, j: usize) -> [DVec3; 2] {
         self.rods[j].base
-    }
-
-    /// Whether a dead moment on the tip changes.
-    pub fn changes_moment(&self) -> bool {
-        self.rods.len() == 1 && self.tip_moment != DVec3::ZERO
     }
 }
 
@@ -179,7 +177,6 @@ impl DiscreteLeaf {
         let mut forces = Forces::zeros(self.rods());
         let neighbours = self.each_of(rate);
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
-        let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.sections_unchanged() {
                 self.add_section_changes(segments, j, rod, &neighbours, &mut forces);
@@ -192,6 +189,7 @@ impl DiscreteLeaf {
                 self.add_base_motion(state, segments, j, rod.base, &mut forces);
             }
         }
+        self.add_moment_changes(rate, &mut forces);
         self.add_tissue_changes(state, &neighbours, &mut forces);
         let motion = self.held_motion(rate, &neighbours);
         self.add_held_motion(state, segments, motion, &mut forces);
@@ -260,10 +258,6 @@ impl DiscreteLeaf {
                 add(&mut forces.nodes[j + 1][i - 1], DVec3::ZERO, -pull);
             }
             add(&mut forces.nodes[j][i - 1], DVec3::ZERO, force);
-        }
-        if self.rods() == 1 {
-            let moment = self.load_factor * rate.tip_moment;
-            add(&mut forces.nodes[j][n - 1], moment, DVec3::ZERO);
         }
     }
 

@@ -9,8 +9,10 @@ mod across;
 mod additions;
 mod coupling;
 mod kernels;
+mod moments;
 mod solve;
 
+use self::moments::DeadMoments;
 pub use solve::Solved;
 
 use super::chain::{Chain, Increments, Masses, TipFactor, group_and_lane, of_lane, set_lane};
@@ -85,8 +87,8 @@ pub struct System {
     across: Vec<NodeBlock>,
     /// Nodes (from 0) that grips hold, with the components that are: these have no momentum.
     gripped: Vec<(usize, usize, Range<usize>)>,
-    /// Spatial dead moment on the tip of a single rod, as of the last assembly.
-    pub(super) moment: DVec3,
+    /// Dead moments on the nodes of a single rod, as of the last assembly.
+    pub(super) moments: DeadMoments,
 }
 
 /// Runs `f` over the groups, on all threads if `parallel`. Each group works on its
@@ -143,7 +145,7 @@ impl System {
                     (held.rod, held.node - 1, first..6)
                 })
                 .collect(),
-            moment: DVec3::ZERO,
+            moments: DeadMoments::default(),
         }
     }
 

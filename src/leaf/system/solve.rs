@@ -4,7 +4,7 @@
 //! one product with the sparse E.
 
 use super::kernels::{Advance, Coupled, Direction, Product};
-use super::{Group, Masses, System, each_group, rods_of};
+use super::{Masses, System, each_group, rods_of};
 use crate::lanes::{Four, run};
 use crate::leaf::chain::{Increments, TipFactor};
 use crate::leaf::state::Increment;
@@ -94,7 +94,7 @@ impl System {
             for group in &mut self.groups {
                 group.solution.copy_from_slice(&group.z);
             }
-            return match self.moment == DVec3::ZERO || self.correct_for_moment() {
+            return match self.moments.is_empty() || self.correct_for_moments() {
                 true => Solved::Yes(1),
                 false => Solved::Singular,
             };
@@ -257,46 +257,6 @@ impl System {
             true => (self.groups.par_iter_mut()).zip(&mut self.p).for_each(turn),
             false => self.groups.iter_mut().zip(&mut self.p).for_each(turn),
         }
-    }
-
-    /// A dead moment M is not conservative in three dimensions: the derivative of the tip's
-    /// moment balance in spatial increments gains -[M]/2, which is skew. It has rank two at
-    /// one node and is included by the Sherman-Morrison-Woodbury formula. False if the matrix
-    /// with it is singular.
-    fn correct_for_moment(&mut self) -> bool {
-        use nalgebra::{Matrix3, Vector3};
-        let (last, arch) = (self.segments - 1, self.arch);
-        let group = &mut self.groups[0];
-        let m = 0.5 * self.moment;
-        let skew = Matrix3::new(0.0, m.z, -m.y, -m.z, 0.0, m.x, m.y, -m.x, 0.0);
-        // z = B^-1 times a moment on the tip; returns the tip's rotation.
-        let solve = |group: &mut Group, moment: [f64; 3]| {
-            group.residual.fill(Increments::default());
-            for c in 0..3 {
-                group.residual[last][c].0[0] = moment[c];
-            }
-            group.matrix.forward(arch, &group.residual, &mut group.z);
-            (group.matrix).backward(arch, &group.residual, &mut group.z);
-            Vector3::from_fn(|c, _| group.z[last][c].0[0])
-        };
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let columns = axes.map(|axis| solve(group, axis));
-        let small = Matrix3::identity() + skew * Matrix3::from_columns(&columns);
-        let Some(inverse) = small.try_inverse() else {
-            return false;
-        };
-        let turn = Vector3::from_fn(|c, _| group.solution[last][c].0[0]);
-        let moment: Vector3<f64> = inverse * (skew * turn);
-        if !moment.iter().all(|component| component.is_finite()) {
-            return false;
-        }
-        solve(group, moment.into());
-        for (solution, z) in group.solution.iter_mut().zip(&group.z) {
-            for c in 0..6 {
-                solution[c].0[0] -= z[c].0[0];
-            }
-        }
-        true
     }
 }
 

@@ -21,6 +21,7 @@ mod advance;
 mod applied;
 mod fictitious;
 mod kernel;
+mod moments;
 mod packs;
 mod stable;
 #[cfg(test)]
@@ -40,6 +41,7 @@ use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
 use glam::{DQuat, DVec3};
 use kernel::{Array, Block, Law, Layout, Step};
+use moments::Moments;
 use packs::{Pack, vector};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -73,6 +75,8 @@ pub struct Explicit {
     block: Block,
     /// What acts on the nodes besides segments, coupling and loads, if anything does.
     applied: Option<Applied>,
+    /// The dead moments of a step.
+    moments: Moments,
     /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     /// Length of rods whose loads act on it.
@@ -122,6 +126,7 @@ impl Explicit {
             positions,
             layout,
             applied: Applied::new(&leaf, &physics, layout),
+            moments: Moments::default(),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_weight: (0..count).map(tip_weight).sum(),
@@ -247,7 +252,8 @@ impl Explicit {
         let before_kick = self.power(&loads);
         let mut work = 0.0;
         let last = self.leaf.segments();
-        let (rotation, before) = (self.rotation(0, last), self.moving(0, last));
+        let before = self.moving(0, last).0;
+        (self.moments).begin(self.leaf.moments_of(loads), self.layout, &self.packs);
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.widths;
             let ahead = if last > 0.0 {
@@ -275,8 +281,8 @@ impl Explicit {
             if let Some(applied) = &self.applied {
                 force += applied.on_tips(self.layout);
             }
-            let after = keep * before.0 + force * (kick / mass);
-            energy += mass * (0.5 * (before.0 + after)).length_squared();
+            let after = keep * before + force * (kick / mass);
+            energy += mass * (0.5 * (before + after)).length_squared();
             let tip = vector(&self.next, self.layout.at(0, last)) + drift * after;
             for (p, pack) in self.packs.iter_mut().enumerate() {
                 for (k, j) in self.layout.rods_of(p).enumerate() {
@@ -292,11 +298,7 @@ impl Explicit {
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_wind(|j, i| self.moving(j, i).0);
         }
-        if loads.tip_moment != DVec3::ZERO {
-            let momentum = 0.5 * (before.1 + self.moving(0, last).1);
-            let spin = self.packs[0].spin(self.layout.place(0, last).1, rotation, momentum);
-            work += length * loads.tip_moment.dot(spin);
-        }
+        work += length * self.moments.power(self.layout, &self.packs);
         if self.physics.rest_changes() {
             work += self.work.of_rest(rest, bent, length, self.widths[0]);
         }
@@ -328,7 +330,7 @@ impl Explicit {
             loads.tip_force = DVec3::ZERO;
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (positions, leaf) = (&self.positions, &self.leaf);
+        let (positions, leaf, moments) = (&self.positions, &self.leaf, self.moments.all());
         let applied = self.applied.as_ref().map(Applied::loads);
         let coupled = leaf.coupled();
         let one = |block: &mut Block, p: usize, pack: &mut Pack, next: [&mut [f64]; 3]| {
@@ -348,6 +350,7 @@ impl Explicit {
                 past: &mut pack.past,
                 law,
                 loads,
+                moments,
                 keep,
                 kick,
                 drift,

@@ -70,11 +70,11 @@ impl SemiImplicit {
                 |rest: f64| self.bending(&self.trial, rest) + self.bending(&self.state, rest);
             work += 0.5 * (bending(self.physics.rest(to)) - bending(self.physics.rest(from)));
         }
-        let moments = [from, to].map(|time| self.physics.loads(time).tip_moment);
-        if self.leaf.rods() == 1 && moments != [DVec3::ZERO; 2] {
-            let tip = self.state.x.len() - 1;
-            let turn = rotation::log(self.state.q[tip] * self.trial.q[tip].conjugate());
-            work += 0.5 * (moments[0] + moments[1]).dot(turn);
+        for time in [from, to] {
+            for (node, moment) in self.leaf.moments_of(self.physics.loads(time)) {
+                let turn = rotation::log(self.state.q[node] * self.trial.q[node].conjugate());
+                work += 0.5 * moment.dot(turn);
+            }
         }
         work
     }

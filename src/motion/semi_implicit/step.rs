@@ -200,7 +200,7 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.each(1..=n) {
             let k = self.state.base(j) + i;
-            let [turns, shifts] = self.leaf.moves(j, i);
+            let [_, shifts] = self.leaf.moves(j, i);
             let mass = self.inertia[k].mass;
             let linear = match i == n {
                 true if together => tip.0 / tip.1,
@@ -210,9 +210,11 @@ impl SemiImplicit {
             if shifts {
                 self.moving[k].a[1] += linear;
             }
-            if i == n && turns && self.leaf.rods() == 1 {
-                let tensor = self.inertia[k].tensor(self.state.q[k]);
-                self.moving[k].a[0] += tensor.inverse() * loads.tip_moment;
+        }
+        for (node, moment) in self.leaf.moments_of(loads) {
+            if self.leaf.moves(0, node)[0] {
+                let tensor = self.inertia[node].tensor(self.state.q[node]);
+                self.moving[node].a[0] += tensor.inverse() * moment;
             }
         }
     }

@@ -314,7 +314,7 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
             None => tip.n = leaf.tip_force(j),
         }
         if !clamped {
-            tip.m = leaf.tip_moment();
+            tip.m = leaf.moment_at(1.0);
         }
     }
 }

@@ -191,8 +191,8 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
         Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
             return Err(RelaxError::ChangingWind);
         }
-        Method::SemiImplicit(_) if scenario.tip_moment != [0.0; 3] => {
-            "a leaf under load.tip_moment"
+        Method::SemiImplicit(_) if scenario.has_moments() => {
+            "a leaf under load.tip_moment or load.point.moment"
         }
         Method::SemiImplicit(_) if !scenario.grips.is_empty() => "a leaf held by [[grip]]",
         Method::SemiImplicit(_) => return Ok(()),

@@ -4,7 +4,6 @@ use crate::leaf::{Leaf, Loads};
 use crate::relax::path::{Path, Route};
 use crate::relax::request::method::{Method, SemiImplicit};
 use crate::relax::request::options::Options;
-use glam::DVec3;
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
@@ -92,7 +91,7 @@ impl<'a> Problem<'a> {
             && !released
             && !self.leaf.is_held()
             && self.leaf.loads != Loads::default()
-            && self.leaf.loads.tip_moment == DVec3::ZERO
+            && !self.leaf.loads.has_moments()
     }
 
     /// Whether a leaf that was released may be loaded slowly.
@@ -104,7 +103,7 @@ impl<'a> Problem<'a> {
         settles
             && self.options.route == Route::Loading
             && !self.leaf.is_held()
-            && self.leaf.loads.tip_moment == DVec3::ZERO
+            && !self.leaf.loads.has_moments()
             && !self.out_of_time()
     }
 
@@ -114,7 +113,7 @@ impl<'a> Problem<'a> {
             return Some(Path::STABLE);
         }
         let released = self.options.route == Route::Release && !self.keeps_unstable();
-        let moved = self.leaf.is_held() || self.leaf.loads.tip_moment != DVec3::ZERO;
+        let moved = self.leaf.is_held() || self.leaf.loads.has_moments();
         (released && !moved).then_some(Path::Released)
     }
 

@@ -228,7 +228,7 @@ pub fn outcome(
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
                 _ => Outcome::Converged,
             },
-            found.index.is_none().then(|| match problem.leaf.loads.tip_moment == DVec3::ZERO {
+            found.index.is_none().then(|| match !problem.leaf.loads.has_moments() {
                 _ if problem.leaf.in_wind() => "wind has no potential: energy and eigenvalues are not stated; the leaf rests where its damped motion \
                      came to rest, and is stable as that motion is".into(),
                 true => "the leaf is too large, or rounding on so many segments too much, to count its negative eigenvalues: \
@@ -306,19 +306,21 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
         .unwrap_or(0);
     let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
     let loads = problem.leaf.loads;
-    let [weight, tip, moment] =
-        [loads.gravity, loads.tip_force, loads.tip_moment].map(|load| load.length());
+    let [weight, tip] = [loads.gravity, loads.tip_force].map(|load| load.length());
+    let moment = problem.leaf.moments().map(|(_, moment)| moment);
+    let moment = moment.max_by(|a, b| a.length().total_cmp(&b.length()));
     // Along the directors at the base a moment shows what it turns; forces turn by their arms.
     let base = level.state.q[level.state.base(vein)];
-    let turned = match moment > weight.max(tip) {
-        true => (base.conjugate() * loads.tip_moment).abs() / stiffness,
-        false => stiffness.recip(),
+    let turned = match moment.filter(|moment| moment.length() > weight.max(tip)) {
+        Some(moment) => (base.conjugate() * moment).abs() / stiffness,
+        None => stiffness.recip(),
     };
     let softest = ["torsion", "bending_2", "bending_3"][turned.max_position()];
     let named = [
         (weight * problem.leaf.rods() as f64, "load.gravity"),
         (tip, "load.tip_force"),
-        (moment, "load.tip_moment"),
+        (loads.tip_moment.length(), "load.tip_moment"),
+        (problem.leaf.largest_on_points(), "load.point.moment"),
     ];
     let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
     let counts = |(size, _): &&(f64, _)| *size > COUNTS * largest;
@@ -333,7 +335,7 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
         }
         _ => String::new(),
     };
-    let otherwise = match moment > 0.0 && problem.leaf.held.is_none() {
+    let otherwise = match moment.is_some() && problem.leaf.held.is_none() {
         true => ", or try the method shooting",
         false => "",
     };

@@ -176,10 +176,9 @@ impl Grid<'_> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
         let mut linear = Linearized::new(self.level, self.tolerance);
         let forces = linear.forces(self.level, rates);
-        let moment = leaf.tip_moment();
         // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
         let physics = Physics::new(&leaf.leaf);
-        let modes = match self.modes > 0 && moment == DVec3::ZERO {
+        let modes = match self.modes > 0 && !leaf.has_moments() {
             true => modes::loaded(leaf, state, self.modes),
             false => None,
         };
@@ -188,7 +187,7 @@ impl Grid<'_> {
         let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
         let (tip_held, held) = (leaf.leaf.held.is_some(), leaf.leaf.is_held());
-        if forces.len() > MOST_DIRECT && modes.is_empty() && moment == DVec3::ZERO && !held {
+        if forces.len() > MOST_DIRECT && modes.is_empty() && !leaf.has_moments() && !held {
             return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
         }
         let responses = linear.responses(self.level, &forces)?;
@@ -198,12 +197,15 @@ impl Grid<'_> {
             let differences = !near.is_empty() && (held || !modes.is_empty());
             let near = differences.then(|| Nearby::new(self.level, near, change));
             let of_modes = (near.iter())
-                .filter(|_| !rate.changes_moment())
+                .filter(|_| !rate.changes_moments())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
             let n = leaf.segments();
             let tip = |j: usize| shift(&response.nodes[j][n - 1]);
-            // The work of a dead moment is not part of the energy.
-            let work = moment.dot(turn(&response.nodes[0][n - 1]));
+            // The work of dead moments is not part of the energy.
+            let works = leaf
+                .moments()
+                .map(|(node, moment)| moment.dot(turn(&response.nodes[0][node - 1])));
+            let work: f64 = works.sum();
             [
                 self.tips().map(tip).collect(),
                 vec![DVec3::X * (forces.energy + work)],

@@ -42,9 +42,9 @@ impl Linearized {
         let mut system = System::new(leaf);
         leaf.assemble(state, &mut system);
         leaf.hold_turn(state, &mut system);
-        let factorized = match leaf.tip_moment() == DVec3::ZERO {
-            true => system.factorize(0.0),
-            false => system.factorize_indefinite(),
+        let factorized = match leaf.has_moments() {
+            false => system.factorize(0.0),
+            true => system.factorize_indefinite(),
         };
         Linearized {
             system,

@@ -101,13 +101,17 @@ fn settle_upright(
         | InitialGuess::Predicted(state)
         | InitialGuess::Pushed(state) => state,
     };
+    let dead_moment = leaf.has_moments();
     let mut moved = false;
     match grip {
+        // Dead moments act once it is held: only without them the path has an energy to follow.
+        true if dead_moment => {
+            (state, _, moved) = move_grips(problem, &leaf.without_moments(), state, effort);
+        }
         true => (state, near_rest, moved) = move_grips(problem, &leaf, state, effort),
         false => leaf.hold(&mut state),
     }
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
-    let dead_moment = leaf.tip_moment() != DVec3::ZERO;
     let windy = leaf.leaf.in_wind();
     // What was held without wind is not at rest in it; two grids must lead to the same place.
     near_rest &= !(windy && from_start);

@@ -20,7 +20,7 @@ const LOOSE: f64 = 1e-3;
 const COARSEST_OF_BLADES: usize = 16;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
-/// tip moment alone determine it, and the largest allowed at rest on the coarsest grid of a
+/// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
 /// loose tolerance.
 pub const COARSEST_TURN: f64 = 0.8;
 
@@ -46,7 +46,7 @@ pub fn least(method: Method, tolerance: f64, shape_alone: bool) -> usize {
 }
 
 /// Segments of a grid: as requested, or at least `least` and as many as the kinks of the
-/// profiles, the rest shape and the tip moment need.
+/// profiles, the rest shape and the dead moments need.
 pub fn check_segments(
     leaf: &Leaf,
     requested: Option<usize>,
@@ -75,7 +75,7 @@ pub fn check_segments(
 
 /// Segments of the coarsest grid.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
-    let moment = leaf.loads.tip_moment.length();
+    let moment = leaf.integral_of_moments();
     let turn = |j: usize| {
         let section = leaf.section(j, 0.5, 1.0);
         let bending = moment / section.couple_stiffness.min_element();

@@ -165,7 +165,7 @@ impl CaseAt {
     /// respect to all numbers. `None` if solving for each number takes no more work.
     pub fn tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
         let leaf = &self.at.levels[0].leaf;
-        let symmetric = !leaf.leaf.is_held() && leaf.tip_moment() == DVec3::ZERO;
+        let symmetric = !leaf.leaf.is_held() && !leaf.has_moments();
         let tip = |component: &Component| match component.what {
             Compared::Result(Quantity::Tip(axis)) => Some(axis),
             _ => None,

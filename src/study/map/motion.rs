@@ -82,7 +82,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
     }
     let rods = shape_of(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
     let index = index_near(scenario, grid.clone(), &rods, SAME_LEAF * leaf.scale.length);
-    if index.is_none() && leaf.loads.tip_moment == DVec3::ZERO {
+    if index.is_none() && !leaf.loads.has_moments() {
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;

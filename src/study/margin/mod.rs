@@ -16,7 +16,7 @@ use crate::limit::Limit;
 use crate::memory;
 use crate::relax::{
     Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, relax_on_grids,
-    without_grips, without_wind,
+    without_wind,
 };
 use crate::scenario::Scenario;
 
@@ -41,7 +41,9 @@ pub enum MarginError {
     #[error("a margin is that of a relaxed leaf: use the method semi-implicit")]
     Method,
     /// Without energy there is neither an index nor a barrier.
-    #[error("a dead moment on the tip has no potential, hence no barrier; use loads that have")]
+    #[error(
+        "a dead moment (load.tip_moment, load.point.moment) has no potential, hence no barrier; use loads that have"
+    )]
     Moment,
 }
 
@@ -75,6 +77,9 @@ const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any 
 const TURNS: &str = "the leaf turns about its base without resistance, towards any push across that axis: only \
      pushes along it are tried";
 
+/// Remark where none is tried.
+const TIP_HELD: &str = "the tip is held: a force on it moves nothing";
+
 /// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
 pub fn relax_with_margin(
@@ -85,10 +90,9 @@ pub fn relax_with_margin(
     if options.method.is_shooting() {
         return Err(MarginError::Method);
     }
-    if scenario.tip_moment != [0.0; 3] {
+    if scenario.has_moments() {
         return Err(MarginError::Moment);
     }
-    without_grips(scenario, "the margin")?;
     without_wind(scenario, "the margin")?;
     let (mut leaf, found) = relax_on_grids(scenario, options, false, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
@@ -202,10 +206,10 @@ fn margin(
         a.total_cmp(&b)
     });
     let (barrier, climbs) = barrier::barrier(&stable, starts, weight);
-    let held = scenario.held_tip.is_some();
+    let held = scenario.holds_all_tips();
     let remark = match options.limit.reached() {
         true => Some("the time allowed was over before all was tried".into()),
-        false if held => Some("the tip is held: a force on it moves nothing".into()),
+        false if held => Some(TIP_HELD.into()),
         false => (rest.stability.neutral_directions > 0).then(|| TURNS.into()),
     };
     Ok(Margin {
@@ -321,10 +325,10 @@ fn is_own_image(scenario: &Scenario, rest: &Equilibrium) -> bool {
     is_mirrored(scenario) && are_mirrored(&rest.shape.rods, distance, angle)
 }
 
-/// The directions of the pushes: none if the tip is held; for a mirror-symmetric leaf only the
+/// The directions of the pushes: none if all tips are held; for a mirror-symmetric leaf only the
 /// first of two that are mirror images.
 fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
-    if scenario.held_tip.is_some() {
+    if scenario.holds_all_tips() {
         return Vec::new();
     }
     // Veins that turn without resistance turn towards any push across their axis.

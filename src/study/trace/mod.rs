@@ -93,7 +93,7 @@ impl TraceRequest {
         if self.vary.values.len() < 2 {
             return Err(refuse("FROM and TO are the same"));
         }
-        if self.base.scenario().tip_moment != [0.0; 3] {
+        if self.base.scenario().has_moments() {
             return Err(refuse(NO_MOMENT));
         }
         if self.most_points < 2 {
@@ -103,5 +103,4 @@ impl TraceRequest {
     }
 }
 
-const NO_MOMENT: &str =
-    "a dead moment on the tip has no potential: there is no index to follow; use loads that have";
+const NO_MOMENT: &str = "a dead moment (load.tip_moment, load.point.moment) has no potential: there is no index to follow; use loads that have";

@@ -6,6 +6,9 @@ use crate::scenario::{Key, Part};
 /// Entries of a list that are told one by one; of longer ones only their common factor.
 const MOST_ENTRIES: usize = 9;
 
+/// What is displaced from zero is by so much of the length.
+const DISPLACED: f64 = 0.1;
+
 /// A number of a scenario.
 #[derive(Clone, Debug)]
 pub struct Number {
@@ -54,9 +57,10 @@ impl Base {
         let keys = Keys(vec![Target::Entry(part)]);
         let value = self.entries.number_at(part)?;
         let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance;
+        let is_length = part.key.dimension() == [1, 0, 0];
         can_vary.then(|| Number {
             value,
-            unit: keys.unit(self.scenario()),
+            unit: keys.unit(self.scenario()) * if is_length { DISPLACED } else { 1.0 },
             positive: keys.is_positive(),
             whole: keys.is_whole(),
             description: part.key.description(),

@@ -20,6 +20,7 @@ pub use self::material::{Material, Node, blocks};
 use self::segments::{Nodes, SegmentSums};
 use crate::lanes::{Lanes, WIDTH};
 use crate::leaf::Loads;
+use glam::DVec3;
 use pulp::Simd;
 use std::sync::Arc;
 
@@ -122,6 +123,8 @@ pub struct Step<'a> {
     pub law: Law,
     /// Without the force on a shared tip.
     pub loads: Loads,
+    /// Nodes and sizes of the dead moments on a single rod.
+    pub moments: &'a [(usize, DVec3)],
     pub keep: f64,
     pub kick: f64,
     pub drift: f64,
@@ -182,7 +185,15 @@ impl pulp::WithSimd for Step<'_> {
                     for c in 0..3 {
                         totals.last_force[c] += block.n[c][WIDTH + tip - 1];
                         block.n[c][WIDTH + tip] = self.loads.tip_force[c];
-                        block.left[c][WIDTH + tip] = 2.0 * self.loads.tip_moment[c];
+                        block.left[c][WIDTH + tip] = 0.0;
+                    }
+                }
+            }
+            for (node, moment) in self.moments {
+                let node = node.wrapping_sub(start);
+                if node < count {
+                    for c in 0..3 {
+                        block.left[c][WIDTH + node] += 2.0 * moment[c];
                     }
                 }
             }

@@ -20,7 +20,6 @@ use crate::relax::request::options::RelaxError;
 use crate::relax::saddle;
 use crate::relax::settle::methods::Relaxation;
 use crate::scenario::Rod;
-use glam::DVec3;
 
 /// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
 const CHECK_INTERVAL: f64 = 0.25;
@@ -62,8 +61,8 @@ const BUDGET: usize = 600_000_000;
 const RIGID: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
 
-const FOLLOWS: &str = "under load.tip_moment, which has no potential, motion need not come to \
-     rest; use semi-implicit, or shooting";
+const FOLLOWS: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
+     need not come to rest; use semi-implicit, or shooting";
 
 /// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
 /// which may drive a motion forever.
@@ -76,7 +75,7 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     if leaf.scenario().rods.iter().any(rigid) {
         return refuse(RIGID);
     }
-    if leaf.loads.tip_moment != DVec3::ZERO {
+    if leaf.loads.has_moments() {
         return refuse(FOLLOWS);
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! A single rod under a dead moment at its tip.
+//! A single rod under dead moments, at its tip or along it.
 //!
 //! A moment fixed in space has no potential in three dimensions, so that
 //! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
@@ -6,15 +6,17 @@
 //! about one radian of tip rotation, each followed by Newton's method with the
 //! exact, unsymmetric tangent.
 //!
-//! Where that would take too many steps, the other loads grow from the shape under the moment
-//! alone. The moment is the same along the whole rod, so that this shape can be computed
-//! segment by segment from the clamp.
+//! Where that would take too many steps, the other loads grow from the shape under the moments
+//! alone. A free rod carries at every place the sum of those beyond it, so that this shape can be
+//! computed segment by segment from the clamp.
 //!
-//! Where the path ends at a fold, the moment is applied before the other loads, or after them.
+//! Where the path ends at a fold, the moments are applied before the other loads, or after them. A
+//! rod that is held elsewhere than at its base is brought there under the other loads, by their
+//! energy, before the moments are applied.
 
 use crate::homotopy::Homotopy;
 use crate::largest::larger;
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, State, System};
 use crate::newton::{Equations, Newton, Stop};
 use crate::relax::settle::methods::Relaxation;
 use crate::rod::{RESOLVED_TURN, Section};
@@ -37,10 +39,11 @@ const SMALLEST_STEP: f64 = 1e-6;
 /// grid.
 const COARSE: f64 = 0.5 * RESOLVED_TURN;
 
-/// Rotation (radians) beyond which the moment is not applied in steps, and the largest number
-/// of steps of the other loads in that case.
+/// Rotation (radians) beyond which the moments on a free rod are not applied in steps, and the
+/// largest number of steps of the other loads in that case; and of the moments on a held rod.
 const LARGEST_BY_STEPS: f64 = 250.0;
 const MAX_STEPS: usize = 100;
+const MAX_STEPS_HELD: usize = 1000;
 
 /// Newton iterations for the rotation of one segment, the step (radians) at which they end,
 /// and the step of their finite differences, radians.
@@ -51,7 +54,7 @@ const DIFFERENCE: f64 = 1e-7;
 /// Squared half rotation below which series replace quotients that tend to 0/0.
 const SMALL: f64 = 1e-5;
 
-/// The parts of the moment and of the other loads that are applied after a part of the loading.
+/// The parts of the moments and of the other loads that are applied after a part of the loading.
 type Order = fn(f64) -> [f64; 2];
 
 /// Orders of loading: the path may end at a fold in one of them, and pass it in another.
@@ -60,6 +63,9 @@ const ORDERS: [Order; 3] = [
     |part| [2.0 * part, 2.0 * part - 1.0],
     |part| [2.0 * part - 1.0, 2.0 * part],
 ];
+
+/// That of a held rod, which the other loads act on from the beginning.
+const HELD: Order = |part| [part, 1.0];
 
 /// Loads the rod from its rest shape, or corrects a state near rest.
 pub fn settle(
@@ -70,14 +76,17 @@ pub fn settle(
     if rod.near_rest {
         return newton(leaf, system, rod, rod.accuracy);
     }
-    if largest_turn(&leaf.leaf) > LARGEST_BY_STEPS {
+    if is_wound(&leaf.leaf) {
         shape_by_moment(leaf, &mut rod.state)?;
         return load(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
     }
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
-    let turn = leaf.leaf.loads.tip_moment.length() * leaf.leaf.length(0) / softest;
+    let turn = leaf.leaf.integral_of_moments() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    if leaf.leaf.is_held() {
+        return load(leaf, system, rod, HELD, (step, MAX_STEPS_HELD));
+    }
     let unloaded = rod.state.clone();
     let mut end = Err(Stop::StepLimit);
     for order in ORDERS {
@@ -86,7 +95,7 @@ pub fn settle(
         if end.is_ok() || end == Err(Stop::Unresolved) || rod.limit.reached() {
             break;
         }
-        // In the others the moment is applied in half of the loading.
+        // In the others the moments are applied in half of the loading.
         step = 0.5 / (turn / TURN_PER_STEP).ceil().max(1.0);
     }
     end
@@ -125,10 +134,12 @@ fn load(
         }
         steps -= 1;
         let part = path.next();
-        let [moment, others] = order(part).map(|part| part.clamp(0.0, 1.0));
-        leaf.loads.tip_moment = moment * loads.tip_moment;
-        leaf.loads.gravity = others * loads.gravity;
-        leaf.loads.tip_force = others * loads.tip_force;
+        let [moments, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        leaf.loads = Loads {
+            tip_moment: moments * loads.tip_moment,
+            moments: moments * loads.moments,
+            ..loads * others
+        };
         let wanted = match part < 1.0 {
             true => STEP_ACCURACY,
             false => rod.accuracy,
@@ -155,37 +166,37 @@ fn load(
     end
 }
 
-/// Upper bound on the rotation of the tip (radians) by the moment: as if only the softest
-/// stiffness resisted it.
-fn largest_turn(leaf: &Leaf) -> f64 {
-    let moment = leaf.loads.tip_moment.length();
+/// Whether moments turn the tip of a free rod so far (at most, as if only the softest stiffness
+/// resisted them) that they are not applied in steps.
+fn is_wound(leaf: &Leaf) -> bool {
     let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
-    moment * leaf.length(0) / softest
+    let turn = leaf.integral_of_moments() * leaf.length(0) / softest;
+    turn > LARGEST_BY_STEPS && !leaf.is_held()
 }
 
-/// The largest curvature (radians per length) of the rod under a large moment alone; `None` if
-/// the moment is small, or too large for a grid of `segments` segments.
+/// The largest curvature (radians per length) of the rod under large moments alone; `None` if
+/// these are small, or too large for a grid of `segments` segments.
 pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
-    if largest_turn(leaf) <= LARGEST_BY_STEPS {
+    if !is_wound(leaf) {
         return None;
     }
     let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
     let (_, mut base) = leaf.leaf.base(0);
     let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
-    for section in &leaf.sections {
-        turn = segment_turn(section, base, leaf.tip_moment(), turn)?;
+    for (i, section) in leaf.sections.iter().enumerate() {
+        turn = segment_turn(section, base, leaf.moment_beyond(i), turn)?;
         largest = larger(largest, turn.length() / section.ds);
         base = (base * rotation::exp(turn)).normalize();
     }
     Some(largest)
 }
 
-/// Sets the state to the shape under the moment alone.
+/// Sets the state to the shape under the moments alone.
 fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
     let mut turn = DVec3::ZERO;
     for (i, section) in leaf.sections.iter().enumerate() {
         let base = state.q[i];
-        turn = segment_turn(section, base, leaf.tip_moment(), turn).ok_or(Stop::Unresolved)?;
+        turn = segment_turn(section, base, leaf.moment_beyond(i), turn).ok_or(Stop::Unresolved)?;
         let next = (base * rotation::exp(turn)).normalize();
         state.q[i + 1] = next;
         state.x[i + 1] =
