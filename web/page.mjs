@@ -18,15 +18,16 @@ const scenarios = folders.flatMap((folder) =>
 );
 // Within a script only `</script` and `<!--` are special.
 const data = (object) => JSON.stringify(object).replaceAll("<", "\\u003c");
+const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");
 const part = {
   STYLE: read(pages, "page.css") + read("page/live.css"),
-  THREE: read(pages, "three/three.min.js"),
+  THREE: packed(readFileSync(join(web, pages, "three/three.min.js"))),
   STAGE: ["data.js", "space.js", "axes.js", "chart.js", "stage.js"].map((name) => read(pages, name)).join("\n") + read("page/leaf.js"),
   SCRIPT: ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "main.js"].map((name) => read("page", name)).join("\n"),
   WORKER: read("page/worker.js"),
   GALLERY: data(scenarios),
   GIVEN: "null",
-  SOLVER: gzipSync(readFileSync(process.argv[2]), { level: 9 }).toString("base64"),
+  SOLVER: packed(readFileSync(process.argv[2])),
   LICENCES: [read("../LICENSE-MIT"), read(pages, "three/LICENSE-three.txt")].join("\n\n").replaceAll("&", "&amp;").replaceAll("<", "&lt;"),
 };
 const page = read("page/live.html").replaceAll(/\{\{(\w+)\}\}/g, (_, name) => part[name]);

@@ -7,6 +7,7 @@
 
 mod figure;
 pub mod files;
+pub mod live;
 pub mod page;
 mod report;
 #[cfg(not(target_family = "wasm"))]

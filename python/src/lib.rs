@@ -7,6 +7,7 @@ mod arrays;
 mod dictionary;
 mod errors;
 mod fit;
+mod live;
 mod motion;
 mod relax;
 mod result;
@@ -28,6 +29,8 @@ mod _leafdyn {
     use super::dictionary::overrides;
     #[pymodule_export]
     use super::fit::fit;
+    #[pymodule_export]
+    use super::live::live_page;
     #[pymodule_export]
     use super::motion::Motion;
     #[pymodule_export]

@@ -78,6 +78,8 @@ function show(known, at = sliders.value(trail.key)) {
   tellSoon();
   if (trail.key) trail.add(at, known);
   if (!stage.inSpace()) still();
+  // A notebook around it hears how the scenario stands.
+  if (window.parent !== window) window.parent.postMessage({ leafdyn: { text: now.text, values: Object.fromEntries(sliders.values) } }, "*");
 }
 
 /// Numbers that change faster than one reads are told now and then.
@@ -222,7 +224,7 @@ async function play(released) {
     now.playing = false;
     return;
   }
-  if (now.busy) return;
+  while (now.busy) await nextFrame();
   now.busy = true;
   now.pull = null;
   find("go").textContent = "stop";
@@ -334,8 +336,8 @@ async function share() {
   const shown = sliders.shown.map(({ key, low, high, log }) => ({ key, low, high, log }));
   const view = stage.inSpace() ? stage.camera() : null;
   const hash = `#s=${await packed({ text: now.text, name: now.name, values: [...sliders.values], sliders: shown, view })}`;
-  history.replaceState(null, "", hash);
   try {
+    history.replaceState(null, "", hash);
     await navigator.clipboard.writeText(location.href);
     find("share").textContent = "copied";
   } catch {

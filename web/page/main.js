@@ -146,7 +146,7 @@ function tick(time) {
 async function begin() {
   find("gallery").replaceChildren(...gallery.map(({ name }, i) => new Option(name.replace(/\.toml$/, ""), i)));
   const source = URL.createObjectURL(new Blob([find("worker").textContent], { type: "text/javascript" }));
-  const compiled = await code();
+  const [compiled] = await Promise.all([code(), run("three")]);
   [front, back] = [0, 1].map(() => new Solver(source, compiled));
   await front.ready;
   find("version").textContent = `leafdyn ${(await front.ask({ ask: "version" })).version}`;

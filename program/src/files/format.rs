@@ -113,6 +113,8 @@ words! {
         Png = "png",
         /// A page that shows the leaf in space.
         Html = "html",
+        /// A page that solves the scenario anew as its numbers are moved.
+        Live = "live",
         /// For ParaView.
         Vtk = "vtk",
         /// For Blender.
@@ -121,6 +123,9 @@ words! {
         Gif = "gif",
     }
 }
+
+/// The name of the live page.
+pub const LIVE: &str = "live.html";
 
 impl Kind {
     /// The kinds that need a motion as a film.
@@ -131,6 +136,9 @@ impl Kind {
 
     /// The kind of a file, by the extension of its name.
     pub fn of(file: &str) -> Kind {
+        if file == LIVE {
+            return Kind::Live;
+        }
         let end = file.rsplit('.').next();
         let named = end.and_then(|end| end.parse().ok());
         named.unwrap_or(match end {

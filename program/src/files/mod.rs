@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable, write_new};
-pub use format::{Format, Kind, Written};
+pub use format::{Format, Kind, LIVE, Written};
 pub use journal::{Journal, belongs, claim, write_rows};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
@@ -41,6 +41,7 @@ impl Written for Equilibrium {
         }),
         Format::Table("leaf.glb", glb::leaf),
     ];
+    const BESIDES: &'static [&'static str] = &[LIVE];
 
     const MORE: &'static [Format<Self>] = &[
         Format::Table("modes.csv", report::modes_table),

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 use crate::files::{self, Document, Selection, Written};
+use crate::live;
 use crate::report::table::list_files;
 use crate::report::{Refused, Reported, json};
 use leafdyn::scenario::Scenario;
@@ -87,6 +88,23 @@ impl Job {
     pub fn write<R: Written>(&self, result: &R) -> Listed {
         let files = files::write_all(&self.folder, &self.document(result), &self.selection.kinds)?;
         Ok(self.list_files(&files))
+    }
+
+    /// The live page with its scenario.
+    pub fn live(&self) -> Result<String, Refusal> {
+        let given = match self.base.overrides().is_empty() {
+            true => Some(self.base.text().to_owned()),
+            false => self.base.toml(&[]),
+        };
+        let name = format!("{}.toml", self.scenario.name);
+        let page = live::page(&given.unwrap_or_default(), &name, &[]);
+        page.map_err(|why| format!("--write live: {why}").into())
+    }
+
+    /// Writes a file of this content; returns the line that lists it.
+    pub fn write_table(&self, name: &str, content: &[u8]) -> Listed {
+        let file = files::write_table(&self.folder, name, content)?;
+        Ok(self.list_files(&[file]))
     }
 
     /// The line that lists files, if there are any.

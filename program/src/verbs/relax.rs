@@ -4,6 +4,7 @@ use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
 use super::request::{Request, VerbTraits, words};
 use super::{Refusal, Status};
+use crate::files::{Kind, LIVE};
 use crate::report::numbers::brief;
 use clap::Args;
 use leafdyn::relax::{self, Equilibrium, Method, Options, Outcome, Route, Settings};
@@ -97,6 +98,10 @@ impl Relax {
     }
 
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
+        let live = match job.selection.kinds.contains(&Kind::Live) {
+            true => Some(job.live()?),
+            false => None,
+        };
         let equilibrium = self.solve(job)?;
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.remark(equilibrium.remark.as_ref());
@@ -106,7 +111,9 @@ impl Relax {
         let accepts_saddles = self.keep_unstable || equilibrium.method.is_shooting();
         let unwanted = equilibrium.outcome == Outcome::Saddle && !accepts_saddles;
         let success = equilibrium.outcome.is_success() && !unwanted;
-        job.deliver(&equilibrium, success)
+        let live = live.map(|page| job.write_table(LIVE, page.as_bytes()));
+        let written = [job.write(&equilibrium)].into_iter().chain(live);
+        job.deliver_written(&equilibrium, success, &equilibrium, written)
     }
 
     /// The method with its options; refused if they do not fit the method.

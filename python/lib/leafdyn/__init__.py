@@ -12,6 +12,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._errors import LeafWarning, ScenarioError
+from ._explore import Exploration, explore
 from ._fit import Candidate, Fit, Parameter, fit
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
@@ -36,6 +37,7 @@ __all__ = [
     "Curve",
     "Equilibria",
     "Equilibrium",
+    "Exploration",
     "Fit",
     "Frame",
     "LeafWarning",
@@ -54,6 +56,7 @@ __all__ = [
     "chart",
     "check",
     "equilibria",
+    "explore",
     "fit",
     "frames",
     "map",

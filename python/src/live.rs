@@ -1,0 +1,38 @@
+//! The live page with a scenario in it.
+
+use leafdyn::study::Keys;
+use leafdyn_program::live::{self, Slider};
+use pyo3::prelude::*;
+
+use crate::errors::{value_error, vary_error};
+use crate::scenario::Scenario;
+
+/// The page on which a scenario is open, with these sliders: the path of a number, the ends of its
+/// range, and whether it is logarithmic.
+#[pyfunction]
+pub fn live_page(
+    py: Python,
+    scenario: &Scenario,
+    sliders: Vec<(String, f64, f64, bool)>,
+) -> PyResult<String> {
+    let base = scenario.base(py)?;
+    for (key, ..) in &sliders {
+        let keys: Keys = key.parse().map_err(|error| vary_error(py, error))?;
+        base.value(&keys).map_err(|error| vary_error(py, error))?;
+    }
+    let sliders = sliders.into_iter();
+    let sliders: Vec<Slider> = sliders
+        .map(|(key, low, high, log)| Slider {
+            key,
+            low,
+            high,
+            log,
+        })
+        .collect();
+    let text = match base.overrides().is_empty() {
+        true => base.text().to_owned(),
+        false => base.toml(&[]).unwrap_or_default(),
+    };
+    let name = format!("{}.toml", base.scenario().name);
+    live::page(&text, &name, &sliders).map_err(value_error)
+}
