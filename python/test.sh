@@ -10,11 +10,16 @@ if test "$part" != run; then
 fi
 PATH="$PWD/target/venv/bin:$PATH"
 if test "$part" != run; then
+    # With the live page, where it was built.
+    if test -f web/dist/live.html; then
+        export MATURIN_PEP517_ARGS="--features live"
+        live=(--features live)
+    fi
     pip install --quiet ./python
-    pip install --quiet maturin pytest mypy matplotlib tqdm pandas "dask[distributed]" nbmake ipykernel
+    pip install --quiet maturin pytest mypy matplotlib tqdm pandas anywidget "dask[distributed]" nbmake ipykernel
     # The wheel is one for all versions of Python.
     rm -rf target/wheels
-    maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
+    maturin build --release --locked ${live[@]+"${live[@]}"} --quiet --manifest-path python/Cargo.toml --out target/wheels
     test "$(ls target/wheels/*cp310-abi3*.whl | wc -l)" = 1
 fi
 if test "$part" = build; then

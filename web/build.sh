@@ -16,7 +16,7 @@ elif [ -d /usr/src/rustc-1.85.0/library ] && [ -x /usr/bin/cargo ] && command -v
     # Its compiler is older than the one that is asked for, and has the standard library as source.
     export PATH=/usr/bin:$PATH RUSTC=/usr/bin/rustc RUSTC_BOOTSTRAP=1
     export RUSTC_WRAPPER=$PWD/web/older-rustc.sh CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=wasm-ld-19
-    /usr/bin/cargo "${options[@]/--locked/--ignore-rust-version}" -Z build-std=std,panic_abort
+    /usr/bin/cargo "${options[@]}" --ignore-rust-version -Z build-std=std,panic_abort
 else
     echo "web/build.sh: there is no Rust for $target: rustup target add $target, or on Debian" >&2
     echo "  apt-get install rustc-web cargo-web rust-web-src lld-19" >&2
