@@ -26,7 +26,7 @@ async function open(hash = "", options = {}) {
   await page.waitForFunction(() => window.leafdyn && window.leafdyn.now.count > 0);
   page.opened = Date.now() - start;
   page.tip = () => page.evaluate(() => window.leafdyn.now.known.tips[0]);
-  page.choose = (name) => page.evaluate((name) => window.leafdyn.open(JSON.parse(document.getElementById("gallery-data").textContent).find((one) => one.name === name)), name);
+  page.choose = (name) => page.evaluate((name) => window.leafdyn.open(window.leafdyn.gallery.find((one) => one.name === name)), name);
   page.rest = () => page.waitForFunction(() => !window.leafdyn.now.busy && !window.leafdyn.now.wanted);
   page.done = async (name) => {
     if (keep) await page.screenshot({ path: join(keep, `live-${name}.png`) });

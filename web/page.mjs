@@ -16,16 +16,16 @@ const scenarios = folders.flatMap((folder) =>
     .sort()
     .map((name) => ({ name: `${folder}/${name}`, text: read("../scenarios", folder, name) })),
 );
-// Within a script only `</script` and `<!--` are special.
-const data = (object) => JSON.stringify(object).replaceAll("<", "\\u003c");
+const stage = ["data.js", "space.js", "axes.js", "chart.js", "stage.js"].map((name) => read(pages, name)).join("\n") + read("page/leaf.js");
+const script = ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "main.js"].map((name) => read("page", name)).join("\n");
+// The stage of a leaf of so many veins lasts until another one is opened.
+const scripts = `${read(pages, "three/three.min.js")}\nfunction stageOf(view) {\n"use strict";\n${stage}\n}\n(() => {\n"use strict";\n${script}\n})();`;
 const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");
 const part = {
   STYLE: read(pages, "page.css") + read("page/live.css"),
-  THREE: packed(readFileSync(join(web, pages, "three/three.min.js"))),
-  STAGE: ["data.js", "space.js", "axes.js", "chart.js", "stage.js"].map((name) => read(pages, name)).join("\n") + read("page/leaf.js"),
-  SCRIPT: ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "main.js"].map((name) => read("page", name)).join("\n"),
+  SCRIPTS: packed(Buffer.from(scripts)),
   WORKER: read("page/worker.js"),
-  GALLERY: data(scenarios),
+  GALLERY: packed(Buffer.from(JSON.stringify(scenarios))),
   GIVEN: "null",
   SOLVER: packed(readFileSync(process.argv[2])),
   LICENCES: [read("../LICENSE-MIT"), read(pages, "three/LICENSE-three.txt")].join("\n\n").replaceAll("&", "&amp;").replaceAll("<", "&lt;"),

@@ -89,7 +89,9 @@ function draw(again) {
   if (!space) return;
   if (!shown.plain) widen();
   const mesh = put(0, leaf, again);
-  space.panels = [{ leaf, mesh, label: "", beside: [...ghosts.values()].map((ghost) => ghost.lines) }];
+  // Asked for before it is drawn, it lies where it lay before.
+  const rect = space.panels.length ? space.panels[0].rect : [0, 0, ...stageSize()];
+  space.panels = [{ leaf, mesh, rect, label: "", beside: [...ghosts.values()].map((ghost) => ghost.lines) }];
   shown.dirty = true;
   if (again) shown.stale = true;
   if (find("probe").open) fillProbe();

@@ -1,6 +1,6 @@
 // The live page: a scenario, its sliders, and the leaf that follows them.
 const find = (id) => document.getElementById(id);
-const gallery = JSON.parse(find("gallery-data").textContent);
+let gallery = [];
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 let stage = null;
@@ -17,7 +17,7 @@ const IDLE = 250;
 /// Milliseconds between numbers that are told.
 const TOLD = 120;
 /// Milliseconds that a frame may take with a mode.
-const FRAME = 24;
+const FRAME = 12;
 
 function tell(message) {
   find("message").hidden = !message;

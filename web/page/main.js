@@ -146,7 +146,8 @@ function tick(time) {
 async function begin() {
   find("gallery").replaceChildren(...gallery.map(({ name }, i) => new Option(name.replace(/\.toml$/, ""), i)));
   const source = URL.createObjectURL(new Blob([find("worker").textContent], { type: "text/javascript" }));
-  const [compiled] = await Promise.all([code(), run("three")]);
+  gallery = JSON.parse(new TextDecoder().decode(await unpack("gallery-data")));
+  const compiled = await code();
   [front, back] = [0, 1].map(() => new Solver(source, compiled));
   await front.ready;
   find("version").textContent = `leafdyn ${(await front.ask({ ask: "version" })).version}`;
@@ -158,7 +159,7 @@ async function begin() {
   listen();
   requestAnimationFrame(tick);
   /// For tests, and for whoever builds on the page.
-  window.leafdyn = { now, sliders, trail, open, share, play, stage: () => stage, front, back };
+  window.leafdyn = { now, gallery, sliders, trail, open, share, play, stage: () => stage, front, back };
 }
 
 begin().catch((reason) => {

@@ -35,13 +35,5 @@ async function through(bytes, stream) {
   return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
 }
 
-/// What stands in the page, compressed.
-const unpackedFrom = (id) => through(bytesOf(document.getElementById(id).textContent), new DecompressionStream("gzip"));
-
-const code = async () => WebAssembly.compile(await unpackedFrom("solver"));
-
-/// Runs a script that stands in the page.
-async function run(id) {
-  const source = URL.createObjectURL(new Blob([await unpackedFrom(id)], { type: "text/javascript" }));
-  await new Promise((done, failed) => document.head.append(Object.assign(document.createElement("script"), { src: source, onload: done, onerror: () => failed(new Error(`${id} does not run`)) })));
-}
+/// The code of the solver.
+const code = async () => WebAssembly.compile(await unpack("solver"));

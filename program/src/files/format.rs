@@ -5,7 +5,9 @@ use std::slice;
 
 use serde::Serialize;
 
-use crate::figure::{self, png, svg};
+#[cfg(not(target_family = "wasm"))]
+use crate::figure::png;
+use crate::figure::{self, svg};
 use crate::page::{Shape, vtk};
 use crate::report::Document;
 use leafdyn::scenario::Scenario;
@@ -44,6 +46,8 @@ impl<R> Format<R> {
         match self {
             Format::Table(_, write) => write(result, out),
             Format::Figure(_, draw) => match Kind::of(name) {
+                // A browser makes its own from the vector image.
+                #[cfg(not(target_family = "wasm"))]
                 Kind::Png => png::write(&draw(result, input), out),
                 _ => svg::write(&draw(result, input), out),
             },
