@@ -38,7 +38,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         dynamics,
         ..
     } = scenario;
-    // Their images are not looked for yet.
+    // Their images are not looked for yet; on hinges a leaf may swing out of its plane.
     let other = distributed.is_some()
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()

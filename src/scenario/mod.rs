@@ -65,7 +65,7 @@ pub use tip::{Clamp, HeldTip};
 pub use tissue::Tissue;
 /// Values as they can be written.
 pub use toml::{Table, Value};
-pub use turning::Turning;
+pub use turning::{Begin, Turning};
 pub use wind::Wind;
 
 use std::sync::Arc;

@@ -11,10 +11,12 @@
 //! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
 //! ```
 
+mod base;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::limit::Limit;
-use crate::scenario::{Profile, Scenario, Turning, longest};
+use crate::scenario::{Hold, Profile, Scenario, Turning, longest};
 use crate::shooting::arcs;
 use crate::shooting::arcs::Arc;
 use crate::shooting::state::{Derivatives, RodState, STATE};
@@ -41,6 +43,8 @@ pub struct Equations<'a> {
     tip_moment: DVec3,
     /// Positions and rotations at which the tips of the rods are held.
     held: Vec<(DVec3, DQuat)>,
+    /// Whether hinges hold the bases.
+    hinged: bool,
     /// The smallest couple stiffness along each rod.
     pub softest: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
@@ -147,6 +151,7 @@ impl<'a> Equations<'a> {
                     Some((position, clamp.unwrap_or_default()))
                 })
                 .collect(),
+            hinged: scenario.base_held == Hold::Pinned,
             softest,
             turnings: scenario.turnings(),
             arcs: arcs::arcs(scenario, &lengths),
@@ -204,32 +209,12 @@ impl<'a> Equations<'a> {
         self.kinks.get(next).map_or(to, |kink| kink.min(to))
     }
 
-    /// The state at the base for given forces and moments: conditions (a) and (c).
-    pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
-        let (position, q) = self.scenario.base(j);
-        RodState {
-            r: position / self.length,
-            q,
-            n,
-            m,
-        }
-    }
-
     /// The veins that can turn without resistance, if the leaf has its own shape at rest.
     pub fn turnings(&self) -> &[Turning] {
         match self.part == 1.0 && self.softened == 1.0 {
             true => &self.turnings,
             false => &[],
         }
-    }
-
-    /// A flat state at the base without stress.
-    pub fn clamped(&self) -> Vec<f64> {
-        let mut y = vec![0.0; self.size()];
-        for j in 0..self.rods() {
-            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
-        }
-        y
     }
 
     fn material(&self, j: usize, sigma: f64) -> Material {

@@ -3,6 +3,7 @@
 mod damping;
 mod energy;
 mod grips;
+mod hinges;
 mod momentum;
 mod order;
 mod pulses;

@@ -87,10 +87,11 @@ impl<'a> Problem<'a> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // What is held is moved to its holder by a method of its own.
+        // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
         self.options.route == Route::Loading
             && !released
             && !self.leaf.is_held()
+            && !self.leaf.hinged()
             && self.leaf.loads != Loads::default()
             && self.leaf.loads.tip_moment == DVec3::ZERO
     }
@@ -104,6 +105,7 @@ impl<'a> Problem<'a> {
         settles
             && self.options.route == Route::Loading
             && !self.leaf.is_held()
+            && !self.leaf.hinged()
             && self.leaf.loads.tip_moment == DVec3::ZERO
             && !self.out_of_time()
     }
