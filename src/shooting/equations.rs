@@ -64,6 +64,9 @@ pub struct Equations<'a> {
     pub limit: Limit,
 }
 
+/// Fractions of the length closer to each other than this are the same.
+pub(in crate::shooting) const SAME_PLACE: f64 = 1e-11;
+
 /// Constraint on the tips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tip {
@@ -203,10 +206,14 @@ impl<'a> Equations<'a> {
         Some(Tangent(matrix * self.part))
     }
 
-    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
+    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there. A
+    /// station beside a kink is this kink: a load there would be passed at both.
     pub fn stop(&self, from: f64, to: f64) -> f64 {
-        let next = self.kinks.partition_point(|kink| *kink <= from);
-        self.kinks.get(next).map_or(to, |kink| kink.min(to))
+        let next = self
+            .kinks
+            .partition_point(|kink| *kink <= from + SAME_PLACE);
+        let before = self.kinks.get(next).filter(|kink| **kink < to - SAME_PLACE);
+        before.copied().unwrap_or(to)
     }
 
     /// The veins that can turn without resistance, if the leaf has its own shape at rest.

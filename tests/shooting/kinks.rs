@@ -2,6 +2,7 @@
 //! the boundary-value solution is that of the relaxation there too.
 
 use leafdyn::internals::shooting::Reason;
+use leafdyn::study::{CheckOptions, Verdict, check};
 use leafdyn_testing::*;
 
 /// Veins that taper, with a soft joint, and curl at rest from half their length on.
@@ -209,5 +210,25 @@ fn loads_beyond_folds_of_their_path() {
         let leaf = rod(entries);
         let relaxed = settle(&leaf, TIGHT);
         agree(entries, &leaf, &relaxed, &shot_near(&leaf, &relaxed), 1e-9);
+    }
+}
+
+/// The stations of a leaf may miss the place of a load by rounding: it acts once.
+#[test]
+fn loads_beside_stations_act_once() {
+    for at in [0.37, 0.3, 0.7, 0.61] {
+        let load = format!("load.point = [{{ vein = 1, at = {at}, force = [0.3, -0.2, 1.0] }}]");
+        let leaf = parse(&format!("{ROD}\n{load}"));
+        let options = CheckOptions {
+            tolerance: Some(1e-9),
+            ..CheckOptions::default()
+        };
+        let found = check(&leaf, &options, &mut |_| {}).unwrap();
+        assert_eq!(
+            found.verdict,
+            Verdict::Agree,
+            "{at}: {:?}",
+            found.difference
+        );
     }
 }
