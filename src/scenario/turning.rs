@@ -7,9 +7,9 @@
 //! if it is bent it has a circle of equilibria, and no bifurcation.
 //!
 //! On hinges a vein that is straight or round spins: every section turns about its own tangent,
-//! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins turns as a
-//! rigid body about the line through all points where it is held, if it is loaded along this line,
-//! whatever its sections.
+//! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
+//! turns as a rigid body about the line through all points where it is held, if it is loaded along
+//! this line, whatever its sections.
 
 use std::ops::Range;
 
