@@ -5,6 +5,7 @@ mod bifurcations;
 mod boundary;
 mod boundary_random;
 mod eigenvalue_bars;
+mod hinges;
 mod lateral_buckling;
 mod map_jumps;
 mod margin_of_grips;
