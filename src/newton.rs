@@ -354,7 +354,7 @@ impl Linear<'_> {
             Equations::Proximal {
                 solver, at, rate, ..
             } => {
-                state.increments_to(at, &mut self.back);
+                state.increments_to(at, system.first(), &mut self.back);
                 let springs = Some((self.back.as_slice(), *rate));
                 let shift = self.neutral + *rate;
                 match solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work) {

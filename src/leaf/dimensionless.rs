@@ -3,7 +3,7 @@
 use super::state::State;
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario, Turning, ascending};
+use crate::scenario::{Clamp, Dynamics, Hold, Profile, Rod, Scale, Scenario, Turning, ascending};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -27,6 +27,8 @@ pub struct Leaf {
     pub loads: Loads,
     /// The tip, if it is held.
     pub held: Option<Held>,
+    /// Whether hinges hold the bases.
+    hinged: bool,
     /// The veins that can turn without resistance.
     pub(super) turnings: Vec<Turning>,
     kinks: Vec<f64>,
@@ -142,6 +144,7 @@ impl Leaf {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
+            hinged: scenario.base_held == Hold::Pinned,
             turnings: scenario.turnings(),
             kinks,
             softest: softest / scale.stiffness,
@@ -298,6 +301,12 @@ impl Leaf {
     /// Whether the tip, or a part of a rod, is held by something that is moved to its place.
     pub fn is_held(&self) -> bool {
         self.held.is_some() || !self.scenario.grips.is_empty()
+    }
+
+    /// Whether hinges hold the bases: they stay in their places, and turn freely.
+    #[inline]
+    pub fn hinged(&self) -> bool {
+        self.hinged
     }
 
     /// Whether all rods begin in the origin, in the plane z = 0.

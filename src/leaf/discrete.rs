@@ -10,6 +10,7 @@ use crate::rod::{Section, Segment, Strip};
 use crate::rotation;
 use glam::DVec3;
 use pulp::Scalar;
+use std::ops::Range;
 
 /// Radius of gyration of a vein with the tissue it carries, in units of the leaf's length: its
 /// rotary inertia per unit length and mass is the square. A thin rod's own is smaller, but a
@@ -194,6 +195,18 @@ impl DiscreteLeaf {
         let sections = self.sections.iter();
         let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
         f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
+    }
+
+    /// The first node of a rod that has equations: its base if a hinge lets it turn, else the next.
+    /// Fields of increments and of nodal forces begin with it.
+    #[inline]
+    pub fn first_node(&self) -> usize {
+        usize::from(!self.leaf.hinged())
+    }
+
+    /// The nodes of a rod that have equations.
+    pub fn moving_nodes(&self) -> Range<usize> {
+        self.first_node()..self.segments() + 1
     }
 
     /// Segments per rod.

@@ -1,10 +1,11 @@
-//! Nodes that are held: tips by their holder, and others by grips along their veins.
+//! Nodes that are held: bases, tips by their holder, and others by grips along their veins.
 
 use super::dimensionless::Gripped;
 use super::discrete::DiscreteLeaf;
 use super::state::State;
 use crate::scenario::{Grip, Hold};
 use glam::DVec3;
+use std::ops::Range;
 
 impl DiscreteLeaf {
     /// The nodes that grips hold, where they are in the `natural` leaf and moved by their
@@ -40,8 +41,23 @@ impl DiscreteLeaf {
         self.grips.iter().filter(move |held| held.rod == j)
     }
 
-    /// Whether node `i` of rod `j` is held by a grip: its rotation, and its position.
+    /// The nodes of rod `j` with equations that hinges or grips hold, and the components that are.
+    pub(super) fn held_inside(&self, j: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let hinge = (0..1)
+            .filter(|_| self.leaf.hinged())
+            .map(|base| (base, 3..6));
+        let grips = self.grips_of(j).map(|held| {
+            let first = if held.rotation.is_some() { 0 } else { 3 };
+            (held.node, first..6)
+        });
+        hinge.chain(grips)
+    }
+
+    /// Whether node `i` of rod `j` is held at its base or by a grip: its rotation, and its position.
     pub(super) fn is_gripped(&self, j: usize, i: usize) -> [bool; 2] {
+        if i == 0 {
+            return [!self.leaf.hinged(), true];
+        }
         let here = |it: &&Gripped| (it.rod, it.node) == (j, i);
         match self.grips.iter().find(here) {
             Some(held) => [held.rotation.is_some(), true],
@@ -53,7 +69,7 @@ impl DiscreteLeaf {
     pub fn moves(&self, j: usize, i: usize) -> [bool; 2] {
         match &self.leaf.held {
             Some(held) if i == self.segments() => [held.clamps.is_none(), false],
-            _ if self.grips.is_empty() => [true; 2],
+            _ if i > 0 && self.grips.is_empty() => [true; 2],
             _ => self.is_gripped(j, i).map(|held| !held),
         }
     }

@@ -50,12 +50,12 @@ impl Leaf {
 
 impl DiscreteLeaf {
     /// Nodes and sizes of the dead moments on points; empty if there are none. What acts within
-    /// rounding of the base is left to its clamp.
+    /// rounding of a clamped base is left to its clamp.
     pub(super) fn moments_on_nodes(&self) -> Vec<(usize, DVec3)> {
         let points = self.leaf.moments_on_points();
         let some = points.filter(|(_, moment)| *moment != DVec3::ZERO);
         some.map(|(at, moment)| (self.grid.nearest(at), moment))
-            .filter(|(node, _)| *node > 0)
+            .filter(|(node, _)| *node >= self.first_node())
             .collect()
     }
 
@@ -119,10 +119,13 @@ impl DiscreteLeaf {
     /// Adds the dead moments to the right-hand side of an assembled system, which keeps them for
     /// its solution.
     pub(super) fn add_moments(&self, system: &mut System) {
-        system.moments.set(self.moments());
+        let first = self.first_node();
+        system
+            .moments
+            .set(self.moments().map(|(node, moment)| (node - first, moment)));
         let (group, lane) = group_and_lane(0);
-        for (node, moment) in system.moments.on_nodes() {
-            let rhs = &mut system.groups[group].rhs[node - 1];
+        for (i, moment) in system.moments.on_nodes() {
+            let rhs = &mut system.groups[group].rhs[i];
             for c in 0..3 {
                 rhs[c].0[lane] += moment[c];
             }

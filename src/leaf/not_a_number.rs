@@ -78,7 +78,7 @@ fn a_singular_matrix_under_a_dead_moment_is_not_solved() {
         let mut system = System::new(&leaf);
         let less = DMat3::from_diagonal(DVec3::new(0.0, 0.0, about_z - 1.0));
         system.add(0, 1, (less, 0.0), (DVec3::Y, DVec3::ZERO));
-        system.moments.set([(1, 2.0 * DVec3::X)].into_iter());
+        system.moments.set([(0, 2.0 * DVec3::X)].into_iter());
         assert!(system.factorize_indefinite());
         system.solve(None, 0.0)
     };

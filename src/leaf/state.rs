@@ -28,8 +28,8 @@ const MEETING: f64 = 1e-9;
 /// displacement.
 pub type Increment = [f64; 6];
 
-/// Increments, or the forces that are dual to them, of all nodes of a leaf but the bases:
-/// rods, then nodes 1 to n. With a joint tip the last displacement is the same in every rod,
+/// Increments, or the forces that are dual to them, of all nodes of a leaf with equations: rods,
+/// then nodes from [`first_node`](super::DiscreteLeaf::first_node) on. With a joint tip the last displacement is the same in every rod,
 /// and the last force is each rod's share.
 pub type Field = Vec<Vec<Increment>>;
 
@@ -145,12 +145,14 @@ impl State {
         largest(changes)
     }
 
-    /// Writes the increments of all nodes but the bases that lead to another state on the same grid.
-    pub fn increments_to(&self, other: &State, field: &mut Field) {
-        field.resize_with(self.rods(), || vec![[0.0; 6]; self.segments]);
+    /// Writes the increments of all nodes from the `first` on that lead to another state on the same
+    /// grid.
+    pub fn increments_to(&self, other: &State, first: usize, field: &mut Field) {
+        let nodes = self.segments + 1 - first;
+        field.resize_with(self.rods(), || vec![[0.0; 6]; nodes]);
         for (j, rod) in field.iter_mut().enumerate() {
             for (i, increment) in rod.iter_mut().enumerate() {
-                let k = self.base(j) + i + 1;
+                let k = self.base(j) + i + first;
                 let turn = rotation::log(other.q[k] * self.q[k].conjugate());
                 let shift = other.x[k] - self.x[k];
                 *increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];

@@ -95,7 +95,7 @@ impl DiscreteLeaf {
             let ends = across(state, g, i);
             let (own, mut loads) = strip.energy_and_loads(&ends);
             energy += own;
-            if i == 0 {
+            if i < self.first_node() {
                 continue;
             }
             let force = self.tissue_force(state, (g, i), strip, &ends);
@@ -110,7 +110,7 @@ impl DiscreteLeaf {
                 for (rod, own) in [g, g + 1].into_iter().zip(&hessian.own) {
                     system.add_block(rod, i, own);
                 }
-                *system.across_mut(g, i - 1) = hessian.across;
+                *system.across_mut(g, i - self.first_node()) = hessian.across;
             }
         }
         energy
@@ -142,9 +142,9 @@ impl DiscreteLeaf {
         for (k, (g, i, strip)) in self.each_strip().enumerate() {
             let ends = across(state, g, i);
             let force = self.tissue_force(state, (g, i), strip, &ends);
-            let change = match i {
-                0 => DVec3::ZERO,
-                _ => {
+            let change = match i < self.first_node() {
+                true => DVec3::ZERO,
+                false => {
                     let [a, b] = [g, g + 1].map(|rod| solution.increment(rod, i));
                     let dx = shift(&b) - shift(&a);
                     strip.force_increment(&ends, force, dx, [turn(&a), turn(&b)])
@@ -215,9 +215,11 @@ impl DiscreteLeaf {
         self.strip(g, i).rates(&across(state, g, i), change)
     }
 
-    /// Second derivatives of the energy of the tissue along a shape, at all nodes but the bases.
+    /// Second derivatives of the energy of the tissue along a shape, at all nodes but clamped bases.
     pub fn tissue_curvature(&self, state: &State, shape: &[super::Increment]) -> f64 {
-        let moving = self.tissue_stiffness(state).filter(|(_, i, _)| *i > 0);
+        let moving = self
+            .tissue_stiffness(state)
+            .filter(|(_, i, _)| *i >= self.first_node());
         let each = moving.map(|(g, i, stiffness)| {
             let [a, b] = [g, g + 1].map(|rod| &shape[state.base(rod) + i]);
             let both = SVector::<f64, 12>::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] });

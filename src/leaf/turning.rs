@@ -1,32 +1,32 @@
-//! The turns of veins about the axis of their base without resistance
+//! The turns of veins without resistance
 //! ([`Scenario::turnings`](crate::scenario::Scenario::turnings)): their phase conditions, their
 //! modes, and the equilibrium that stands for a circle of equilibria.
 //!
-//! Bent veins that can turn have an eigenvalue that is exactly zero, on every grid. A spring that
-//! holds one node in the direction in which it would move is a phase condition: as the forces do
+//! Veins that can turn have an eigenvalue that is exactly zero, on every grid, unless they are straight
+//! and clamped. A spring that holds one node in the direction in which it would move is a phase condition: as the forces do
 //! no work in a turn, the equations with it have the same solutions, it has no force there, and the
 //! matrix has one negative eigenvalue for each of those of the leaf, and none for the turn.
 
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, State};
 use super::system::System;
-use crate::rotation::angle_about;
-use crate::scenario::Turning;
-use glam::{DMat3, DQuat, DVec3};
+use crate::rotation::outer;
+use crate::scenario::{Begin, Turning};
+use glam::DVec3;
 
-/// Stiffness of the spring, A/L^3.
+/// Stiffness of the spring, A/L^3, or A/L against a rotation.
 const SPRING: f64 = 100.0;
 
-/// A node nearer to the axis than this (lengths) is on it: straight veins do not move when they
-/// turn.
+/// A node that turns slower than this (lengths per radian) is on the axis: straight veins do not move
+/// when they turn.
 const ON_AXIS: f64 = 1e-6;
 
-/// The node farthest from the axis, at which a turn is held.
-struct Farthest {
+/// The node at which a turn is held.
+struct HeldNode {
     rod: usize,
     node: usize,
-    /// The direction in which it moves.
-    direction: DVec3,
+    /// The direction in which it rotates, or else that in which it is displaced.
+    direction: [DVec3; 2],
 }
 
 impl DiscreteLeaf {
@@ -38,20 +38,36 @@ impl DiscreteLeaf {
         (self.leaf.turnings.iter()).filter(move |it| !half || it.rods.clone().all(moves))
     }
 
-    /// The node that is farthest from the axis, if the veins are not straight. A joint tip, which
-    /// all rods share, is none.
-    fn farthest_from_axis(&self, turning: &Turning, state: &State) -> Option<Farthest> {
+    /// The rotation and the displacement of a node by a turn at unit rate.
+    fn turn_of(&self, turning: &Turning, state: &State, k: usize) -> [DVec3; 2] {
+        turning.rates(state.x[k], state.q[k], self.leaf.scale.length)
+    }
+
+    /// The node to hold: the one that is displaced most or, where sections spin, the base. A joint tip,
+    /// which all rods share, is none.
+    fn node_to_hold(&self, turning: &Turning, state: &State) -> Option<HeldNode> {
+        if turning.axis == DVec3::ZERO {
+            let rod = turning.rods.start;
+            let points = &state.x[state.base(rod)..][..=self.segments()];
+            let [spin, _] = self.turn_of(turning, state, state.base(rod));
+            let moves = turning.moves(points, DVec3::ZERO, ON_AXIS);
+            return moves.then_some(HeldNode {
+                rod,
+                node: 0,
+                direction: [spin, DVec3::ZERO],
+            });
+        }
         let last = self.segments() - usize::from(self.tips_move_together());
         let mut farthest = None;
         let mut most = ON_AXIS;
         for (rod, node) in nodes(turning, last) {
-            let speed = turning.axis.cross(state.x[state.base(rod) + node]);
+            let [_, speed] = self.turn_of(turning, state, state.base(rod) + node);
             if speed.length() > most {
                 most = speed.length();
-                farthest = Some(Farthest {
+                farthest = Some(HeldNode {
                     rod,
                     node,
-                    direction: speed / most,
+                    direction: [DVec3::ZERO, speed / most],
                 });
             }
         }
@@ -61,40 +77,45 @@ impl DiscreteLeaf {
     /// Adds the phase conditions of veins that can turn to an assembled matrix.
     pub fn hold_turn(&self, state: &State, system: &mut System) {
         for turning in self.turnings() {
-            if let Some(at) = self.farthest_from_axis(turning, state) {
-                let d = at.direction;
-                let stiffness = SPRING * DMat3::from_cols(d.x * d, d.y * d, d.z * d);
-                system.hold(at.rod, at.node, stiffness);
+            if let Some(at) = self.node_to_hold(turning, state) {
+                let [turn, shift] = at.direction.map(|d| SPRING * outer(d, d));
+                system.hold(at.rod, at.node, shift);
+                system.hold_rotation(at.rod, at.node, turn);
             }
         }
     }
 
-    /// Turns veins that can turn without resistance until their moment at the base bends them down
-    /// (towards -e3), so that of a circle of equilibria it is always the same one, on all grids.
+    /// Turns veins that can turn without resistance, so that of a circle of equilibria it is always
+    /// the same one, on all grids: clamped ones until their moment at the base bends them down
+    /// (towards -e3); on hinges as near as possible to where they begin in the natural leaf, or down;
+    /// and a vein that spins without a twist from there.
     pub fn lean_down(&self, state: &mut State) {
-        let n = self.segments();
-        let [turns, shifts] = self.moves(0, n);
-        for Turning { rods, axis } in self.turnings() {
+        for turning in self.turnings() {
+            if turning.axis == DVec3::ZERO && self.node_to_hold(turning, state).is_none() {
+                continue;
+            }
+            let rods = &turning.rods;
             let moment = |j: usize| {
-                let segment = self.segment(state, j, 0, state.n[j * n]);
+                let n = state.n[j * self.segments()];
+                let segment = self.segment(state, j, 0, n);
                 -segment.gradient(self.section(j, 0)).1
             };
-            let moment: DVec3 = rods.clone().map(moment).sum();
-            // Down, or for a vertical axis e1, normal to the axis.
-            let down = match axis.z.abs() > 0.99 {
-                true => DVec3::X,
-                false => -DVec3::Z,
+            let begin = |j: usize| Begin {
+                natural: self.leaf.base(j).1,
+                now: state.q[state.base(j)],
             };
-            let angle = angle_about(*axis, moment, axis.cross(down));
-            let (turn, back) = (
-                DQuat::from_axis_angle(*axis, angle),
-                DQuat::from_rotation_x(-angle),
-            );
+            let begins: Vec<Begin> = rods.clone().map(begin).collect();
+            let moments = (!self.leaf.hinged()).then(|| rods.clone().map(moment).sum());
+            let angle = turning.angle_to_lean(&begins, moments);
+            let [turn, back] = turning.rotations(angle);
+            let point = turning.point / self.leaf.scale.length;
+            let n = self.segments();
             for j in rods.clone() {
-                for node in 1..=n {
+                for node in self.moving_nodes() {
                     let k = state.base(j) + node;
+                    let [turns, shifts] = self.moves(j, node);
                     if shifts || node < n {
-                        state.x[k] = turn * state.x[k];
+                        state.x[k] = point + turn * (state.x[k] - point);
                     }
                     if turns || node < n {
                         state.q[k] = (turn * state.q[k] * back).normalize();
@@ -106,21 +127,21 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The turns at unit rate of bent veins that can: increments of the nodes 1 to n of all rods.
+    /// The turns at unit rate of veins that can: increments of the nodes of all rods.
     pub fn turns(&self, state: &State) -> Vec<Field> {
-        let bent = |turning: &&Turning| self.farthest_from_axis(turning, state).is_some();
-        let turn = |Turning { rods, axis }: &Turning| {
-            let mut field = vec![vec![[0.0; 6]; self.segments()]; self.rods()];
-            for j in rods.clone() {
+        let moves = |turning: &&Turning| self.node_to_hold(turning, state).is_some();
+        let turn = |turning: &Turning| {
+            let mut field = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
+            for j in turning.rods.clone() {
                 for (node, increments) in field[j].iter_mut().enumerate() {
-                    let k = state.base(j) + node + 1;
-                    let (spin, velocity) = (*axis - state.q[k] * DVec3::X, axis.cross(state.x[k]));
+                    let k = state.base(j) + node + self.first_node();
+                    let [spin, velocity] = self.turn_of(turning, state, k);
                     *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
                 }
             }
             field
         };
-        self.turnings().filter(bent).map(turn).collect()
+        self.turnings().filter(moves).map(turn).collect()
     }
 }
 

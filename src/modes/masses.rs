@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 /// Inertia of a node.
 struct Node {
-    /// Rod, and number of the node from 1.
+    /// Rod, and number of the node.
     index: (usize, usize),
     unknowns: [usize; 6],
     tensor: DMat3,
@@ -39,7 +39,7 @@ impl Masses {
                 mass: if shifts { inertia.mass } else { 0.0 },
             }
         };
-        let nodes = leaf.each(1..=leaf.segments()).map(node).collect();
+        let nodes = leaf.each(leaf.moving_nodes()).map(node).collect();
         Masses { nodes }
     }
 
@@ -76,5 +76,5 @@ pub fn mass(leaf: &DiscreteLeaf, physics: &Physics, state: &State, shape: &[Incr
         let (turn, shift) = (turn(&shape[k]), shift(&shape[k]));
         turn.dot(inertia.tensor(state.q[k]) * turn) + inertia.mass * shift.length_squared()
     };
-    leaf.each(1..=leaf.segments()).map(node).sum()
+    leaf.each(leaf.moving_nodes()).map(node).sum()
 }

@@ -140,10 +140,11 @@ fn of_softened(
     let near = wanted.near.iter().map(|near| vibration.vector(near));
     vibration.near = near.collect();
     let turn = |turn: &Field| {
-        let base = [[0.0; 6]];
+        // Clamped bases have no equations.
+        let bases = &[[0.0; 6]][..soft.first_node()];
         let all: Vec<_> = turn
             .iter()
-            .flat_map(|rod| base.iter().chain(rod))
+            .flat_map(|rod| bases.iter().chain(rod))
             .copied()
             .collect();
         vibration.vector(&all)
@@ -214,16 +215,23 @@ impl Vibration<'_> {
 
     /// The turns as eigenvectors of unit mass, whose eigenvalues are zero.
     fn turning(&self) -> Vec<Mode> {
-        let mode = |turn: &Vec<f64>| {
-            let mass: f64 = (turn.iter().zip(self.masses.times(turn)))
-                .map(|(v, m)| v * m)
-                .sum();
-            Mode {
-                eigenvalue: 0.0,
-                vector: turn.iter().map(|v| v / mass.sqrt()).collect(),
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut modes: Vec<Mode> = Vec::new();
+        for turn in &self.turns {
+            let mut vector = turn.clone();
+            for other in &modes {
+                let part = dot(&other.vector, &self.masses.times(&vector));
+                let both = vector.iter_mut().zip(&other.vector);
+                both.for_each(|(v, other)| *v -= part * other);
             }
-        };
-        self.turns.iter().map(mode).collect()
+            let mass = dot(&vector, &self.masses.times(&vector));
+            vector.iter_mut().for_each(|v| *v /= mass.sqrt());
+            modes.push(Mode {
+                eigenvalue: 0.0,
+                vector,
+            });
+        }
+        modes
     }
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
@@ -358,7 +366,7 @@ impl Vibration<'_> {
     /// A vector as turns and shifts of all nodes.
     fn shape(&self, vector: &[f64]) -> Vec<Increment> {
         let mut shape = vec![[0.0; 6]; self.state.x.len()];
-        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
             shape[self.state.base(j) + i] = self.pattern.unknowns(j, i).map(|at| vector[at]);
         }
         shape
@@ -367,7 +375,7 @@ impl Vibration<'_> {
     /// Turns and shifts of all nodes as a vector.
     fn vector(&self, shape: &[Increment]) -> Vec<f64> {
         let mut vector = vec![0.0; self.pattern.size()];
-        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
             let node = &shape[self.state.base(j) + i];
             for (at, part) in self.pattern.unknowns(j, i).into_iter().zip(node) {
                 vector[at] = *part;

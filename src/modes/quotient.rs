@@ -41,7 +41,10 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         sum += 2.0 * force.dot(gap) - section.ds * (section.compliance * force).dot(force);
         sum += turns(&segment, section, a, b);
     }
-    for (j, i) in leaf.each(1..n + 1).filter(|(j, _)| j + 1 < leaf.rods()) {
+    for (j, i) in leaf
+        .each(leaf.moving_nodes())
+        .filter(|(j, _)| j + 1 < leaf.rods())
+    {
         let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.spring(j, i) * (b - a));
     }

@@ -17,7 +17,7 @@ impl Vibration<'_> {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let mut load = vec![0.0; self.pattern.size()];
-        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
             let sigma = self.leaf.grid.sigma()[i];
             let wave = (7.0 * search as f64 * sigma).sin();
             for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {

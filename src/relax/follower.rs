@@ -289,6 +289,7 @@ impl Follower {
         let grips = own.grips.iter().zip(&other.grips);
         own.rods.len() == other.rods.len()
             && own.joined == other.joined
+            && own.base_held == other.base_held
             && own.tissue.is_some() == other.tissue.is_some()
             && own.wind.is_none()
             && other.wind.is_none()

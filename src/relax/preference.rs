@@ -23,6 +23,6 @@ pub fn preference(leaf: &DiscreteLeaf, state: &State, leaning: DVec3) -> Field {
         let shift = (1.0 + 0.2 * x.x) * everywhere + x.y * leftwards;
         [0.0, 0.0, 0.0, shift.x, shift.y, shift.z]
     };
-    let rod = |j: usize| (1..=leaf.segments()).map(|i| node(j, i)).collect();
+    let rod = |j: usize| leaf.moving_nodes().map(|i| node(j, i)).collect();
     (0..leaf.rods()).map(rod).collect()
 }

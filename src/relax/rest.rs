@@ -8,7 +8,7 @@ use crate::relax::loading::arrival::{arrive, guess, load_slowly};
 use crate::relax::nested::{Found, History, NestedEquilibrium, along};
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{
-    Options, Progress, RelaxError, check_tolerance, rests_in_wind,
+    Options, Progress, RelaxError, check_tolerance, points_somewhere, rests_in_wind,
 };
 use crate::relax::request::problem::Problem;
 use crate::relax::result::equilibrium::{Equilibrium, Outcome};
@@ -39,6 +39,7 @@ pub(crate) fn relax_on_grids(
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     rests_in_wind(scenario, options)?;
+    points_somewhere(scenario)?;
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {

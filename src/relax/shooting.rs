@@ -19,7 +19,7 @@ use crate::relax::result::stations::SAME;
 use crate::relax::result::stress::Stresses;
 use crate::relax::settle::segments::coarsest;
 use crate::relax::stability::index::index_near;
-use crate::scenario::{Scenario, longest};
+use crate::scenario::{Hold, Scenario, longest};
 use crate::shape::{RodShape, equally_spaced};
 use crate::shooting;
 use crate::shooting::{Reason, Solution, Start};
@@ -100,6 +100,11 @@ pub fn relax(
     if !from_rest && scenario.joined && scenario.rods.len() > 1 && !Leaf::new(scenario).is_fan() {
         let why = "veins that begin apart are led to their joint tip by the relaxation; \
                    use shooting-from-rest";
+        return Err(RefusedOption::new("method", options.method.word(), why).into());
+    }
+    if !from_rest && scenario.base_held == Hold::Pinned {
+        // Without loads the leaf of arcs turns about its hinges.
+        let why = "a leaf on hinges (leaf.base_held) is led to rest by the relaxation; use shooting-from-rest";
         return Err(RefusedOption::new("method", options.method.word(), why).into());
     }
     if !from_rest && scenario.held_tip.is_some() {

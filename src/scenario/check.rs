@@ -7,7 +7,6 @@ use super::error::Result;
 use super::item::Item;
 use super::key::Key;
 use super::loads::on_one_rod;
-use super::not_yet::not_yet;
 use super::section::Property;
 use super::tissue::tissue;
 use super::veins::{Made, joined, veins};
@@ -30,24 +29,6 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> Result<Scenario> {
-        let scenario = self.checked()?;
-        match not_yet(&scenario) {
-            None => Ok(scenario),
-            Some(key) => {
-                let (table, _) = key.parts();
-                let name = match table {
-                    "leaf" | "load" => key.path(),
-                    _ => table,
-                };
-                Err(self.refuse(key, format!(
-                    "{name} is read and checked, but no method takes it into account yet: leave it out"
-                )))
-            }
-        }
-    }
-
-    /// The checked scenario, whether methods take all of it into account or not.
-    pub(crate) fn checked(&self) -> Result<Scenario> {
         let name = name(self.item(Key::Name)?)?;
         let units = Units {
             length: self.given(Key::UnitLength).map(unit).transpose()?,

@@ -56,7 +56,7 @@ keys! {
     Base "leaf.base": VectorPerRod, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// angles of the rods at the base above the x-y plane, in radians.
     Elevation "leaf.elevation": PerRod(Finite), [0, 0, 0], Default("0.0");
-    /// how the bases are held.
+    /// how the bases are held: "clamped", or "pinned", by hinges that leave their directions free.
     BaseHeld "leaf.base_held": Text, [0, 0, 0], Default("\"clamped\"");
     /// A1, against torsion.
     Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Required("1.0");

@@ -23,7 +23,6 @@ mod load_limits;
 mod loads;
 mod material;
 mod moduli;
-mod not_yet;
 mod outline;
 mod part;
 mod profile;
@@ -65,7 +64,7 @@ pub use tip::{Clamp, HeldTip};
 pub use tissue::Tissue;
 /// Values as they can be written.
 pub use toml::{Table, Value};
-pub use turning::Turning;
+pub use turning::{Begin, Turning};
 pub use wind::Wind;
 
 use std::sync::Arc;

@@ -1,15 +1,24 @@
-//! Veins that can turn about the axis of their base without resistance: round ones that are
-//! clamped in line, loaded along this line and held on it, if at all. Tissue, hinges, and axes that
-//! do not go through the origin are left out.
+//! Veins that can turn without resistance.
 //!
-//! Where every vein of a group that is tied together, or a single one, turns about the axis by an
-//! angle and every section back about its own tangent, no clamp, load or strain energy changes: if
-//! it is bent it has a circle of equilibria, and no bifurcation.
+//! Round ones that are clamped in line, loaded along this line and held on it, if at all, turn about
+//! the axis of their base; with tissue, and about axes that do not go through the origin, they are
+//! left out. Where every vein of a group that is tied together, or a single one, turns about the axis
+//! by an angle and every section back about its own tangent, no clamp, load or strain energy changes:
+//! if it is bent it has a circle of equilibria, and no bifurcation.
+//!
+//! On hinges a vein that is straight or round spins: every section turns about its own tangent,
+//! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
+//! turns as a rigid body about the line through all points where it is held, if it is loaded along
+//! this line, whatever its sections.
 
 use std::ops::Range;
 
-use super::{Hold, Profile, Rod, Scenario, Tissue};
-use glam::DVec3;
+use super::{Grip, Hold, Profile, Rod, Scenario, Tissue};
+use crate::rotation::angle_about;
+use glam::{DQuat, DVec3};
+
+/// Tangents whose parts across an axis are smaller tell no direction about it.
+const ACROSS: f64 = 1e-8;
 
 /// Numbers that differ by less than this part are the same.
 const ROUNDING: f64 = 1e-12;
@@ -17,28 +26,237 @@ const ROUNDING: f64 = 1e-12;
 /// Profiles are compared at so many equal distances, and at their kinks.
 const COMPARED: usize = 16;
 
-/// Neighbouring veins that can turn together without resistance, whatever their shape.
+/// Neighbouring veins that can turn together without resistance, whatever their shape: at unit rate
+/// all turn about the axis, and every section by `own` about its own tangent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turning {
     /// Their numbers.
     pub rods: Range<usize>,
-    /// The direction of the axis, which goes through the base.
+    /// A point of the axis.
+    pub point: DVec3,
+    /// The direction of the axis, or zero for a vein that only spins.
     pub axis: DVec3,
+    /// Rate of the turn of sections about their own tangents: -1, 0 or 1.
+    pub own: f64,
+    /// Whether they turn so also where they are bent.
+    pub bent: bool,
+}
+
+/// The rotations in which a vein begins.
+pub struct Begin {
+    /// In the natural leaf.
+    pub natural: DQuat,
+    /// Now.
+    pub now: DQuat,
+}
+
+impl Turning {
+    /// The angle by which a leaf turns to the one of its circle of equilibria that stands for all:
+    /// clamped veins until their `moment` on the bases bends them down (towards -e3); on hinges until
+    /// the veins begin as near as possible to where they do in the natural leaf, or down; what spins
+    /// until it has no twist from there.
+    pub fn angle_to_lean(&self, begin: &[Begin], moment: Option<DVec3>) -> f64 {
+        let axis = self.axis;
+        if let (true, [Begin { natural, now }]) = (axis == DVec3::ZERO, begin) {
+            let from_natural = natural.conjugate() * *now;
+            return -2.0 * from_natural.x.atan2(from_natural.w);
+        }
+        // Down, or for a vertical axis e1, normal to the axis.
+        let down = match axis.z.abs() > 0.99 {
+            true => DVec3::X,
+            false => -DVec3::Z,
+        };
+        if let Some(moment) = moment {
+            return angle_about(axis, moment, axis.cross(down));
+        }
+        // The angle with the least sum of squared distances of the tangents.
+        let across = |q: DQuat| (q * DVec3::X).reject_from_normalized(axis);
+        let (mut sin, mut cos, mut sum) = (0.0, 0.0, DVec3::ZERO);
+        for [natural, now] in begin.iter().map(|it| [it.natural, it.now].map(across)) {
+            sin += axis.dot(now.cross(natural));
+            cos += now.dot(natural);
+            sum += now;
+        }
+        match (f64::hypot(sin, cos) > ACROSS, sum.length() > ACROSS) {
+            (true, _) => sin.atan2(cos),
+            (false, true) => angle_about(axis, sum, down.reject_from_normalized(axis)),
+            (false, false) => 0.0,
+        }
+    }
+
+    /// Whether anything moves when veins through these points turn: some point that is farther than
+    /// `near` from the axis through `point`; or, where a vein spins, its sections, if it is round or no
+    /// point is so far from the line between its ends.
+    pub fn moves(&self, points: &[DVec3], point: DVec3, near: f64) -> bool {
+        let off = |from: DVec3, axis: DVec3| {
+            let mut points = points.iter();
+            points.any(|at| (*at - from).reject_from_normalized(axis).length() > near)
+        };
+        match (self.axis == DVec3::ZERO, points) {
+            (false, _) => off(point, self.axis),
+            (true, [base, .., tip]) => {
+                let chord = (*tip - *base).normalize_or(DVec3::X);
+                self.bent || !off(*base, chord)
+            }
+            (true, _) => self.bent,
+        }
+    }
+
+    /// The rotations by this angle about the axis and, from the right, of sections about their own
+    /// tangents.
+    pub fn rotations(&self, angle: f64) -> [DQuat; 2] {
+        let turn = match self.axis == DVec3::ZERO {
+            true => DQuat::IDENTITY,
+            false => DQuat::from_axis_angle(self.axis, angle),
+        };
+        [turn, DQuat::from_rotation_x(self.own * angle)]
+    }
+
+    /// The velocity of a node in this position, whose unit of length is `length`, and with these
+    /// directors.
+    pub fn rates(&self, x: DVec3, q: DQuat, length: f64) -> [DVec3; 2] {
+        let spin = self.axis + self.own * (q * DVec3::X);
+        [spin, self.axis.cross(x - self.point / length)]
+    }
 }
 
 impl Scenario {
-    /// The groups of veins that can turn without resistance, each about its own axis: none in wind.
+    /// The groups of veins that can turn without resistance: in wind only those that spin.
     pub fn turnings(&self) -> Vec<Turning> {
-        if self.wind.is_some() {
-            return Vec::new();
+        let mut turnings = Vec::new();
+        let hinged = self.base_held == Hold::Pinned;
+        for rods in self.tied_groups() {
+            let windy = self.wind.is_some();
+            let between_clamps = self.axis_of(rods.clone()).filter(|_| !windy);
+            turnings.extend(between_clamps.map(|axis| Turning {
+                rods: rods.clone(),
+                point: DVec3::ZERO,
+                axis,
+                own: -1.0,
+                bent: true,
+            }));
+            if hinged {
+                // In this order: to lean, a vein spins back from where it has turned to as a whole.
+                let rigid = self.rigid_turn(&rods).filter(|_| !windy);
+                turnings.extend(rigid);
+                turnings.extend(rods.filter(|j| self.spins(*j)).map(|j| self.spin(j)));
+            }
         }
-        let groups = self.tied_groups().into_iter();
-        groups
-            .filter_map(|rods| {
-                let axis = self.axis_of(rods.clone())?;
-                Some(Turning { rods, axis })
+        turnings
+    }
+
+    /// Whether every section of a vein on a hinge can turn about its own tangent, if it is round or
+    /// straight.
+    fn spins(&self, vein: usize) -> bool {
+        let gaps = [vein.checked_sub(1), Some(vein)].into_iter().flatten();
+        let tissue = |gap| (self.tissue.iter()).any(|all| all.get(gap).is_some_and(has_some));
+        let clamps = |grip: &Grip| grip.vein == vein && grip.held == Hold::Clamped;
+        let tip = self.held_tip.as_ref();
+        tip.is_none_or(|held| held.clamps.is_none())
+            && !gaps.clone().any(tissue)
+            && !self.grips.iter().any(clamps)
+            && !self.has_moments_on(&(vein..vein + 1))
+    }
+
+    fn spin(&self, vein: usize) -> Turning {
+        Turning {
+            rods: vein..vein + 1,
+            point: DVec3::ZERO,
+            axis: DVec3::ZERO,
+            own: 1.0,
+            bent: is_round(&self.rods[vein]),
+        }
+    }
+
+    /// The turn of a group of tied veins on hinges as a rigid body, about the line through the points
+    /// where it is held or, if there is only one, along its loads.
+    fn rigid_turn(&self, group: &Range<usize>) -> Option<Turning> {
+        let apart = self.held_apart(group)?;
+        let near = ROUNDING * super::longest(&self.rods);
+        let on_line = |axis: DVec3| {
+            let mut apart = apart.iter();
+            apart.all(|it| it.reject_from_normalized(axis).length() <= near)
+        };
+        let loads = self.loads_on(group);
+        let axis = self.line_of(group, &apart)?;
+        let turns = on_line(axis)
+            && loads.iter().all(|load| is_along(*load, axis))
+            && self.coupling_is_isotropic(group, axis);
+        turns.then(|| Turning {
+            rods: group.clone(),
+            point: self.rods[group.start].base_position(),
+            axis,
+            own: 0.0,
+            bent: true,
+        })
+    }
+
+    /// The places where a group of veins is held, from that of its first hinge; `None` if clamps hold
+    /// it, or moments act, or grips, whose places depend on the shapes at rest.
+    fn held_apart(&self, group: &Range<usize>) -> Option<Vec<DVec3>> {
+        let tip = self.held_tip.as_ref();
+        let gripped = self.grips.iter().any(|grip| group.contains(&grip.vein));
+        let clamped = tip.is_some_and(|held| held.clamps.is_some());
+        if gripped || clamped || self.has_moments_on(group) {
+            return None;
+        }
+        let tip = tip.map(|held| DVec3::from_array(held.position));
+        let bases = self.rods[group.clone()].iter().map(Rod::base_position);
+        let first = self.rods[group.start].base_position();
+        Some(bases.chain(tip).map(|place| place - first).collect())
+    }
+
+    /// The direction of the line through these places, or of a load; `None` without any.
+    fn line_of(&self, group: &Range<usize>, apart: &[DVec3]) -> Option<DVec3> {
+        let near = ROUNDING * super::longest(&self.rods);
+        let line = apart.iter().find(|apart| apart.length() > near).copied();
+        let load = |load: &DVec3| *load != DVec3::ZERO;
+        let axis = line.or_else(|| self.loads_on(group).into_iter().find(load));
+        axis.map(DVec3::normalize)
+    }
+
+    /// Whether a group of veins on one hinge has no load: nothing tells where it points.
+    pub fn turns_freely(&self) -> bool {
+        let free = |group: Range<usize>| {
+            let apart = self.held_apart(&group);
+            apart.is_some_and(|apart| self.line_of(&group, &apart).is_none())
+        };
+        let hinged = self.base_held == Hold::Pinned && self.wind.is_none();
+        hinged && self.tied_groups().into_iter().any(free)
+    }
+
+    /// Whether a coupling within a group differs from a multiple of the unit matrix along an axis
+    /// alone.
+    fn coupling_is_isotropic(&self, group: &Range<usize>, axis: DVec3) -> bool {
+        self.coupling[group.start..group.end - 1].iter().all(|k| {
+            (0..3).any(|own| {
+                let [one, other] = [k[(own + 1) % 3], k[(own + 2) % 3]];
+                let on_axis = axis.reject_from_normalized(DVec3::AXES[own]).length() <= ROUNDING;
+                same(one, other) && (same(one, k[own]) || on_axis)
             })
-            .collect()
+        })
+    }
+
+    /// Whether dead moments, which have no potential, act on a group of veins.
+    fn has_moments_on(&self, group: &Range<usize>) -> bool {
+        let mut points = self.points.iter();
+        let turned = points.any(|it| group.contains(&it.vein) && it.moment != [0.0; 3]);
+        turned || self.tip_moment != [0.0; 3]
+    }
+
+    /// All loads on a group of veins, where they may be largest.
+    fn loads_on(&self, group: &Range<usize>) -> Vec<DVec3> {
+        let points = self.points.iter();
+        let points = points.filter(|point| group.contains(&point.vein));
+        let of_veins = group.clone().flat_map(|vein| {
+            let weight = self.weight(vein);
+            let of_mass = weight.of_mass.map(|(g, _)| g);
+            let weights = [weight.even].into_iter().chain(of_mass);
+            weights.chain(self.distributed_at_knots(vein))
+        });
+        let forces = points.map(|point| self.force_on(point));
+        let all = of_veins.chain(forces).chain([self.tip_force]);
+        all.map(DVec3::from_array).collect()
     }
 
     /// The veins that couplings, tissue or a free joint tip tie together.
@@ -52,56 +270,42 @@ impl Scenario {
             .collect()
     }
 
-    /// The axis about which a group of tied veins can turn.
+    /// The axis about which a group of tied veins can turn between clamps.
     fn axis_of(&self, group: Range<usize>) -> Option<DVec3> {
         let rods = &self.rods[group.clone()];
         let tangent = |rod: &Rod| rod.base_rotation() * DVec3::X;
-        let axis = tangent(rods.first()?);
+        let mut grips = self.grips.iter().filter(|grip| group.contains(&grip.vein));
+        let gripped = grips.clone().any(|grip| grip.held == Hold::Clamped);
+        let clamps = self.held_tip.as_ref().and_then(|tip| tip.clamps.as_ref());
+        let clamp = clamps.map(|clamps| clamps[group.start].rotation() * DVec3::X);
+        // Where grips hold a vein depends on how it begins in the natural leaf.
+        let free = self.base_held == Hold::Pinned && grips.clone().next().is_none();
+        let axis = match self.base_held {
+            Hold::Pinned if free => clamp?,
+            Hold::Pinned if !gripped && clamp.is_none() => return None,
+            _ => tangent(rods.first()?),
+        };
         let in_line = |direction: DVec3| direction.distance(axis) <= ROUNDING;
-        let is_along =
-            |load: DVec3| load.reject_from_normalized(axis).length() <= ROUNDING * load.length();
-        let along = |load: [f64; 3]| is_along(DVec3::from_array(load));
+        let along = |load: [f64; 3]| is_along(DVec3::from_array(load), axis);
         let held = self.held_tip.as_ref().is_none_or(|held| {
             let clamps = held.clamps.as_ref().map(|clamps| &clamps[group.clone()]);
             let mut clamps = clamps.into_iter().flatten();
             along(held.position) && clamps.all(|clamp| in_line(clamp.rotation() * DVec3::X))
         });
-        // A coupling differs from a multiple of the unit matrix along the axis alone.
         let gaps = group.start..group.end - 1;
-        let within = &self.coupling[gaps.clone()];
-        let coupling = within.iter().all(|k| {
-            (0..3).any(|own| {
-                let [one, other] = [k[(own + 1) % 3], k[(own + 2) % 3]];
-                let on_axis = axis.reject_from_normalized(DVec3::AXES[own]).length() <= ROUNDING;
-                same(one, other) && (same(one, k[own]) || on_axis)
-            })
-        });
         let tissue = self
             .tissue
             .iter()
             .any(|all| all[gaps.clone()].iter().any(has_some));
-        let loads = |vein: usize| {
-            let weight = self.weight(vein);
-            along(weight.even)
-                && weight.of_mass.is_none_or(|(g, _)| along(g))
-                && self.distributed_at_knots(vein).all(along)
-        };
-        let mut points = self
-            .points
-            .iter()
-            .filter(|point| group.contains(&point.vein));
-        let mut grips = self.grips.iter().filter(|grip| group.contains(&grip.vein));
-        let turns = rods.iter().all(|rod| in_line(tangent(rod)) && is_along(rod.base_position()))
-            && self.base_held == Hold::Clamped
+        let begins =
+            |rod: &Rod| (free || in_line(tangent(rod))) && is_along(rod.base_position(), axis);
+        let turns = rods.iter().all(begins)
             && !tissue
-            && group.clone().all(loads)
-            && points.all(|point| along(self.force_on(point)))
+            && self.loads_on(&group).iter().all(|load| is_along(*load, axis))
             && grips.all(|grip| along(grip.displacement))
-            && along(self.tip_force)
-            // A dead moment has no potential.
-            && !self.has_moments()
+            && !self.has_moments_on(&group)
             && held
-            && coupling
+            && self.coupling_is_isotropic(&group, axis)
             // This takes longest.
             && rods.iter().all(is_round);
         turns.then_some(axis)
@@ -126,19 +330,23 @@ const ON_AXIS: f64 = 1e-6;
 
 impl Scenario {
     /// Number of directions in which the leaf can move without resistance in an equilibrium: one
-    /// for every group of veins that can turn and is bent. Each has an eigenvalue that is zero.
-    /// `points` are those of a vein.
+    /// for every vein that can spin, and for every group that can turn and is bent. Each has an
+    /// eigenvalue that is zero. `points` are those of a vein.
     pub fn neutral_directions<P: IntoIterator<Item = DVec3>>(
         &self,
         points: impl Fn(usize) -> P,
     ) -> usize {
         let near = ON_AXIS * super::longest(&self.rods);
-        let bent = |turning: &Turning| {
-            let mut points = turning.rods.clone().flat_map(&points);
-            points.any(|point| point.reject_from_normalized(turning.axis).length() > near)
+        let moves = |turning: &Turning| {
+            let points: Vec<DVec3> = turning.rods.clone().flat_map(&points).collect();
+            turning.moves(&points, turning.point, near)
         };
-        self.turnings().iter().filter(|it| bent(it)).count()
+        self.turnings().iter().filter(|it| moves(it)).count()
     }
+}
+
+fn is_along(vector: DVec3, axis: DVec3) -> bool {
+    vector.reject_from_normalized(axis).length() <= ROUNDING * vector.length()
 }
 
 fn has_some(tissue: &Tissue) -> bool {
@@ -164,101 +372,4 @@ fn is_round(rod: &Rod) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scenario::Entries;
-
-    fn turnings(change: &str) -> Vec<Turning> {
-        turnings_with("", change)
-    }
-
-    fn turnings_with(tables: &str, change: &str) -> Vec<Turning> {
-        let text = r#"
-            name = "round"
-            leaf = { rods = 2, length = [1.0, 0.8], fan = [0.0, 0.0], joined = false }
-            stiffness = { torsion = 0.7, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = 9.0, shear_3 = 9.0 }
-            coupling = { x = 1.0, y = 2.0, z = 2.0 }
-            [load]
-            gravity = [-3.0, 0.0, 0.0]
-            "#;
-        let entries = change.split("; ").filter(|entry| !entry.is_empty());
-        let entries: Vec<_> = entries.map(|entry| entry.into()).collect();
-        let text = format!("{text}\n{tables}");
-        let given = Entries::of_text(&text, "round").unwrap().replaced(&entries);
-        given.unwrap().checked().unwrap().turnings()
-    }
-
-    fn about(axis: DVec3, rods: Range<usize>) -> Turning {
-        Turning { rods, axis }
-    }
-
-    #[test]
-    fn only_what_has_no_preferred_direction_turns() {
-        let both = [about(DVec3::X, 0..2)];
-        assert_eq!(turnings(""), both);
-        assert_eq!(turnings("rest.twist=0.4"), both);
-        assert_eq!(turnings("rest.bend_2=0.1"), []);
-    }
-
-    /// A column that stands upright, or a force in its middle: along the axis nothing changes.
-    #[test]
-    fn loads_along_the_axis_leave_it_free_to_turn() {
-        let upright = "leaf.elevation=1.5707963267948966; coupling.x=2; coupling.z=1; load.gravity=[0, 0, -3]";
-        let axis = turnings(upright);
-        assert!(axis.len() == 1 && axis[0].axis.distance(DVec3::Z) < 1e-15);
-        assert_eq!(
-            turnings(&upright.replace("coupling.z=1", "coupling.z=2.5; coupling.y=1")),
-            []
-        );
-        let both = [about(DVec3::X, 0..2)];
-        for (entry, turns) in [
-            ("leaf.base=[-0.3, 0, 0]", true),
-            ("leaf.base=[[0, 0, 0], [0, 0.1, 0]]", false),
-            ("leaf.base_held=pinned", false),
-            ("load.gravity=[[1, 0, 0], [-2, 0, 0]]", true),
-            ("load.gravity=[[1, 0, 0], [-2, 0, 1]]", false),
-            ("load.g=[-1, 0, 0]; dynamics.density=1", true),
-            ("load.g=[0, 0, -1]; dynamics.density=1", false),
-            (
-                "load.distributed={at=[0, 1], value=[[0, 0, 0], [1, 0, 0]]}",
-                true,
-            ),
-            (
-                "load.distributed={at=[0, 1], value=[[0, 0, 0], [1, 1, 0]]}",
-                false,
-            ),
-            ("tissue.normal=1", false),
-        ] {
-            assert_eq!(turnings(entry) == both, turns, "{entry}");
-        }
-        let held = |tables: &str, along: &str, across: &str| {
-            for (vector, turns) in [(along, true), (across, false)] {
-                let found = turnings_with(&tables.replace("VECTOR", vector), "");
-                assert_eq!(found == both, turns, "{tables} {vector}");
-            }
-        };
-        held(
-            "[[load.point]]\nvein = 2\nat = 0.4\nforce = VECTOR",
-            "[2, 0, 0]",
-            "[0, 1, 0]",
-        );
-        held(
-            "[[grip]]\nvein = 2\nat = 0.4\nheld = 'clamped'\nmove = VECTOR",
-            "[-0.1, 0, 0]",
-            "[0, 0, 1]",
-        );
-    }
-
-    /// Veins that nothing ties together turn each for itself, and only those that are round.
-    #[test]
-    fn untied_veins_turn_each_for_itself() {
-        let untied = "coupling.x=0; coupling.y=0; coupling.z=0";
-        let each = [about(DVec3::X, 0..1), about(DVec3::X, 1..2)];
-        assert_eq!(turnings(untied), each);
-        let strip = format!("{untied}; stiffness.bending_3=[3.0, 1.0]");
-        assert_eq!(turnings(&strip), each[1..]);
-        let aside = format!("{untied}; leaf.fan=[0.3, 0.0]");
-        assert_eq!(turnings(&aside), each[1..]);
-        assert_eq!(turnings(&format!("{aside}; leaf.joined=true")), []);
-    }
-}
+mod tests;

@@ -34,6 +34,8 @@ pub struct CondensedEquations {
     /// turn without resistance.
     determined: usize,
     tip: Tip,
+    /// The first of the components that are free at the base.
+    free_at_base: usize,
     units: Units,
 }
 
@@ -75,6 +77,7 @@ impl CondensedEquations {
             right: svd.V().to_owned(),
             determined,
             tip,
+            free_at_base: equations.free_at_base(),
             units: units.clone(),
         };
         let least = orthonormal((0..turns.len()).map(|k| march.direction(k).swap_remove(0)));
@@ -168,11 +171,15 @@ impl CondensedEquations {
             free -= &shifts[k];
             back_substitute(&self.growths[k], &mut free);
         }
-        // At the clamp only forces and moments are free.
+        // At the base six components are free.
+        let first = self.free_at_base;
         let rods = free.nrows() / 6;
         let base = (0..rods).flat_map(|j| {
             let free = &free;
-            (0..TANGENT).map(move |k| if k < 6 { 0.0 } else { free[6 * j + k - 6] })
+            (0..TANGENT).map(move |k| match k.checked_sub(first) {
+                Some(k) if k < 6 => free[6 * j + k],
+                _ => 0.0,
+            })
         });
         increments.push(base.collect());
         increments.reverse();

@@ -2,7 +2,7 @@
 
 use crate::largest::larger;
 use crate::shooting::equations::Equations;
-use crate::shooting::own_loads::SAME_PLACE;
+use crate::shooting::equations::SAME_PLACE;
 use crate::shooting::state::{RodState, STATE};
 use crate::tableau::{A, B, C, E3, E5, STAGES};
 

@@ -11,13 +11,14 @@
 //! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
 //! ```
 
+mod base;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::limit::Limit;
-use crate::scenario::{Profile, Scenario, Turning, longest};
+use crate::scenario::{Hold, Profile, Scenario, Turning, longest};
 use crate::shooting::arcs;
 use crate::shooting::arcs::Arc;
-use crate::shooting::own_loads::SAME_PLACE;
 use crate::shooting::state::{Derivatives, RodState, STATE};
 use crate::shooting::tissue::{Tangent, Tissue};
 
@@ -42,6 +43,8 @@ pub struct Equations<'a> {
     tip_moment: DVec3,
     /// Positions and rotations at which the tips of the rods are held.
     held: Vec<(DVec3, DQuat)>,
+    /// Whether hinges hold the bases.
+    hinged: bool,
     /// The smallest couple stiffness along each rod.
     pub softest: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
@@ -60,6 +63,9 @@ pub struct Equations<'a> {
     /// Time limit of their solution.
     pub limit: Limit,
 }
+
+/// Fractions of the length closer to each other than this are the same.
+pub(in crate::shooting) const SAME_PLACE: f64 = 1e-11;
 
 /// Constraint on the tips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,6 +154,7 @@ impl<'a> Equations<'a> {
                     Some((position, clamp.unwrap_or_default()))
                 })
                 .collect(),
+            hinged: scenario.base_held == Hold::Pinned,
             softest,
             turnings: scenario.turnings(),
             arcs: arcs::arcs(scenario, &lengths),
@@ -199,23 +206,14 @@ impl<'a> Equations<'a> {
         Some(Tangent(matrix * self.part))
     }
 
-    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there.
-    /// A kink within rounding of either is there.
+    /// Where an integration step from `from` towards `to` must end: at a kink before it, or there. A
+    /// station beside a kink is this kink: a load there would be passed at both.
     pub fn stop(&self, from: f64, to: f64) -> f64 {
-        let next = (self.kinks).partition_point(|kink| *kink <= from + SAME_PLACE);
-        let kink = self.kinks.get(next).copied();
-        kink.filter(|kink| *kink < to - SAME_PLACE).unwrap_or(to)
-    }
-
-    /// The state at the base for given forces and moments: conditions (a) and (c).
-    pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
-        let (position, q) = self.scenario.base(j);
-        RodState {
-            r: position / self.length,
-            q,
-            n,
-            m,
-        }
+        let next = self
+            .kinks
+            .partition_point(|kink| *kink <= from + SAME_PLACE);
+        let before = self.kinks.get(next).filter(|kink| **kink < to - SAME_PLACE);
+        before.copied().unwrap_or(to)
     }
 
     /// The veins that can turn without resistance, if the leaf has its own shape at rest.
@@ -224,15 +222,6 @@ impl<'a> Equations<'a> {
             true => &self.turnings,
             false => &[],
         }
-    }
-
-    /// A flat state at the base without stress.
-    pub fn clamped(&self) -> Vec<f64> {
-        let mut y = vec![0.0; self.size()];
-        for j in 0..self.rods() {
-            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
-        }
-        y
     }
 
     fn material(&self, j: usize, sigma: f64) -> Material {

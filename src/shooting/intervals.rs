@@ -160,8 +160,8 @@ pub fn responses(
         let some = some.into_par_iter().map(|task| {
             let (steps, j) = (&integrated[task / rods].steps, task % rods);
             match task < rods {
-                true => responses_of::<6>(equations, steps, j),
-                false => responses_of::<TANGENT>(equations, steps, j),
+                true => responses_of::<6>(equations, steps, (j, equations.free_at_base())),
+                false => responses_of::<TANGENT>(equations, steps, (j, 0)),
             }
         });
         found.par_extend(some);
@@ -170,8 +170,8 @@ pub fn responses(
 }
 
 /// The sensitivities of the ends of all intervals to their beginnings, in the
-/// given units: square, except in the first interval, which begins at the clamp,
-/// where only forces and moments are perturbed.
+/// given units: square, except in the first interval, which begins at the base,
+/// where only [six components](Equations::free_at_base) are perturbed.
 pub fn sensitivities(
     equations: &Equations,
     units: &Units,
@@ -181,14 +181,17 @@ pub fn sensitivities(
     let rods = equations.rods();
     (responses.chunks(rods).enumerate())
         .map(|(k, columns)| {
-            let kinds = if k == 0 { 6 } else { TANGENT };
+            let (kinds, first_kind) = match k {
+                0 => (6, equations.free_at_base()),
+                _ => (TANGENT, 0),
+            };
             let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
             let mut largest: f64 = 1.0;
             for (j, (first, rows)) in columns.iter().enumerate() {
                 for (i, row) in rows.chunks(kinds).enumerate() {
                     let row_index = TANGENT * first + i;
                     for (k, value) in row.iter().enumerate() {
-                        let from = TANGENT * j + TANGENT - kinds + k;
+                        let from = TANGENT * j + first_kind + k;
                         matrix[(row_index, kinds * j + k)] =
                             value * units.of(from) / units.of(row_index);
                         if from % TANGENT / 3 == row_index % TANGENT / 3 {
@@ -203,13 +206,13 @@ pub fn sensitivities(
         .collect()
 }
 
-/// Responses to the perturbations of rod `j`.
+/// Responses to the perturbations of rod `j`, of its components from the `first` on.
 fn responses_of<const W: usize>(
     equations: &Equations,
     steps: &[LinearStep],
-    j: usize,
+    (j, first): (usize, usize),
 ) -> Responses {
-    let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+    let mut perturbations = Perturbations::<W>::unit(group(equations, j), j, first);
     for step in steps {
         perturbations.advance(equations, step);
     }
@@ -230,7 +233,7 @@ pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Node
         }
         let mut integrator = Integrator::new(equations, begin, near.at(begin), ROUGH);
         let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
-            .map(|j| Perturbations::unit(j..j + 1, j))
+            .map(|j| Perturbations::unit(j..j + 1, j, 0))
             .collect();
         while integrator.sigma < 1.0 {
             let before = integrator.sigma;

@@ -11,8 +11,7 @@ mod neutral;
 
 use crate::largest::largest;
 use crate::memory;
-use crate::rotation::angle_about;
-use crate::scenario::Turning;
+use crate::scenario::{Begin, Turning};
 use crate::shape::equally_spaced;
 use crate::shooting::condensed::CondensedEquations;
 use crate::shooting::equations::Equations;
@@ -22,10 +21,13 @@ use crate::shooting::intervals::{
 use crate::shooting::solution::{Correction, Log, Reason};
 use crate::shooting::state::{RodState, TANGENT};
 use crate::shooting::trajectory::{Nodes, Trajectory};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// A leaf that turned by less than this (radians) keeps its linearisation.
 const SAME_LINEARIZATION: f64 = 1e-3;
+
+/// Distance from an axis (lengths) within which a point is on it.
+const ON_AXIS: f64 = 1e-6;
 
 /// Changes of a base's force and moment, in their units, below which a leaf does not turn: it is
 /// straight.
@@ -79,6 +81,8 @@ pub struct Newton<'e, 'a, 'p> {
     pub nodes: Nodes,
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
+    /// Which of the turns without resistance move something.
+    moved: Vec<bool>,
     /// The last linearisation.
     pub condensed: Option<CondensedEquations>,
     /// Growth of perturbations over each interval, at that linearisation.
@@ -117,13 +121,16 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         let first = &mut nodes.states[0];
         for j in 0..equations.rods() {
             let rod = RodState::read(first, j);
-            equations.base(j, rod.n, rod.m).write(first, j);
+            equations.held_base(j, &rod).write(first, j);
         }
         Ok(Newton {
             equations,
             units: Units::new(equations, near),
             nodes,
             only_near: false,
+            moved: (equations.turnings().iter())
+                .map(|turning| turns_something(equations, near, turning))
+                .collect(),
             condensed: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
@@ -239,46 +246,68 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         }
     }
 
-    /// The changes of forces and moments at the base as veins turn that can without resistance, in
-    /// the units; none of those that carry nothing.
+    /// The changes at the base as veins turn that can without resistance, in the units; none of those
+    /// that move nothing.
     fn turns(&self) -> Vec<Vec<f64>> {
         let base = &self.nodes.states[0];
-        let turn = |Turning { rods, axis }: &Turning| {
+        let turn = |turning: &Turning| {
+            let (rods, axis) = (&turning.rods, turning.axis);
             let mut turn = vec![0.0; TANGENT * self.equations.rods()];
             for j in rods.clone() {
                 let rod = RodState::read(base, j);
                 let unit = |k: usize| self.units.of(TANGENT * j + k);
                 let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
-                let own = &mut turn[TANGENT * j + 6..TANGENT * (j + 1)];
-                own[..3].copy_from_slice(&force.to_array());
-                own[3..].copy_from_slice(&moment.to_array());
+                let [spin, _] = turning.rates(rod.r, rod.q, self.equations.length);
+                let own = &mut turn[TANGENT * j..TANGENT * (j + 1)];
+                // A clamp does not turn.
+                if self.equations.free_at_base() == 3 {
+                    own[3..6].copy_from_slice(&spin.to_array());
+                }
+                own[6..9].copy_from_slice(&force.to_array());
+                own[9..].copy_from_slice(&moment.to_array());
             }
             turn
         };
         let carries = |turn: &Vec<f64>| turn.iter().any(|value| value.abs() > NO_TURN);
-        let turns = self.equations.turnings().iter().map(turn);
+        let turns = self.turnings().map(turn);
         turns.filter(carries).collect()
     }
 
-    /// Turns veins that can turn without resistance until their moment at the base bends them down
-    /// (towards -e3), as those of a relaxed leaf are.
+    /// The turns of the leaf without resistance: on hinges those that moved something in the start.
+    fn turnings(&self) -> impl Iterator<Item = &Turning> {
+        let turnings = self.equations.turnings().iter().enumerate();
+        let moved = turnings.filter(|(k, _)| self.moved[*k]);
+        moved.map(|(_, turning)| turning)
+    }
+
+    /// Turns veins that can turn without resistance as those of a relaxed leaf are turned.
     fn lean_down(&mut self) {
-        for Turning { rods, axis } in self.equations.turnings() {
-            let moments = (rods.clone()).map(|j| RodState::read(&self.nodes.states[0], j).m);
-            let angle = angle_about(*axis, moments.sum(), axis.cross(-DVec3::Z));
-            let turn = DQuat::from_axis_angle(*axis, angle);
-            let back = DQuat::from_rotation_x(-angle);
+        let turnings: Vec<Turning> = self.turnings().cloned().collect();
+        for turning in turnings {
+            let rods = &turning.rods;
+            let bases = |j: usize| RodState::read(&self.nodes.states[0], j);
+            let natural = self.equations.clamped();
+            let begin = |j: usize| Begin {
+                natural: RodState::read(&natural, j).q,
+                now: bases(j).q,
+            };
+            let begins: Vec<Begin> = rods.clone().map(begin).collect();
+            let clamped = self.equations.free_at_base() == 6;
+            let moments = clamped.then(|| rods.clone().map(|j| bases(j).m).sum());
+            let angle = turning.angle_to_lean(&begins, moments);
+            let [turn, back] = turning.rotations(angle);
+            let point = turning.point / self.equations.length;
             for (k, state) in self.nodes.states.iter_mut().enumerate() {
                 for j in rods.clone() {
                     let rod = RodState::read(state, j);
                     let turned = RodState {
-                        r: turn * rod.r,
+                        r: point + turn * (rod.r - point),
                         q: turn * rod.q * back,
                         n: turn * rod.n,
                         m: turn * rod.m,
                     };
                     let turned = match k {
-                        0 => self.equations.base(j, turned.n, turned.m),
+                        0 => self.equations.held_base(j, &turned),
                         _ => turned,
                     };
                     turned.write(state, j);
@@ -349,6 +378,16 @@ impl Residuals {
         let defects = self.defects.iter().chain(&tip).flatten();
         largest(defects.map(|value| value.abs()))
     }
+}
+
+/// Whether a turn moves something of the leaf at the start; for clamped veins their forces tell it.
+fn turns_something(equations: &Equations, near: &Trajectory, turning: &Turning) -> bool {
+    let stations = STATIONS.iter().map(|sigma| near.at(*sigma));
+    let states: Vec<Vec<f64>> = stations.collect();
+    let of_rod = |j: usize| states.iter().map(move |y| RodState::read(y, j).r);
+    let points: Vec<DVec3> = turning.rods.clone().flat_map(of_rod).collect();
+    let point = turning.point / equations.length;
+    turning.own < 0.0 || turning.moves(&points, point, ON_AXIS)
 }
 
 /// The largest component of an increment.

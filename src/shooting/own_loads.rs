@@ -2,11 +2,8 @@
 
 use glam::DVec3;
 
-use crate::shooting::equations::Equations;
+use crate::shooting::equations::{Equations, SAME_PLACE};
 use crate::shooting::state::{RodState, STATE};
-
-/// Fractions of the length closer to each other than this are the same.
-pub(in crate::shooting) const SAME_PLACE: f64 = 1e-11;
 
 impl Equations<'_> {
     /// Load of rod `j` alone, per length: its weight besides the common one, and what is

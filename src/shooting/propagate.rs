@@ -54,11 +54,11 @@ pub struct Perturbations<const W: usize> {
 }
 
 impl<const W: usize> Perturbations<W> {
-    /// Unit perturbations of the last `W` components of rod `j`.
-    pub fn unit(rods: Range<usize>, j: usize) -> Self {
+    /// Unit perturbations of the `W` components of rod `j` from the `first` on.
+    pub fn unit(rods: Range<usize>, j: usize, first: usize) -> Self {
         let mut all = vec![0.0; TANGENT * rods.len() * W];
         for k in 0..W {
-            all[(TANGENT * (j - rods.start) + TANGENT - W + k) * W + k] = 1.0;
+            all[(TANGENT * (j - rods.start) + first + k) * W + k] = 1.0;
         }
         Perturbations {
             rods,
@@ -192,7 +192,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::scenario::Scenario;
+    use crate::scenario::{Hold, Scenario};
     use crate::shooting::state::RodState;
 
     const END: f64 = 0.8;
@@ -258,8 +258,11 @@ mod tests {
     }
 
     /// Responses of its group to unit perturbations of rod `j`.
-    fn linear<const W: usize>(equations: &Equations, j: usize) -> Perturbations<W> {
-        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+    fn linear<const W: usize>(
+        equations: &Equations,
+        (j, first): (usize, usize),
+    ) -> Perturbations<W> {
+        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j, first);
         let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);
         let mut advance = |integrator: &Integrator| {
             perturbations.advance(equations, &LinearStep::of(equations, integrator));
@@ -275,7 +278,7 @@ mod tests {
         let equations = Equations::new(&scenario);
         let begin = begin(&equations);
         for j in 0..3 {
-            let linear = linear::<TANGENT>(&equations, j);
+            let linear = linear::<TANGENT>(&equations, (j, 0));
             assert_eq!(linear.rods, if j < 2 { 0..2 } else { 2..3 });
             for k in 0..TANGENT {
                 let central = |h: f64| {
@@ -298,12 +301,16 @@ mod tests {
     }
 
     #[test]
-    fn at_the_clamp_only_forces_and_moments_are_perturbed() {
-        let scenario = three();
-        let equations = Equations::new(&scenario);
-        let (all, some) = (linear::<TANGENT>(&equations, 1), linear::<6>(&equations, 1));
-        for (all, some) in all.rows().iter().zip(some.rows()) {
-            assert_eq!(all[6..], some[..]);
+    fn at_the_base_six_components_are_perturbed() {
+        let mut scenario = three();
+        for (held, free) in [(Hold::Clamped, 6), (Hold::Pinned, 3)] {
+            scenario.base_held = held;
+            let equations = Equations::new(&scenario);
+            let all = linear::<TANGENT>(&equations, (1, 0));
+            let some = linear::<6>(&equations, (1, equations.free_at_base()));
+            for (all, some) in all.rows().iter().zip(some.rows()) {
+                assert_eq!(all[free..free + 6], some[..]);
+            }
         }
     }
 

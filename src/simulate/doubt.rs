@@ -81,10 +81,14 @@ fn deviation(
     mode: &[Increment],
 ) -> f64 {
     let (mut field, mut along, mut largest) = (Vec::new(), 0.0, 0.0_f64);
-    from.increments_to(to, &mut field);
-    for (j, i) in leaf.each(1..=leaf.segments()) {
+    from.increments_to(to, leaf.first_node(), &mut field);
+    for (j, i) in leaf.each(leaf.moving_nodes()) {
         let (k, inertia) = (from.base(j) + i, physics.inertia(leaf, j, i));
-        let (off, mode, tensor) = (&field[j][i - 1], &mode[k], inertia.tensor(from.q[k]));
+        let (off, mode, tensor) = (
+            &field[j][i - leaf.first_node()],
+            &mode[k],
+            inertia.tensor(from.q[k]),
+        );
         along += turn(mode).dot(tensor * turn(off)) + inertia.mass * shift(mode).dot(shift(off));
         largest = largest.max(turn(mode).length()).max(shift(mode).length());
     }

@@ -5,6 +5,7 @@ use crate::relax::{
     Equilibrium, Follower, Options, Parameter, Progress, RelaxError, Sensitivity, relax_on_grids,
     sensitivities, without_wind,
 };
+use crate::scenario::Scenario;
 
 /// Why there are no derivatives.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +40,7 @@ pub fn relax_with_sensitivities(
     let (mut leaf, found) = relax_on_grids(scenario, options, false, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     let turns = leaf.stability.neutral_directions > 0;
-    let turnings = scenario.turnings().len();
+    let turnings = bent_turnings(scenario);
     let (none, known): (Vec<_>, Vec<_>) = (numbers.into_iter())
         .partition(|(_, number)| at_rest && turns && decides_where_it_turns(number, turnings));
     leaf.doubts
@@ -94,7 +95,11 @@ fn numbers<'v>(base: &'v Base, values: &'v [(&'v Keys, f64)]) -> Vec<(String, Pa
 fn decides_where_it_turns(number: &Parameter, turnings: usize) -> bool {
     let near = number.rate().unwrap_or_default();
     near.iter()
-        .any(|(_, scenario)| scenario.turnings().len() < turnings)
+        .any(|(_, scenario)| bent_turnings(scenario) < turnings)
+}
+
+fn bent_turnings(scenario: &Scenario) -> usize {
+    scenario.turnings().iter().filter(|it| it.bent).count()
 }
 
 fn no_derivative(key: &str) -> String {

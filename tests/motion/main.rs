@@ -3,6 +3,7 @@
 mod damping;
 mod energy;
 mod grips;
+mod hinges;
 mod moments;
 mod momentum;
 mod order;

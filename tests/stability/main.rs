@@ -6,6 +6,7 @@ mod boundary;
 mod boundary_random;
 mod eigenvalue_bars;
 mod follower;
+mod hinges;
 mod lateral_buckling;
 mod map_jumps;
 mod margin_of_grips;

@@ -16,6 +16,7 @@ mod grips;
 mod growth;
 mod held_tips;
 mod helix;
+mod hinges;
 mod lens;
 mod linear_theory;
 mod loads;

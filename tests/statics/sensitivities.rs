@@ -8,10 +8,11 @@ use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
 
-/// Leaves to be tried, from the second number on with grips; `LEAFDYN_LEAVES` in the environment
-/// asks for more.
-const LEAVES: usize = 32;
+/// Leaves to be tried, from the second number on with grips, from the third on with hinges;
+/// `LEAFDYN_LEAVES` in the environment asks for more.
+const LEAVES: usize = 38;
 const GRIPPED: usize = 24;
+const HINGED: usize = 32;
 
 /// A part of a scenario, and the keys that it has, between blanks.
 type Part = (String, &'static str);
@@ -53,7 +54,8 @@ fn stiffness(draw: &mut Draw, number: usize, rods: usize) -> Part {
 fn coupling(draw: &mut Draw, number: usize, rods: usize) -> Part {
     match rods {
         1 => {
-            let moment = if number.is_multiple_of(8) { 0.3 } else { 0.0 };
+            let some = number.is_multiple_of(8) && number < HINGED;
+            let moment = if some { 0.3 } else { 0.0 };
             let moment = format!("load.tip_moment = [0.0, {moment:?}, 0.0]");
             (moment, "load.tip_moment[1]")
         }
@@ -123,7 +125,8 @@ fn held_tip(draw: &mut Draw, number: usize, rods: usize) -> Part {
 fn grips(draw: &mut Draw, number: usize, rods: usize) -> Part {
     // Between two holders of a nearly rigid rod the force is that of rounding.
     let rigid = number % 5 == 4;
-    if number < GRIPPED || rigid && rods > 1 {
+    let ungripped = number >= HINGED && !number.is_multiple_of(2);
+    if number < GRIPPED || ungripped || rigid && rods > 1 {
         return (String::new(), "");
     }
     let held = ["clamped", "pinned"][number % 2];
@@ -142,7 +145,10 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
     let mut draw = Draw(number as u64);
     let rods = 1 + number % 4;
     let joined = !number.is_multiple_of(3);
-    let (stiffness, its_keys) = stiffness(&mut draw, number, rods);
+    let hinged = number >= HINGED;
+    // Round veins spin on hinges.
+    let round = hinged && number % 5 == 2;
+    let (stiffness, its_keys) = stiffness(&mut draw, number + usize::from(round), rods);
     let (coupling, coupling_keys) = coupling(&mut draw, number, rods);
     let (tip, tip_keys) = match rods > 1 && joined {
         true => held_tip(&mut draw, number, rods),
@@ -167,6 +173,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         {coupling}
         {apart}
         {grips}
+        leaf.base_held = "{}"
         leaf.rods = {rods}
         leaf.joined = {joined}
         leaf.length = {:?}
@@ -177,6 +184,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         load.tip_force = {:?}
         dynamics = {{ density = 1.3, rotary_inertia = 0.01 }}
         "#,
+        if hinged { "pinned" } else { "clamped" },
         draw.list(rods, 0.8, 1.2),
         draw.list(rods, -0.7, 0.7),
         draw.list(rods, -0.5, 0.5),

@@ -1,5 +1,7 @@
 //! Small vibrations of a leaf at rest: its stiffness and mass matrices, dense, and its modes.
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
 use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use leafdyn::internals::modes::{Eigenpair, Wanted, lowest};
@@ -11,11 +13,11 @@ use crate::Limit;
 use crate::motion::discrete;
 
 /// A leaf in a state, whose segments bear what their strains say, with its unknowns numbered:
-/// turns about and shifts along the lab axes. Bases are held; a joint tip is one point.
+/// turns about and shifts along the lab axes. Clamped bases have none; a joint tip is one point.
 pub struct Linear {
     numbers: DirectSolver,
     rods: usize,
-    segments: usize,
+    nodes: Range<usize>,
     stiffness: DMatrix<f64>,
     /// One over the root of the mass matrix.
     pub per_root_mass: DMatrix<f64>,
@@ -31,7 +33,7 @@ impl Linear {
         let zeros = DMatrix::zeros(numbers.size(), numbers.size());
         let mut linear = Linear {
             rods: leaf.rods(),
-            segments: leaf.segments(),
+            nodes: leaf.moving_nodes(),
             stiffness: zeros.clone(),
             per_root_mass: zeros,
             numbers,
@@ -41,10 +43,10 @@ impl Linear {
                 let numbers = linear.numbers.unknowns(j, i);
                 numbers.map(|number| f64::from(u8::from(number == k)))
             };
-            let rod = |j: usize| (1..=linear.segments).map(|i| node(j, i)).collect();
+            let rod = |j: usize| leaf.moving_nodes().map(|i| node(j, i)).collect();
             let field = (0..linear.rods).map(rod).collect();
             let forces = linear.numbers.product(&system, &field);
-            let column = linear.numbered(|j, i| forces[j][i - 1]);
+            let column = linear.numbered(|j, i| forces[j][i - leaf.first_node()]);
             linear.stiffness.set_column(k, &column);
         }
         linear.add_masses(leaf, physics, &state);
@@ -53,7 +55,7 @@ impl Linear {
 
     fn add_masses(&mut self, leaf: &DiscreteLeaf, physics: &Physics, state: &State) {
         let mut masses = vec![0.0; self.numbers.size()];
-        for (j, i) in leaf.each(1..=self.segments) {
+        for (j, i) in leaf.each(leaf.moving_nodes()) {
             let node = state.base(j) + i;
             let [turn, _, _, shift, ..] = self.numbers.unknowns(j, i);
             let inertia = physics.inertia(leaf, j, i);
@@ -82,7 +84,7 @@ impl Linear {
     pub fn numbered(&self, node: impl Fn(usize, usize) -> [f64; 6]) -> DVector<f64> {
         let mut all = DVector::zeros(self.numbers.size());
         for j in (0..self.rods).rev() {
-            for i in 1..=self.segments {
+            for i in self.nodes.clone() {
                 for (at, part) in self.numbers.unknowns(j, i).into_iter().zip(node(j, i)) {
                     all[at] = part;
                 }

@@ -102,10 +102,9 @@ fn turns(equilibrium: &Equilibrium) -> String {
     ) {
         (0, _) => String::new(),
         (1, 1) => ", one of a circle: it turns about its base without resistance".into(),
-        (1, _) => ", one of a circle: round veins turn about their base without resistance".into(),
+        (1, _) => ", one of a circle: veins turn about their base without resistance".into(),
         (count, _) => format!(
-            ", one of a family: {count} round veins, or groups of them, turn about their bases \
-             without resistance"
+            ", one of a family: in {count} ways veins turn about their bases without resistance"
         ),
     }
 }

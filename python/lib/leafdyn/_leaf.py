@@ -62,7 +62,7 @@ class Equilibrium(Viewed):
     negative_eigenvalues: int | None
     """The Morse index: 0 for a stable leaf; none if it is not known."""
     neutral_directions: int
-    """Directions in which the leaf moves without resistance, as round veins clamped in line turn: eigenvalues that are exactly zero."""
+    """Directions in which the leaf moves without resistance, as round veins clamped in line turn, and veins on hinges: eigenvalues that are exactly zero."""
     path: str | None
     """How the leaf came to this equilibrium: ``"stable-throughout"``, ``"snapped"``, ``"branched"`` or ``"released"``."""
     path_events: list[str]

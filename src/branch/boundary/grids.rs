@@ -21,7 +21,9 @@ pub fn on_finer<'a>(
         &point.solution.state,
     );
     let finer = manifold.refined();
-    let point = transferred(point, state, prolong_field);
+    let point = transferred(point, state, |field| {
+        prolong_field(field, manifold.first_node())
+    });
     let point = SingularPoint {
         tangent: finer.normalised(point.tangent),
         normal: finer.normalised(point.normal),
@@ -37,7 +39,9 @@ pub fn on_coarser(
     point: &SingularPoint,
 ) -> Option<(Grid, SingularPoint)> {
     let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
-    Some((coarse, transferred(point, state, every_second)))
+    let first = usize::from(!plane.first().hinged());
+    let point = transferred(point, state, |field| every_second(field, first));
+    Some((coarse, point))
 }
 
 /// The point on the grid of this state, to which `field` transfers increments.

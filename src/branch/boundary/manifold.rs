@@ -32,11 +32,11 @@ impl Direction {
 impl Manifold<'_> {
     /// The direction in which one parameter changes and nothing else.
     pub fn unit_parameter(&self, which: usize) -> Direction {
-        let segments = self.grid().segments();
+        let nodes = self.system.nodes();
         let mut params = [0.0; 2];
         params[which] = 1.0;
         Direction {
-            increments: vec![vec![[0.0; 6]; segments]; self.rods()],
+            increments: vec![vec![[0.0; 6]; nodes]; self.rods()],
             params,
         }
     }
@@ -44,7 +44,7 @@ impl Manifold<'_> {
     /// What leads from one solution to another.
     pub fn difference(&self, a: &Solution, b: &Solution) -> Direction {
         Direction {
-            increments: between(&a.state, &b.state),
+            increments: between(&a.state, &b.state, self.first_node()),
             params: [0, 1].map(|i| b.params[i] - a.params[i]),
         }
     }

@@ -57,7 +57,10 @@ fn for_pictures(plane: &Plane, point: &Verified) -> (Grid, Verified) {
     while grid.segments() > FINEST
         && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
     {
-        point.across.increments = every_second(&point.across.increments);
+        point.across.increments = every_second(
+            &point.across.increments,
+            usize::from(!plane.first().hinged()),
+        );
         (grid, point.state) = (coarse, state);
     }
     (grid, point)

@@ -71,7 +71,10 @@ fn vertex_between(
         part * (1.0 - part) * (1.0 - part),
         -part * part * (1.0 - part),
     ];
-    let mut increments = times(&between(&a.state, &b.state), hermite[0]);
+    let mut increments = times(
+        &between(&a.state, &b.state, equations.first_node()),
+        hermite[0],
+    );
     add(&mut increments, step * hermite[1], &a.tangent.increments);
     add(&mut increments, step * hermite[2], &b.tangent.increments);
     let fraction = a.fraction + hermite[0] * chord + hermite[1] * rates[0] + hermite[2] * rates[1];

@@ -49,7 +49,7 @@ impl Plane {
     /// The same on the grid with all segments halved; `leaf` is on this one.
     pub fn refined(&self, leaf: &DiscreteLeaf) -> Self {
         Plane {
-            dual: at_same_nodes(&self.dual),
+            dual: at_same_nodes(&self.dual, leaf.first_node()),
             own: self.own,
             through: (self.through.as_ref()).map(|state| prolong(leaf, state)),
         }
@@ -58,21 +58,26 @@ impl Plane {
     /// Signed distance of a state from it, without the parameter.
     fn distance(&self, state: &State) -> f64 {
         let through = self.through.as_ref();
-        through.map_or(0.0, |through| dot(&self.dual, &between(through, state)))
+        through.map_or(0.0, |through| {
+            let first = state.segments() + 1 - self.dual[0].len();
+            dot(&self.dual, &between(through, state, first))
+        })
     }
 }
 
 impl Equations<'_> {
-    /// Derivative, with respect to the parameter, of the positions of nodes held away from the
-    /// bases, which the forces do not contain; `None` if there are none.
+    /// Derivative, with respect to the parameter, of the positions of held nodes that have equations,
+    /// which the forces do not contain; `None` if there are none.
     fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
-        if !self.leaves.at([fraction])?.leaf.is_held() {
+        let leaf = &self.leaves.at([fraction])?.leaf;
+        if !leaf.is_held() && !leaf.hinged() {
             return Ok(None);
         }
+        let first = self.first_node();
         let held = |step: f64| {
             let mut held = state.clone();
             clamp(self.leaves.at([fraction + step])?, &mut held);
-            Ok(between(state, &held))
+            Ok(between(state, &held, first))
         };
         rate(held).map(Some)
     }
@@ -191,9 +196,15 @@ impl Equations<'_> {
     /// Subtracts the turns of veins that can turn without resistance, so that a tangent does not
     /// depend on where the turns are held.
     fn exclude_turn(&mut self, at: &Solution, increments: &mut Field) -> Result<(), OutOfRange> {
-        for turn in self.leaves.at(at.params)?.turns(&at.state) {
-            let amount = self.product(&turn, increments) / self.product(&turn, &turn);
-            add(increments, -amount, &turn);
+        let mut excluded: Vec<Field> = Vec::new();
+        for mut turn in self.leaves.at(at.params)?.turns(&at.state) {
+            let without = |field: &mut Field, other: &Field| {
+                let amount = self.product(other, field) / self.product(other, other);
+                add(field, -amount, other);
+            };
+            excluded.iter().for_each(|other| without(&mut turn, other));
+            without(increments, &turn);
+            excluded.push(turn);
         }
         Ok(())
     }

@@ -61,7 +61,7 @@ impl<'a, const N: usize> Equations<'a, N> {
     fn of(leaves: Leaves<'a, N>) -> Self {
         let system = leaves.family.system(&leaves.grid);
         let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
-        let ones = vec![vec![one; leaves.grid.segments()]; system.rods()];
+        let ones = vec![vec![one; system.nodes()]; system.rods()];
         Equations {
             leaves,
             softened: None,
@@ -104,6 +104,11 @@ impl<'a, const N: usize> Equations<'a, N> {
         all.iter().map(|a| self.momentum(a)).collect()
     }
 
+    /// The first node of a rod with equations, with which increments begin.
+    pub fn first_node(&self) -> usize {
+        self.system.first()
+    }
+
     pub(in crate::branch) fn rods(&self) -> usize {
         self.system.rods()
     }
@@ -138,7 +143,7 @@ impl<'a, const N: usize> Equations<'a, N> {
     /// A direction on the grid of which this one halves all segments.
     pub(in crate::branch) fn prolonged(&self, coarse: &Direction<N>) -> Direction<N> {
         self.normalised(Direction {
-            increments: prolong(&coarse.increments),
+            increments: prolong(&coarse.increments, self.first_node()),
             params: coarse.params,
         })
     }

@@ -269,11 +269,15 @@ impl<'a, const N: usize> Leaves<'a, N> {
     }
 }
 
-/// Puts the bases of all rods where the leaf clamps them, and held tips where it holds them.
+/// Puts the bases of all rods where the leaf holds them, and held tips where it holds them.
 pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.hold(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
-        (state.x[base], state.q[base]) = leaf.leaf.base(j);
+        let (x, q) = leaf.leaf.base(j);
+        state.x[base] = x;
+        if !leaf.leaf.hinged() {
+            state.q[base] = q;
+        }
     }
 }

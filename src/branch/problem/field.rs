@@ -47,10 +47,11 @@ pub fn largest(a: &Field) -> f64 {
     crate::largest::largest(a.iter().flatten().flatten().map(|v| v.abs()))
 }
 
-/// The increments that lead from one state to another on the same grid.
-pub fn between(a: &State, b: &State) -> Field {
+/// The increments of the nodes from the `first` on that lead from one state to another on the same
+/// grid.
+pub fn between(a: &State, b: &State, first: usize) -> Field {
     let mut field = Field::new();
-    a.increments_to(b, &mut field);
+    a.increments_to(b, first, &mut field);
     field
 }
 
@@ -58,29 +59,32 @@ pub fn is_finite(a: &Field) -> bool {
     a.iter().flatten().flatten().all(|v| v.is_finite())
 }
 
-/// Increments on the grid with all segments halved: cubic interpolation, zero at the bases.
-pub fn prolong(a: &Field) -> Field {
-    a.iter().map(|rod| prolong_rod(rod)).collect()
+/// Increments on the grid with all segments halved: cubic interpolation, zero at clamped bases, where
+/// the `first` node of the field is the next.
+pub fn prolong(a: &Field, first: usize) -> Field {
+    a.iter().map(|rod| prolong_rod(rod, first)).collect()
 }
 
 /// Nodal forces on the grid with all segments halved: the given ones at the nodes of this grid,
 /// zero at the new ones.
-pub fn at_same_nodes(a: &Field) -> Field {
-    let rod = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect();
+pub fn at_same_nodes(a: &Field, first: usize) -> Field {
+    // A new node precedes every one but a base.
+    let all = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect::<Vec<_>>();
+    let rod = |rod: &Vec<Increment>| all(rod).split_off(1 - first);
     a.iter().map(rod).collect()
 }
 
 /// Increments on the grid with every second node.
-pub fn every_second(a: &Field) -> Field {
-    let rod = |rod: &Vec<Increment>| rod.iter().skip(1).step_by(2).copied().collect();
+pub fn every_second(a: &Field, first: usize) -> Field {
+    let rod = |rod: &Vec<Increment>| rod.iter().skip(first).step_by(2).copied().collect();
     a.iter().map(rod).collect()
 }
 
-fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
-    let n = rod.len();
-    let at = |i: usize| match i {
-        0 => [0.0; 6],
-        _ => rod[i - 1],
+fn prolong_rod(rod: &[Increment], first: usize) -> Vec<Increment> {
+    let n = rod.len() + first - 1;
+    let at = |i: usize| match i < first {
+        true => [0.0; 6],
+        false => rod[i - first],
     };
     let node = |k: usize| {
         if k.is_multiple_of(2) {
@@ -96,7 +100,7 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
         }
         sum
     };
-    (1..=2 * n).map(node).collect()
+    (first..=2 * n).map(node).collect()
 }
 
 #[cfg(test)]
@@ -106,10 +110,19 @@ mod tests {
     #[test]
     fn cubics_are_prolonged_exactly() {
         let f = |s: f64| [s, s * s, s * s * s, 2.0 * s - s * s, 0.0, -s];
-        let on = |n: usize| vec![(1..=n).map(|i| f(i as f64 / n as f64)).collect::<Vec<_>>()];
-        for n in [3, 4, 7] {
-            let difference = plus(&prolong(&on(n)), -1.0, &on(2 * n));
+        for (n, first) in [(3, 1), (4, 1), (7, 1), (3, 0), (4, 0)] {
+            let on = |n: usize| {
+                vec![
+                    (first..=n)
+                        .map(|i| f(i as f64 / n as f64))
+                        .collect::<Vec<_>>(),
+                ]
+            };
+            let (coarse, fine) = (on(n), on(2 * n));
+            let difference = plus(&prolong(&coarse, first), -1.0, &fine);
             assert!(largest(&difference) < 1e-14, "{n}");
+            assert_eq!(every_second(&fine, first), coarse);
+            assert_eq!(every_second(&at_same_nodes(&coarse, first), first), coarse);
         }
     }
 }

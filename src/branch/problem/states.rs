@@ -66,9 +66,9 @@ pub fn advanced(
         return next;
     }
     let mut increments = times(increments, step);
-    for (j, i) in leaf.each(1..leaf.segments() + 1) {
+    for (j, i) in leaf.each(leaf.moving_nodes()) {
         let [turns, shifts] = leaf.moves(j, i);
-        let increment = &mut increments[j][i - 1];
+        let increment = &mut increments[j][i - leaf.first_node()];
         if !shifts {
             increment[3..].fill(0.0);
         }

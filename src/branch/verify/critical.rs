@@ -56,10 +56,12 @@ pub fn refine_critical(
             let leaf = equations.leaves.at([critical.fraction])?;
             let state = prolong(leaf, &critical.state);
             equations = equations.refined();
+            let first = equations.first_node();
+            let soft = critical.soft.iter();
             let finer = Critical {
                 state,
                 tangent: equations.prolonged(&critical.tangent),
-                soft: critical.soft.iter().map(prolong_field).collect(),
+                soft: soft.map(|field| prolong_field(field, first)).collect(),
                 ..critical.clone()
             };
             critical = finer.relocated(&mut equations)?;

@@ -184,7 +184,7 @@ fn on_coarser(
     let near = Point {
         state: restrict(&point.state),
         tangent: equations.normalised(Direction {
-            increments: every_second(&point.tangent.increments),
+            increments: every_second(&point.tangent.increments, equations.first_node()),
             ..point.tangent
         }),
         ..point.clone()
@@ -256,7 +256,8 @@ fn refine_in(
 /// the energy if these may move, from neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let held = equations.leaves.at([point.fraction])?.leaf.is_held();
+    let leaf = &equations.leaves.at([point.fraction])?.leaf;
+    let held = leaf.is_held() || leaf.hinged();
     let [
         (after, energy, forces),
         (before, energy_before, forces_before),
@@ -273,7 +274,9 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     })?;
     let leaf = equations.leaves.at([point.fraction])?;
     let nodes = observed_nodes(leaf, leaf.segments());
-    let displacements = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
+    let first = leaf.first_node();
+    let displacements =
+        nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - first]));
     Ok(Values {
         points: displacements
             .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.params[0]))

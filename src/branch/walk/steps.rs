@@ -265,7 +265,7 @@ impl Branch {
         let turned = now.tangent.params[0] * next.point.tangent.params[0] < 0.0;
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
-            let distance = equations.inner(&chord(now, &next.point), &now.tangent);
+            let distance = equations.inner(&chord(equations, now, &next.point), &now.tangent);
             let found = locate(equations, now, &next.point, distance);
             // If the branch turns back and no eigenvalue changes sign, it touches another one
             // where that crosses: the vertex of a pitchfork.
@@ -320,9 +320,9 @@ impl Walk<'_> {
 }
 
 /// The difference of two points.
-fn chord(a: &Point, b: &Point) -> Direction {
+fn chord(equations: &Equations, a: &Point, b: &Point) -> Direction {
     Direction {
-        increments: between(&a.state, &b.state),
+        increments: between(&a.state, &b.state, equations.first_node()),
         params: [b.fraction - a.fraction],
     }
 }
@@ -334,7 +334,7 @@ fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
         increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
         params: [a.tangent.params[0] + b.tangent.params[0]],
     });
-    let mut rest = chord(a, b);
+    let mut rest = chord(equations, a, b);
     let length = equations.inner(&rest, &rest).sqrt();
     let along = equations.inner(&rest, &mean);
     add(&mut rest.increments, -along, &mean.increments);
@@ -354,7 +354,7 @@ fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) 
         if distance(&near, first) < SAME {
             return Some(near);
         }
-        let shift = equations.inner(&chord(&near, first), &first.tangent) / same;
+        let shift = equations.inner(&chord(equations, &near, first), &first.tangent) / same;
         if shift.abs() > 2.0 * step {
             return None;
         }

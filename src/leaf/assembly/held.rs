@@ -1,5 +1,5 @@
 //! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
-//! at a pinned or clamped tip, or by grips.
+//! at a pinned or clamped tip, at a hinged base, or by grips.
 
 use super::component;
 use crate::lanes::Four;
@@ -21,10 +21,9 @@ const ALL: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
 const HELD: f64 = 1e9;
 
 impl DiscreteLeaf {
-    /// The components that are zero in the increments of node `i` (from 1) of
-    /// rod `j`.
+    /// The components that are zero in the increments of node `i` of rod `j`.
     fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
-        if !self.grips.is_empty() {
+        if i == 0 || !self.grips.is_empty() {
             match self.is_gripped(j, i) {
                 [true, _] => return &ALL,
                 [false, true] => return &ALL[3..],
@@ -45,21 +44,22 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The number (from 0) of the first node that may be held.
+    /// The first node with equations that may be held.
     fn first_held(&self) -> usize {
         match (self.leaf.mirrored, &self.leaf.held) {
-            _ if !self.grips.is_empty() => 0,
-            (true, _) => 0,
-            (false, Some(_)) => self.segments() - 1,
-            (false, None) => self.segments(),
+            _ if self.leaf.hinged() || !self.grips.is_empty() => self.first_node(),
+            (true, _) => self.first_node(),
+            (false, Some(_)) => self.segments(),
+            (false, None) => self.segments() + 1,
         }
     }
 
     /// Sets the held components of rod `j` to zero in the right-hand side of its
     /// group.
     pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
-        for (i, rhs) in rhs.iter_mut().enumerate().skip(self.first_held()) {
-            for &c in self.held_components(j, i + 1) {
+        for i in self.first_held()..self.segments() + 1 {
+            let rhs = &mut rhs[i - self.first_node()];
+            for &c in self.held_components(j, i) {
                 rhs[c].0[group_and_lane(j).1] = 0.0;
             }
         }
@@ -69,30 +69,31 @@ impl DiscreteLeaf {
     /// the identity, which makes them zero.
     pub(super) fn hold_components(&self, j: usize, chain: &mut Chain) {
         let set = |four: &mut Four, value: f64| four.0[group_and_lane(j).1] = value;
-        for i in self.first_held()..self.segments() {
-            for &c in self.held_components(j, i + 1) {
+        for i in self.first_held()..self.segments() + 1 {
+            let at = i - self.first_node();
+            for &c in self.held_components(j, i) {
                 for k in 0..UNKNOWNS {
-                    set(chain.diagonal(i, c.min(k), c.max(k)), 0.0);
-                    set(chain.off(i, c, k), 0.0);
-                    if i > 0 {
-                        set(chain.off(i - 1, k, c), 0.0);
+                    set(chain.diagonal(at, c.min(k), c.max(k)), 0.0);
+                    set(chain.off(at, c, k), 0.0);
+                    if at > 0 {
+                        set(chain.off(at - 1, k, c), 0.0);
                     }
                 }
-                let gripped = self.is_gripped(j, i + 1)[1];
-                set(chain.diagonal(i, c, c), if gripped { HELD } else { 1.0 });
+                let gripped = self.is_gripped(j, i)[1];
+                set(chain.diagonal(at, c, c), if gripped { HELD } else { 1.0 });
             }
         }
     }
 
     /// Sets the entries of held components between neighbouring rods to zero.
     pub(super) fn hold_across(&self, system: &mut System) {
-        for (g, i) in self.each(self.first_held()..self.segments()) {
+        for (g, i) in self.each(self.first_held()..self.segments() + 1) {
             if g + 1 < self.rods() {
-                let across = system.across_mut(g, i);
-                for &c in self.held_components(g, i + 1) {
+                let across = system.across_mut(g, i - self.first_node());
+                for &c in self.held_components(g, i) {
                     across[c] = [0.0; UNKNOWNS];
                 }
-                for &c in self.held_components(g + 1, i + 1) {
+                for &c in self.held_components(g + 1, i) {
                     across.iter_mut().for_each(|row| row[c] = 0.0);
                 }
             }

@@ -42,8 +42,8 @@ impl DiscreteLeaf {
         jumps: &[Vec<Jump>],
         system: &mut System,
     ) {
-        let n = self.segments();
-        let mut rhs = vec![vec![[0.0; 6]; n]; self.rods()];
+        let (n, first) = (self.segments(), self.first_node());
+        let mut rhs = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
         for ((rhs, rod), tangents) in rhs.iter_mut().zip(jumps).zip(tangents) {
             let part = n / rod.len();
             for (k, (&[shift, turn, force, moment], tangent)) in
@@ -58,8 +58,8 @@ impl DiscreteLeaf {
                 let at_begin =
                     second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
                 let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
-                add(&mut rhs[i - 1], -at_begin - moment, pull - force);
-                add(&mut rhs[i], -at_end, -pull);
+                add(&mut rhs[i - first], -at_begin - moment, pull - force);
+                add(&mut rhs[i + 1 - first], -at_end, -pull);
             }
         }
         system.set_rhs(&rhs);

@@ -11,6 +11,7 @@ use crate::rod::{Element, Nodes, Section, Sections, UNKNOWNS, on_nodes};
 use crate::rotation::{Quaternions, exp_each, multiply_each};
 use glam::{DQuat, DVec3};
 use pulp::Simd;
+use std::ops::Range;
 
 /// The rods of a group in a state; lanes without a rod repeat the last.
 pub struct Rods<'a> {
@@ -105,27 +106,27 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
         let stiffness = loads.stiffness().array();
         let (mut energy, mut squared_turn) = (zero, zero);
         let (mut own, mut force) = ([[zero; UNKNOWNS]; UNKNOWNS], [zero; UNKNOWNS]);
-        let n = rhs.len();
+        let (n, first) = (rods.leaf.segments(), rods.leaf.first_node());
         for i in 0..n {
             let (element, sections) = rods.element(simd, i, part);
             energy = energy + element.strain_energy(&sections);
             squared_turn = squared_turn.larger(element.squared_turn());
             let gradient = on_nodes(element.condensed(&sections));
-            if i > 0 {
+            if i >= first {
                 for r in 0..UNKNOWNS {
                     let force = active * (force[r] - gradient[0][r]);
-                    force.put(&mut rhs[i - 1][r], part);
+                    force.put(&mut rhs[i - first][r], part);
                 }
             }
             if MATRIX {
                 let hessian = element.hessian(&sections);
-                if i > 0 {
+                if i >= first {
                     for r in 0..UNKNOWNS {
                         for c in r..UNKNOWNS {
                             own[r][c] = own[r][c] + hessian.own[0][r][c];
                         }
                     }
-                    matrix.put(i - 1, &own, Some(&hessian.across), active, part);
+                    matrix.put(i - first, &own, Some(&hessian.across), active, part);
                 }
                 own = hessian.own[1];
             }
@@ -154,10 +155,10 @@ impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
             }
         }
         for r in 0..UNKNOWNS {
-            (active * force[r]).put(&mut rhs[n - 1][r], part);
+            (active * force[r]).put(&mut rhs[n - first][r], part);
         }
         if MATRIX {
-            matrix.put(n - 1, &own, None, active, part);
+            matrix.put(n - first, &own, None, active, part);
         }
         if part == 0 {
             *sums = Sums::default();
@@ -181,7 +182,8 @@ impl Kernel for Stiffen<'_> {
         let active = Lanes::of(simd, active, part);
         let dropped = Vectors::splat(simd, self.dropped.to_array());
         let none = [Lanes::splat(simd, 0.0); UNKNOWNS];
-        let (mut force, n) = (none, rhs.len());
+        let (n, first) = (self.rods.leaf.segments(), self.rods.leaf.first_node());
+        let mut force = none;
         for i in 0..=n {
             let gradient = match i < n {
                 true => {
@@ -191,9 +193,9 @@ impl Kernel for Stiffen<'_> {
                 false => [none; 2],
             };
             for r in 0..UNKNOWNS {
-                if i > 0 {
+                if i >= first {
                     let force = active * (force[r] - gradient[0][r]);
-                    force.put(&mut rhs[i - 1][r], part);
+                    force.put(&mut rhs[i - first][r], part);
                 }
                 force[r] = -gradient[1][r];
             }
@@ -201,7 +203,7 @@ impl Kernel for Stiffen<'_> {
     }
 }
 
-/// The next state of a group, without the bases, which stay.
+/// The next state of a group, without clamped bases, which stay.
 pub struct Advance<'a> {
     pub rods: Rods<'a>,
     pub solution: &'a [Increments],
@@ -219,16 +221,14 @@ impl Kernel for Advance<'_> {
         let lanes = part..lanes.min(part + S::F64_LANES);
         let none = Vectors::splat(simd, [0.0; 3]);
         let (mut turn, mut shift) = (none, none);
-        let segments = self.solution.len();
-        for (i, increment) in self.solution.iter().enumerate() {
-            let of = |c: usize| {
-                let [x, y, z] = [&increment[c], &increment[c + 1], &increment[c + 2]];
-                Vectors::new(
-                    Lanes::of(simd, x, part),
-                    Lanes::of(simd, y, part),
-                    Lanes::of(simd, z, part),
-                )
-            };
+        let segments = self.rods.leaf.segments();
+        let ahead = self.solution.len() - segments;
+        if ahead > 0 {
+            turn = vectors(simd, &self.solution[0], 0, part);
+            self.turn_bases(turn.scale(step), lanes.clone(), part);
+        }
+        for (i, increment) in self.solution[ahead..].iter().enumerate() {
+            let of = |c: usize| vectors(simd, increment, c, part);
             let (turn_after, shift_after) = (of(0), of(3));
             let rods = &self.rods;
             let (element, sections) = rods.element(simd, i, part);
@@ -256,4 +256,33 @@ impl Kernel for Advance<'_> {
             (turn, shift) = (turn_after, shift_after);
         }
     }
+}
+
+impl Advance<'_> {
+    /// Turns the bases, which hinges hold in their places.
+    #[inline(always)]
+    fn turn_bases<S: Simd>(&mut self, turn: Vectors<S>, lanes: Range<usize>, part: usize) {
+        let simd = turn.x.simd;
+        let (q, qw) = multiply_each(exp_each(turn), self.rods.q(simd, 0, part));
+        let mut numbers = [Four::default(); 4];
+        let [x, y, z] = q.array();
+        for (number, four) in [x, y, z, qw].into_iter().zip(&mut numbers) {
+            number.put(four, part);
+        }
+        let nodes = self.rods.leaf.segments() + 1;
+        for lane in lanes {
+            self.q[lane * nodes] = DQuat::from_array(numbers.map(|four| four.0[lane]));
+        }
+    }
+}
+
+/// The components of increments from `c` on.
+#[inline(always)]
+fn vectors<S: Simd>(simd: S, of: &Increments, c: usize, part: usize) -> Vectors<S> {
+    let [x, y, z] = [&of[c], &of[c + 1], &of[c + 2]];
+    Vectors::new(
+        Lanes::of(simd, x, part),
+        Lanes::of(simd, y, part),
+        Lanes::of(simd, z, part),
+    )
 }

@@ -86,8 +86,8 @@ impl DiscreteLeaf {
             0.5 * times * segment.excess_stiffness(self.section(j, i))
         };
         for j in 0..self.rods() {
-            let mut before = excess(j, 0);
-            for i in 1..=n {
+            let mut before = 0.0;
+            for i in 0..=n {
                 let after = if i < n { excess(j, i) } else { 0.0 };
                 if self.moves(j, i)[0] {
                     let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
@@ -99,7 +99,7 @@ impl DiscreteLeaf {
     }
 
     /// The state after `step` times the increments in `solution` (rod after
-    /// rod, nodes 1 to n), written over `next`.
+    /// rod, all nodes with equations), written over `next`.
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         next.clone_from(state);
         if self.tied() {
@@ -141,11 +141,12 @@ impl DiscreteLeaf {
         let mut largest = 0.0_f64;
         let mut tip = DVec3::ZERO;
         for j in 0..self.rods() {
-            let (mut force, mut moment) = (DVec3::ZERO, DVec3::ZERO);
+            let turned = self.tissue_load(state, j, 0).moment + self.moment_on(0);
+            let (mut force, mut moment) = (DVec3::ZERO, turned);
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
-                if i > 0 {
+                if i >= self.first_node() {
                     let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
                     let [turned, held] = self.is_gripped(j, i);
                     let forces = if held { 0.0 } else { forces };

@@ -22,7 +22,7 @@ impl Kernel for Factorize<'_> {
         for k in 0..2 {
             masses[k] = shift * Lanes::of(simd, &self.masses.per_weight[k], part);
         }
-        let n = self.chain.segments();
+        let n = self.chain.nodes();
         let mut schur = [[zero; UNKNOWNS]; UNKNOWNS];
         for i in 0..n {
             let node = &self.chain.matrix[i];
@@ -121,7 +121,7 @@ pub struct Forward<'a> {
 impl Kernel for Forward<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let n = self.chain.segments();
+        let n = self.chain.nodes();
         let mut y = [Lanes::splat(simd, 0.0); UNKNOWNS];
         let mut before = y;
         for i in 0..n {
@@ -166,7 +166,7 @@ pub struct Backward<'a> {
 impl Kernel for Backward<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let n = self.chain.segments();
+        let n = self.chain.nodes();
         let mut y = [Lanes::splat(simd, 0.0); UNKNOWNS];
         let (mut after, mut product) = (y, y[0]);
         for i in (0..n).rev() {

@@ -56,8 +56,8 @@ const fn off(r: usize, c: usize) -> usize {
 /// The 3 x 3 matrix of a tip, rows first.
 pub type Tip = [[f64; 3]; 3];
 
-/// The matrices of a group of rods, nodes 1 to n, without the coupling to others,
-/// and their factorisations.
+/// The matrices of a group of rods, nodes from the first with equations on (from 0), without the
+/// coupling to others, and their factorisations.
 #[derive(Clone, Debug)]
 pub struct Chain {
     /// Entries of all nodes.
@@ -78,21 +78,21 @@ pub struct Masses<'a> {
 }
 
 impl Chain {
-    /// Identity matrices, for rods with `segments` segments.
-    pub fn new(segments: usize, joined: bool) -> Self {
+    /// Identity matrices, for rods with `nodes` nodes that have equations.
+    pub fn new(nodes: usize, joined: bool) -> Self {
         let zeros = [Four::default(); ENTRIES];
         let mut identity = zeros;
         for k in 0..UNKNOWNS {
             identity[upper(k, k)] = Four::splat(1.0);
         }
         Chain {
-            matrix: vec![identity; segments],
-            factor: vec![zeros; segments],
+            matrix: vec![identity; nodes],
+            factor: vec![zeros; nodes],
             last: if joined { TURNS } else { UNKNOWNS },
         }
     }
 
-    fn segments(&self) -> usize {
+    fn nodes(&self) -> usize {
         self.matrix.len()
     }
 
@@ -167,7 +167,7 @@ impl Chain {
 
     /// The contribution of the rod in a lane to the matrix of the joint tip.
     pub fn tip(&self, lane: usize) -> Tip {
-        let node = &self.factor[self.segments() - 1];
+        let node = &self.factor[self.nodes() - 1];
         let entry = |r: usize, c: usize| node[upper(TURNS + r.min(c), TURNS + r.max(c))].0[lane];
         std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
     }

@@ -1,5 +1,6 @@
 //! The forces by which a parameter change unbalances a leaf, and the linear response to them.
 
+use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, Increment, State};
 use glam::DVec3;
 
@@ -36,10 +37,10 @@ impl Forces {
         }
     }
 
-    /// The forces on the nodes of rod `j`, which has `segments` of them.
-    pub fn on_nodes(&mut self, j: usize, segments: usize) -> &mut [Increment] {
+    /// The forces on the nodes of rod `j`, of which `count` have equations.
+    pub fn on_nodes(&mut self, j: usize, count: usize) -> &mut [Increment] {
         let nodes = &mut self.nodes[j];
-        nodes.resize(segments, [0.0; 6]);
+        nodes.resize(count, [0.0; 6]);
         nodes
     }
 
@@ -66,14 +67,15 @@ impl Forces {
         }
     }
 
-    /// Forces on all nodes and effects on all gaps of rods of `segments` segments, zeros included.
-    pub fn dense(&self, segments: usize) -> (Field, Vec<DVec3>) {
+    /// Forces on all nodes and effects on all gaps of the rods of `leaf`, zeros included.
+    pub fn dense(&self, leaf: &DiscreteLeaf) -> (Field, Vec<DVec3>) {
+        let (segments, count) = (leaf.segments(), leaf.moving_nodes().len());
         let mut gaps = vec![DVec3::ZERO; self.gaps.len() * segments];
         for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {
             all[..own.len()].copy_from_slice(own);
         }
         let rod = |nodes: &Vec<Increment>| match nodes.is_empty() {
-            true => vec![[0.0; 6]; segments],
+            true => vec![[0.0; 6]; count],
             false => nodes.clone(),
         };
         (self.nodes.iter().map(rod).collect(), gaps)
@@ -81,24 +83,30 @@ impl Forces {
 }
 
 impl Response {
-    /// Zero, for `rods` rods of `segments` segments.
-    pub fn zeros(rods: usize, segments: usize) -> Response {
+    /// Zero, for the rods of `leaf`.
+    pub fn zeros(leaf: &DiscreteLeaf) -> Response {
         Response {
-            nodes: vec![vec![[0.0; 6]; segments]; rods],
-            carried: vec![DVec3::ZERO; rods * segments],
+            nodes: vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()],
+            carried: vec![DVec3::ZERO; leaf.rods() * leaf.segments()],
         }
     }
 
-    /// Moves a state, but not its bases, by `step` times the response.
+    /// Moves a state, but not clamped bases, by `step` times the response.
     pub fn advance(&self, state: &mut State, step: f64) {
         for (j, rod) in self.nodes.iter().enumerate() {
-            let base = state.base(j);
+            let first = state.base(j) + state.segments() + 1 - rod.len();
             for (i, increment) in rod.iter().enumerate() {
-                state.advance(base + i + 1, increment, step);
+                state.advance(first + i, increment, step);
             }
         }
         let forces = state.n.iter_mut().zip(&self.carried);
         forces.for_each(|(force, change)| *force += step * *change);
+    }
+
+    /// The increment of node `i` of rod `j` of `leaf`; zero for a clamped base.
+    pub fn of_node(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Increment {
+        let known = i.checked_sub(leaf.first_node());
+        known.map_or([0.0; 6], |k| self.nodes[j][k])
     }
 
     /// Adds `times` another response.

@@ -63,15 +63,18 @@ impl DiscreteLeaf {
         rate: &LeafRate,
         each: &[(f64, DiscreteLeaf)],
     ) -> Field {
-        let n = self.segments();
+        let (n, nodes) = (self.segments(), self.moving_nodes());
         let mut motion = vec![Vec::new(); self.rods()];
         let mut put = |j: usize, i: usize, by: Increment| {
             if by != [0.0; 6] {
-                let nodes: &mut Vec<Increment> = &mut motion[j];
-                nodes.resize(n, [0.0; 6]);
-                nodes[i - 1] = by;
+                let of_rod: &mut Vec<Increment> = &mut motion[j];
+                of_rod.resize(nodes.len(), [0.0; 6]);
+                of_rod[i - nodes.start] = by;
             }
         };
+        for j in 0..self.rods() {
+            put(j, 0, increment(DVec3::ZERO, rate.of_hinge(j)));
+        }
         for (j, held) in (0..self.rods()).flat_map(|j| rate.held.iter().map(move |it| (j, it))) {
             put(j, n, held.of_tip(j));
         }
@@ -100,7 +103,7 @@ impl DiscreteLeaf {
         for (j, rod) in motion.iter().enumerate() {
             for (i, by) in rod.iter().enumerate() {
                 if *by != [0.0; 6] {
-                    self.add_node_motion((state, segments), (j, i + 1), by, forces);
+                    self.add_node_motion((state, segments), (j, i + self.first_node()), by, forces);
                 }
             }
         }
@@ -108,7 +111,7 @@ impl DiscreteLeaf {
         forces.moved = motion;
     }
 
-    /// Adds what moving node `i` of rod `j` does to both of its segments, and to the energy.
+    /// Adds what moving node `i` of rod `j` does to its segments, and to the energy.
     fn add_node_motion(
         &self,
         (state, segments): (&State, &[Segment]),
@@ -118,25 +121,30 @@ impl DiscreteLeaf {
     ) {
         let n = self.segments();
         let (turned, moved) = (turn(by), shift(by));
-        let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
-        let k = at_constant_force(segment, section);
-        let nodes = forces.on_nodes(j, n);
-        if i > 1 {
-            let moment = k.ab * turned + k.xa.transpose() * moved;
-            add(&mut nodes[i - 2], -moment, k.xx * moved + k.xb * turned);
+        let (first, count) = (self.first_node(), self.moving_nodes().len());
+        if i > 0 {
+            let (section, segment) = (self.section(j, i - 1), &segments[j * n + i - 1]);
+            let k = at_constant_force(segment, section);
+            let nodes = forces.on_nodes(j, count);
+            if i > first {
+                let moment = k.ab * turned + k.xa.transpose() * moved;
+                let force = k.xx * moved + k.xb * turned;
+                add(&mut nodes[i - 1 - first], -moment, force);
+            }
+            // A node that is only pinned rotates freely.
+            let moment = k.bb * turned + k.xb.transpose() * moved;
+            add(&mut nodes[i - first], -moment, DVec3::ZERO);
+            let gap = segment.gap_increment(section, moved, DVec3::ZERO, turned);
+            forces.on_gaps(j, n)[i - 1] += gap;
         }
-        // A node that is only pinned rotates freely.
-        let moment = k.bb * turned + k.xb.transpose() * moved;
-        add(&mut nodes[i - 1], -moment, DVec3::ZERO);
-        forces.on_gaps(j, n)[i - 1] += segment.gap_increment(section, moved, DVec3::ZERO, turned);
         if i < n {
             let (section, segment) = (self.section(j, i), &segments[j * n + i]);
             let k = at_constant_force(segment, section);
-            let nodes = forces.on_nodes(j, n);
+            let nodes = forces.on_nodes(j, count);
             let moment = k.aa * turned - k.xa.transpose() * moved;
-            add(&mut nodes[i - 1], -moment, DVec3::ZERO);
+            add(&mut nodes[i - first], -moment, DVec3::ZERO);
             add(
-                &mut nodes[i],
+                &mut nodes[i + 1 - first],
                 k.xb.transpose() * moved - k.ab.transpose() * turned,
                 k.xx * moved - k.xa * turned,
             );
@@ -149,10 +157,14 @@ impl DiscreteLeaf {
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint
     /// tip neighbours are displaced alike, and what turns there is held.
     fn add_response_of_ties(&self, state: &State, increments: &Field, forces: &mut Forces) {
-        let n = self.segments();
-        let by = |j: usize, i: usize| increments[j].get(i - 1).copied().unwrap_or([0.0; 6]);
+        let (n, first, count) = (
+            self.segments(),
+            self.first_node(),
+            self.moving_nodes().len(),
+        );
+        let by = |j: usize, i: usize| increments[j].get(i - first).copied().unwrap_or([0.0; 6]);
         let last = if self.leaf.joined() { n } else { n + 1 };
-        for (g, i) in (0..self.rods() - 1).flat_map(|g| (1..last).map(move |i| (g, i))) {
+        for (g, i) in (0..self.rods() - 1).flat_map(|g| (first..last).map(move |i| (g, i))) {
             let both = [by(g, i), by(g + 1, i)];
             if both == [[0.0; 6]; 2] {
                 continue;
@@ -166,7 +178,7 @@ impl DiscreteLeaf {
                 }
             }
             for (j, [moment, force]) in [g, g + 1].into_iter().zip(on) {
-                add(&mut forces.on_nodes(j, n)[i - 1], moment, force);
+                add(&mut forces.on_nodes(j, count)[i - first], moment, force);
             }
         }
     }
@@ -190,7 +202,7 @@ impl DiscreteLeaf {
         for held in &self.grips {
             let (j, i) = (held.rod, held.node);
             let carried = |segment: usize| response.carried[j * n + segment];
-            let mut force = shift(&loads.nodes[j][i - 1]) - carried(i - 1);
+            let mut force = shift(&loads.nodes[j][i - self.first_node()]) - carried(i - 1);
             if i < n {
                 force += carried(i);
             }

@@ -77,7 +77,7 @@ impl DiscreteLeaf {
         each: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
-        let n = self.segments();
+        let (n, nodes) = (self.segments(), self.moving_nodes());
         for (j, i) in self.each(0..n + 1) {
             let first = each[0].1.own_load(j, i);
             let changes = each
@@ -86,8 +86,9 @@ impl DiscreteLeaf {
             let change = self.load_factor * changes.sum::<DVec3>();
             if change != DVec3::ZERO {
                 forces.energy -= change.dot(state.x[state.base(j) + i]);
-                if i > 0 {
-                    add(&mut forces.on_nodes(j, n)[i - 1], DVec3::ZERO, change);
+                if nodes.contains(&i) {
+                    let on = &mut forces.on_nodes(j, nodes.len())[i - nodes.start];
+                    add(on, DVec3::ZERO, change);
                 }
             }
         }
@@ -101,7 +102,7 @@ impl DiscreteLeaf {
         each: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
-        let n = self.segments();
+        let (n, nodes) = (self.segments(), self.moving_nodes());
         let Some((_, first)) = each.first() else {
             return;
         };
@@ -122,8 +123,9 @@ impl DiscreteLeaf {
             let (energy, loads) = self.tissue_rates(state, (g, i), &change);
             forces.energy += energy;
             for (j, [moment, force]) in [g, g + 1].into_iter().zip(loads) {
-                if i > 0 {
-                    add(&mut forces.on_nodes(j, n)[i - 1], moment, force);
+                if nodes.contains(&i) {
+                    let on = &mut forces.on_nodes(j, nodes.len())[i - nodes.start];
+                    add(on, moment, force);
                 }
             }
         }

@@ -2,11 +2,13 @@
 //! state, and of its energy. Exact except for the finite differences of scenarios that define
 //! the number's effect on the scenario itself.
 
+mod bases;
 mod forces;
 mod held;
 mod leaves;
 mod moments;
 
+use crate::leaf::derivative::bases::base_rate;
 pub use crate::leaf::derivative::forces::{Forces, Response};
 use crate::leaf::derivative::held::HeldRate;
 use crate::leaf::derivative::leaves::{leaves, rest_rates};
@@ -15,7 +17,6 @@ use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Field, State, add};
 use crate::rod::{Blocks, Section, SectionRate, Segment};
-use crate::rotation;
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
 
@@ -41,8 +42,10 @@ const CLOSED: f64 = 1e-12;
 /// The derivative of a rod, in the leaf's units.
 struct RodRate<'s> {
     length: f64,
-    /// Of the base: its position, its rotation.
+    /// Of a clamped base: its position, its rotation.
     base: [DVec3; 2],
+    /// Of the place of a hinge.
+    hinge: DVec3,
     couple_stiffness: [Slope<'s>; 3],
     force_stiffness: [Slope<'s>; 3],
     rest_curvature: [Slope<'s>; 3],
@@ -85,9 +88,14 @@ impl<'s> LeafRate<'s> {
         let vector = |value: fn(&Scenario) -> [f64; 3], unit: f64| {
             DVec3::from_array([0, 1, 2].map(|axis| sum(&|s| value(s)[axis]))) / unit
         };
+        let bases = |j: usize| match (base_rate(terms, j, scale.length), leaf.hinged()) {
+            ([shift, _], true) => ([DVec3::ZERO; 2], shift),
+            (clamped, false) => (clamped, DVec3::ZERO),
+        };
         let rod = |j: usize| RodRate {
             length: sum(&|s| s.rods[j].length) / scale.length,
-            base: base_rate(terms, j, scale.length),
+            base: bases(j).0,
+            hinge: bases(j).1,
             couple_stiffness: [0, 1, 2].map(|k| {
                 Slope::of(terms, 1.0 / scale.stiffness, move |s| {
                     &s.rods[j].couple_stiffness[k]
@@ -130,7 +138,12 @@ impl<'s> LeafRate<'s> {
 }
 
 impl LeafRate<'_> {
-    /// The rates of displacement and rotation of the base of rod `j`.
+    /// The rate of displacement of the hinge of rod `j`.
+    pub(in crate::leaf::derivative) fn of_hinge(&self, j: usize) -> DVec3 {
+        self.rods[j].hinge
+    }
+
+    /// The rates of displacement and rotation of the base of rod `j` if it is clamped.
     pub fn of_base(&self, j: usize) -> [DVec3; 2] {
         self.rods[j].base
     }
@@ -204,8 +217,8 @@ impl DiscreteLeaf {
         neighbours: &[(f64, DiscreteLeaf)],
         forces: &mut Forces,
     ) {
-        let n = self.segments();
-        forces.on_nodes(j, n);
+        let (n, first) = (self.segments(), self.first_node());
+        forces.on_nodes(j, n + 1 - first);
         forces.on_gaps(j, n);
         for i in 0..n {
             let section = self.section(j, i);
@@ -217,10 +230,10 @@ impl DiscreteLeaf {
             let change = segment.rate(section, &change);
             let [left, right] = change.gradient;
             let nodes = &mut forces.nodes[j];
-            if i > 0 {
-                add(&mut nodes[i - 1], -left, DVec3::ZERO);
+            if i >= first {
+                add(&mut nodes[i - first], -left, DVec3::ZERO);
             }
-            add(&mut nodes[i], -right, DVec3::ZERO);
+            add(&mut nodes[i + 1 - first], -right, DVec3::ZERO);
             forces.gaps[j][i] += change.gap;
             forces.energy += change.energy;
         }
@@ -228,13 +241,14 @@ impl DiscreteLeaf {
 
     /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
     fn add_load_changes(&self, state: &State, j: usize, rate: &LeafRate, forces: &mut Forces) {
-        let n = self.segments();
+        let (n, first) = (self.segments(), self.first_node());
+        let count = n + 1 - first;
         let rod = &rate.rods[j];
         let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
         let ends_here = j == 0 || !self.leaf.joined();
-        forces.on_nodes(j, n);
+        forces.on_nodes(j, count);
         if rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO) {
-            forces.on_nodes(j + 1, n);
+            forces.on_nodes(j + 1, count);
         }
         let base = state.x[state.base(j)];
         forces.energy -= (gravity * (self.load_factor * self.grid.weight(0))).dot(base);
@@ -255,33 +269,10 @@ impl DiscreteLeaf {
                 let pull = rate.coupling[j] * self.grid.weight(i) * stretch;
                 forces.energy += 0.5 * pull.dot(stretch);
                 force += pull;
-                add(&mut forces.nodes[j + 1][i - 1], DVec3::ZERO, -pull);
+                add(&mut forces.nodes[j + 1][i - first], DVec3::ZERO, -pull);
             }
-            add(&mut forces.nodes[j][i - 1], DVec3::ZERO, force);
+            add(&mut forces.nodes[j][i - first], DVec3::ZERO, force);
         }
-    }
-
-    /// Adds the effect of displacing and rotating a base.
-    fn add_base_motion(
-        &self,
-        state: &State,
-        segments: &[Segment],
-        j: usize,
-        [shift, turn]: [DVec3; 2],
-        forces: &mut Forces,
-    ) {
-        let n = self.segments();
-        let section = self.section(j, 0);
-        let segment = &segments[j * n];
-        let k = at_constant_force(segment, section);
-        add(
-            &mut forces.on_nodes(j, n)[0],
-            k.xb.transpose() * shift - k.ab.transpose() * turn,
-            k.xx * shift - k.xa * turn,
-        );
-        forces.on_gaps(j, n)[0] += segment.gap_increment(section, -shift, turn, DVec3::ZERO);
-        let ((g_x, g_a, _), load) = (segment.gradient(section), self.load(state, j, 0));
-        forces.energy += (g_a - load.moment).dot(turn) - (g_x + load.force).dot(shift);
     }
 
     /// The work of forces on a response to others: by symmetry also that of the
@@ -306,7 +297,7 @@ impl DiscreteLeaf {
     /// Adds to forces on the nodes the contribution of changes of the gaps when the forces of
     /// the segments are condensed out.
     pub fn condense_gaps(&self, segments: &[Segment], gaps: &[DVec3], nodes: &mut Field) {
-        let n = self.segments();
+        let (n, first) = (self.segments(), self.first_node());
         for (j, i) in self.each(0..n) {
             let gap = gaps[j * n + i];
             if gap == DVec3::ZERO {
@@ -314,17 +305,18 @@ impl DiscreteLeaf {
             }
             let segment = &segments[j * n + i];
             let (g_x, g_a, g_b) = segment.gap_gradient(self.section(j, i), gap);
-            if i > 0 {
-                add(&mut nodes[j][i - 1], -g_a, g_x);
+            if i >= first {
+                add(&mut nodes[j][i - first], -g_a, g_x);
             }
-            add(&mut nodes[j][i], -g_b, -g_x);
+            add(&mut nodes[j][i + 1 - first], -g_b, -g_x);
         }
         // Held components have no equations.
-        let first = if self.grips.is_empty() { n } else { 1 };
-        for (j, i) in self.each(first..n + 1) {
+        let only_tips = self.grips.is_empty() && !self.leaf.hinged();
+        let held = if only_tips { n } else { first };
+        for (j, i) in self.each(held..n + 1) {
             let [turns, shifts] = self.moves(j, i);
             let moves = [turns, turns, turns, shifts, shifts, shifts];
-            for (force, moves) in nodes[j][i - 1].iter_mut().zip(moves) {
+            for (force, moves) in nodes[j][i - first].iter_mut().zip(moves) {
                 if !moves {
                     *force = 0.0;
                 }
@@ -344,8 +336,10 @@ impl DiscreteLeaf {
     ) {
         let n = self.segments();
         for (j, rod) in increments.iter().enumerate() {
-            let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
-            for (i, increment) in rod.iter().enumerate() {
+            let (bases, nodes) = rod.split_at(1 - self.first_node());
+            let base = bases.first().copied().unwrap_or([0.0; 6]);
+            let (mut a, mut dx0) = (crate::leaf::turn(&base), crate::leaf::shift(&base));
+            for (i, increment) in nodes.iter().enumerate() {
                 let k = j * n + i;
                 let (b, dx1) = (crate::leaf::turn(increment), crate::leaf::shift(increment));
                 let section = self.section(j, i);
@@ -359,18 +353,6 @@ impl DiscreteLeaf {
             }
         }
     }
-}
-
-/// The derivatives of the position and of the rotation of the base of rod `j`.
-fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
-    let (first, turned) = terms[0].1.base(j);
-    let mut rate = [DVec3::ZERO; 2];
-    for (weight, scenario) in terms {
-        let (x, q) = scenario.base(j);
-        rate[0] += *weight * (x - first) / length;
-        rate[1] += *weight * rotation::log(q * turned.conjugate());
-    }
-    rate
 }
 
 /// The derivative of a number of the scenario: relative to the first, so that without changes it

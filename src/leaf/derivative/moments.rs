@@ -35,9 +35,9 @@ impl DiscreteLeaf {
         forces: &mut Forces,
     ) {
         for (sigma, moment) in &rate.moments {
-            let nodes = forces.on_nodes(0, self.segments());
-            if let Some(node) = self.grid.nearest(*sigma).checked_sub(1) {
-                add(&mut nodes[node], self.load_factor * *moment, DVec3::ZERO);
+            let nodes = forces.on_nodes(0, self.moving_nodes().len());
+            if let Some(i) = self.grid.nearest(*sigma).checked_sub(self.first_node()) {
+                add(&mut nodes[i], self.load_factor * *moment, DVec3::ZERO);
             }
         }
     }

@@ -26,6 +26,8 @@ const MOST_CONDENSED: usize = 32;
 /// symbolic factorisation where one is needed.
 pub struct DirectSolver {
     unknowns: Arc<Unknowns>,
+    /// The first node of a rod with equations.
+    first: usize,
     /// Whether the matrix is factorised vein after vein, if its pivots allow it.
     condenses: bool,
     symbolic: OnceLock<Result<Arc<Symbolic>, DirectError>>,
@@ -85,13 +87,14 @@ impl DirectSolver {
 
     /// For rods of whose nodes these unknowns are coupled, with border rows.
     fn along(system: &System, coupled: [bool; 6], border: usize) -> Result<Self, DirectError> {
-        let (rods, n) = (system.rods(), system.segments);
+        let (rods, n) = (system.rods(), system.nodes());
         let solver = DirectSolver {
             unknowns: Arc::new(Unknowns::new(system, coupled)),
+            first: system.first(),
             condenses: border == 0
                 && coupled != [false; 6]
                 && !system.tied()
-                && n <= MOST_CONDENSED
+                && system.segments() <= MOST_CONDENSED
                 && memory::factor(rods * (3 * n).pow(2)).is_ok(),
             symbolic: OnceLock::new(),
             border,
@@ -123,10 +126,10 @@ impl DirectSolver {
         self.unknowns.count + self.border
     }
 
-    /// The unknowns of the rotation and of the displacement of node `i` (from 1) of rod `j`.
+    /// The unknowns of the rotation and of the displacement of node `i` of rod `j`.
     /// A joint tip has one displacement for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 6] {
-        self.unknowns.of(j, i - 1)
+        self.unknowns.of(j, i - self.first)
     }
 
     /// The matrix assembled in `system` times increments: forces, those on a joint tip all
@@ -151,7 +154,7 @@ impl DirectSolver {
         let mut forces = self.unknowns.field(&y);
         if unknowns.tip.is_some() {
             let others = forces.iter_mut().skip(1);
-            others.for_each(|rod| rod[unknowns.segments - 1][3..].fill(0.0));
+            others.for_each(|rod| rod[unknowns.nodes - 1][3..].fill(0.0));
         }
         forces
     }

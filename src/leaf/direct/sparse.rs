@@ -61,7 +61,7 @@ impl Symbolic {
     pub fn new(system: &System, unknowns: &Unknowns, rows: usize) -> Result<Self, DirectError> {
         let border = unknowns.count;
         let size = border + rows;
-        let (rods, n) = (system.rods(), system.segments);
+        let (rods, n) = (system.rods(), system.nodes());
         let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
         let mut pairs = Vec::new();
         entries(system, unknowns, &ones, border, 0.0, |a, b, _| {

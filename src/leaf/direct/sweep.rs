@@ -44,7 +44,7 @@ pub struct Workspace {
 
 impl Workspace {
     pub fn new(system: &System) -> Self {
-        let width = 3 * system.segments();
+        let width = 3 * system.nodes();
         let rows = || vec![0.0; 3 * padded(width)];
         Workspace {
             width,

@@ -15,11 +15,12 @@ const WIDE: f64 = 2.5;
 
 /// The numbering of the unknowns of the nodes.
 pub struct Unknowns {
-    /// The unknowns of node i (from 0) of rod j, at j n + i.
+    /// The unknowns of node i (from the first with equations) of rod j, at j n + i.
     numbers: Vec<[usize; 6]>,
     /// First unknown of the joint tip.
     pub tip: Option<usize>,
-    pub segments: usize,
+    /// Nodes of a rod that have equations.
+    pub nodes: usize,
     /// Number of unknowns.
     pub count: usize,
     /// Unknowns of a node that are coupled with those of the next rod.
@@ -30,11 +31,11 @@ impl Unknowns {
     /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
     /// of which these unknowns are coupled only.
     pub fn new(system: &System, coupled: [bool; 6]) -> Self {
-        let (rods, n) = (system.rods(), system.segments);
+        let (rods, n) = (system.rods(), system.nodes());
         let mut order = Order {
             numbers: vec![[0; 6]; rods * n],
             count: 0,
-            segments: n,
+            nodes: n,
             joined: system.joined,
             coupled,
         };
@@ -54,7 +55,7 @@ impl Unknowns {
         Unknowns {
             numbers,
             tip,
-            segments: n,
+            nodes: n,
             count,
             coupled,
         }
@@ -67,7 +68,7 @@ impl Unknowns {
 
     /// All six unknowns of node `i` (from 0) of rod `j`.
     pub fn of(&self, j: usize, i: usize) -> [usize; 6] {
-        self.numbers[j * self.segments + i]
+        self.numbers[j * self.nodes + i]
     }
 
     /// Adds the forces on a node to a vector of all unknowns.
@@ -80,7 +81,7 @@ impl Unknowns {
     /// The values at all nodes, from a vector of all unknowns.
     pub fn field(&self, all: &[f64]) -> Field {
         let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
-        let rods = self.numbers.chunks_exact(self.segments).enumerate();
+        let rods = self.numbers.chunks_exact(self.nodes).enumerate();
         rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
             .collect()
     }
@@ -90,7 +91,7 @@ impl Unknowns {
 struct Order {
     numbers: Vec<[usize; 6]>,
     count: usize,
-    segments: usize,
+    nodes: usize,
     joined: bool,
     coupled: [bool; 6],
 }
@@ -146,12 +147,12 @@ impl Order {
 
     /// Some components of a node; not those of the joint tip, which follows.
     fn number(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
-        let own = match self.joined && i + 1 == self.segments {
+        let own = match self.joined && i + 1 == self.nodes {
             true => 3,
             false => 6,
         };
         for c in (0..own).filter(|&c| some(c)) {
-            self.numbers[j * self.segments + i][c] = self.count;
+            self.numbers[j * self.nodes + i][c] = self.count;
             self.count += 1;
         }
     }
@@ -167,7 +168,7 @@ pub fn entries(
     shift: f64,
     mut add: impl FnMut(usize, usize, f64),
 ) {
-    let n = system.segments;
+    let n = system.nodes();
     for j in 0..system.rods() {
         let (group, lane) = group_and_lane(j);
         let chain = &system.groups[group].matrix;

@@ -48,7 +48,7 @@ impl Vein {
     fn assemble(&mut self, system: &System, j: usize, shift: f64, width: usize) {
         let (group, lane) = group_and_lane(j);
         let chain = &system.groups[group].matrix;
-        let (n, stride) = (system.segments(), padded(width));
+        let (n, stride) = (system.nodes(), padded(width));
         self.nodes.clear();
         self.swept.clear();
         self.swept.resize(width * stride, 0.0);

@@ -18,34 +18,35 @@ impl System {
         std::array::from_fn(|c| self.tied() || c >= 3 && along(c - 3))
     }
 
-    /// The block between node `i` (from 0) of rod `g` and that of the next, if there is tissue.
+    /// The block between node `i` (from the first with equations) of rod `g` and that of the next, if there is tissue.
     pub(in crate::leaf) fn across(&self, g: usize, i: usize) -> Option<&NodeBlock> {
         match self.tied() && g + 1 < self.rods {
-            true => Some(&self.across[g * self.segments + i]),
+            true => Some(&self.across[g * self.nodes() + i]),
             false => None,
         }
     }
 
     /// The same, to be changed.
     pub(in crate::leaf) fn across_mut(&mut self, g: usize, i: usize) -> &mut NodeBlock {
-        &mut self.across[g * self.segments + i]
+        let nodes = self.nodes();
+        &mut self.across[g * nodes + i]
     }
 
-    /// Adds the upper triangle of a block to the matrix at node `i` (from 1) of rod `j`.
+    /// Adds the upper triangle of a block to the matrix at node `i` of rod `j`.
     pub(in crate::leaf) fn add_block(&mut self, j: usize, i: usize, block: &NodeBlock) {
         let (group, lane) = group_and_lane(j);
-        let chain = &mut self.groups[group].matrix;
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for (r, row) in block.iter().enumerate() {
             for c in r..row.len() {
-                chain.diagonal(i - 1, r, c).0[lane] += row[c];
+                chain.diagonal(at, r, c).0[lane] += row[c];
             }
         }
     }
 
-    /// Adds a moment and a force to the right-hand side of node `i` (from 1) of rod `j`.
+    /// Adds a moment and a force to the right-hand side of node `i` of rod `j`.
     pub fn add_load(&mut self, j: usize, i: usize, [moment, force]: [DVec3; 2]) {
         let (group, lane) = group_and_lane(j);
-        let rhs = &mut self.groups[group].rhs[i - 1];
+        let rhs = &mut self.groups[group].rhs[i - self.first];
         for c in 0..3 {
             rhs[c].0[lane] += moment[c];
             rhs[3 + c].0[lane] += force[c];

@@ -5,43 +5,49 @@ use crate::leaf::chain::group_and_lane;
 use glam::{DMat3, DVec3};
 
 impl System {
-    /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a rotary and a
+    /// Adds to the equations of node `i` of rod `j`: to the matrix a rotary and a
     /// translational part on its diagonal, to the right-hand side a moment and a force.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let (group, lane) = group_and_lane(j);
-        let group = &mut self.groups[group];
+        let (at, group) = (i - self.first, &mut self.groups[group]);
         let chain = &mut group.matrix;
-        let increment = &mut group.rhs[i - 1];
+        let increment = &mut group.rhs[at];
         for c in 0..3 {
             for r in 0..=c {
-                chain.diagonal(i - 1, r, c).0[lane] += matrix.0.col(c)[r];
+                chain.diagonal(at, r, c).0[lane] += matrix.0.col(c)[r];
             }
-            chain.diagonal(i - 1, 3 + c, 3 + c).0[lane] += matrix.1;
+            chain.diagonal(at, 3 + c, 3 + c).0[lane] += matrix.1;
             increment[c].0[lane] += rhs.0[c];
             increment[3 + c].0[lane] += rhs.1[c];
         }
     }
 
-    /// Adds a spring's `stiffness` to the matrix at node `i` (from 1) of rod `j`, against its
+    /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its
     /// displacement.
     pub fn hold(&mut self, j: usize, i: usize, stiffness: DMat3) {
         let (group, lane) = group_and_lane(j);
-        let chain = &mut self.groups[group].matrix;
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..=c {
-                chain.diagonal(i - 1, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+                chain.diagonal(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
             }
         }
     }
 
-    /// Adds `stiffness` to the matrix between the displacements of nodes `i` (from 1) and `i` + 1 of
+    /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its rotation.
+    pub fn hold_rotation(&mut self, j: usize, i: usize, stiffness: DMat3) {
+        let none = (DVec3::ZERO, DVec3::ZERO);
+        self.add(j, i, (stiffness, 0.0), none);
+    }
+
+    /// Adds `stiffness` to the matrix between the displacements of nodes `i` and `i` + 1 of
     /// rod `j`.
     pub fn hold_together(&mut self, j: usize, i: usize, stiffness: DMat3) {
         let (group, lane) = group_and_lane(j);
-        let chain = &mut self.groups[group].matrix;
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
         for c in 0..3 {
             for r in 0..3 {
-                chain.off(i - 1, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+                chain.off(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
             }
         }
     }

@@ -49,7 +49,7 @@ pub(crate) struct Group {
     /// Right-hand side; with a joint tip, the last displacement slots hold
     /// the rods' shares of the tip's.
     pub rhs: Vec<Increments>,
-    /// Solution, nodes 1 to n, complete.
+    /// Solution, all nodes with equations, complete.
     pub solution: Vec<Increments>,
     pub sums: Sums,
     /// Nodal masses per weight: rotary, translational.
@@ -74,19 +74,21 @@ pub struct System {
     pub(super) joined: bool,
     coupled: bool,
     pub(super) parallel: bool,
-    pub(super) segments: usize,
-    /// Weights of the nodes 1 to n in the masses.
+    segments: usize,
+    /// The first node of a rod with equations, from which its nodes are numbered here.
+    first: usize,
+    /// Weights of the nodes with equations in the masses.
     weights: Vec<f64>,
-    /// Weights of the nodes in E: zero at a joint tip.
+    /// Weights of the nodes in E: zero at a joint tip and at hinged bases, which stay.
     coupling_weights: Vec<f64>,
     pub(super) arch: Arch,
     tip: Option<TipFactor>,
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
     gaps: Vec<DVec3>,
-    /// The blocks between neighbouring rods, gap after gap, nodes 1 to n; empty without tissue.
+    /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without tissue.
     across: Vec<NodeBlock>,
-    /// Nodes (from 0) that grips hold, with the components that are: these have no momentum.
-    gripped: Vec<(usize, usize, Range<usize>)>,
+    /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
+    held: Vec<(usize, usize, Range<usize>)>,
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
 }
@@ -116,7 +118,8 @@ pub(super) fn rods_of(group: usize, rods: usize) -> Range<usize> {
 impl System {
     /// Allocates the equations of `leaf`.
     pub fn new(leaf: &DiscreteLeaf) -> Self {
-        let (rods, n) = (leaf.rods(), leaf.segments());
+        let (rods, nodes) = (leaf.rods(), leaf.moving_nodes());
+        let (first, n) = (nodes.start, nodes.len());
         let joined = leaf.tips_move_together();
         let coupled = leaf.coupled() || leaf.tied();
         let gaps = match leaf.coupled() {
@@ -131,18 +134,20 @@ impl System {
             joined,
             coupled,
             parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
-            segments: n,
-            weights: (1..=n).map(|i| leaf.moving_weight(i)).collect(),
-            coupling_weights: (1..=n).map(|i| leaf.coupling_weight(i)).collect(),
+            segments: leaf.segments(),
+            first,
+            weights: nodes.clone().map(|i| leaf.moving_weight(i)).collect(),
+            coupling_weights: nodes
+                .map(|i| if i == 0 { 0.0 } else { leaf.coupling_weight(i) })
+                .collect(),
             arch: widest_arch(),
             tip: None,
             gaps,
             across: vec![Default::default(); if leaf.tied() { (rods - 1) * n } else { 0 }],
-            gripped: (0..rods)
-                .flat_map(|j| leaf.grips_of(j))
-                .map(|held| {
-                    let first = if held.rotation.is_some() { 0 } else { 3 };
-                    (held.rod, held.node - 1, first..6)
+            held: (0..rods)
+                .flat_map(|j| {
+                    leaf.held_inside(j)
+                        .map(move |(i, parts)| (j, i - first, parts))
                 })
                 .collect(),
             moments: DeadMoments::default(),
@@ -164,7 +169,10 @@ impl System {
     /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
     /// on a grid of as many segments.
     pub fn reused(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
-        let fits = |spare: &System| (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
+        let fits = |spare: &System| {
+            let same = (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
+            same && spare.first == leaf.first_node()
+        };
         spare.filter(fits).unwrap_or_else(|| System::new(leaf))
     }
 
@@ -178,28 +186,38 @@ impl System {
         self.segments
     }
 
+    /// The first node of a rod with equations; fields begin with it.
+    pub fn first(&self) -> usize {
+        self.first
+    }
+
+    /// Number of nodes of a rod with equations.
+    pub fn nodes(&self) -> usize {
+        self.weights.len()
+    }
+
     /// Whether neighbours are coupled, so that conjugate gradients are needed.
     pub fn coupled(&self) -> bool {
         self.coupled
     }
 
-    /// Coupling of gap `g` at node `i` (from 0), if there is one.
+    /// Coupling of gap `g` at node `i` (from the first with equations), if there is one.
     pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
         Some(*self.gaps.get(g)? * self.coupling_weights[i])
     }
 
-    /// Nodal mass of node `i` (from 0) of rod `j`: rotary, translational.
+    /// Nodal mass of node `i` (from the first with equations) of rod `j`: rotary, translational.
     pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
         let (group, lane) = group_and_lane(j);
         let masses = &self.groups[group].masses;
         masses.map(|mass| mass.0[lane] * self.weights[i])
     }
 
-    /// The right-hand side of node `i` (from 1) of rod `j`: moment and force on it; at a joint
+    /// The right-hand side of node `i` of rod `j`: moment and force on it; at a joint
     /// tip the rod's share.
     pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
         let (group, lane) = group_and_lane(j);
-        let rhs = of_lane(&self.groups[group].rhs[i - 1], lane);
+        let rhs = of_lane(&self.groups[group].rhs[i - self.first], lane);
         (turn(&rhs), shift(&rhs))
     }
 
@@ -222,10 +240,10 @@ impl System {
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let segments = self.segments as f64;
         let node = |j: usize, i: usize| {
-            let along = (i + 1) as f64 / segments;
+            let along = (i + self.first) as f64 / segments;
             std::array::from_fn(|c| golden(12 * j + c + 1) + along * golden(12 * j + c + 7))
         };
-        let rod = |j: usize| (0..self.segments).map(|i| node(j, i)).collect();
+        let rod = |j: usize| (0..self.nodes()).map(|i| node(j, i)).collect();
         let seed: Field = (0..self.rods).map(rod).collect();
         self.set_rhs(&self.momentum(&seed));
     }
@@ -265,10 +283,10 @@ impl System {
         self.gather(|group| &group.solution)
     }
 
-    /// The last solution at node `i` (from 1) of rod `j`.
+    /// The last solution at node `i` of rod `j`.
     pub fn increment(&self, j: usize, i: usize) -> Increment {
         let (group, lane) = group_and_lane(j);
-        of_lane(&self.groups[group].solution[i - 1], lane)
+        of_lane(&self.groups[group].solution[i - self.first], lane)
     }
 
     /// Replaces the last solution.
@@ -304,7 +322,7 @@ impl System {
         let mut momentum: Field = rods
             .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
             .collect();
-        for (j, i, held) in &self.gripped {
+        for (j, i, held) in &self.held {
             momentum[*j][*i][held.clone()].fill(0.0);
         }
         momentum
@@ -351,7 +369,7 @@ impl System {
 impl Group {
     /// Allocates the equations of a group of the rods of `leaf`.
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
-        let n = leaf.segments();
+        let n = leaf.moving_nodes().len();
         let zeros = vec![Increments::default(); n];
         let (mut active, mut masses) = (Four::default(), [Four::default(); 2]);
         for (lane, j) in rods_of(group, leaf.rods()).enumerate() {

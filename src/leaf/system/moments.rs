@@ -14,7 +14,7 @@ use pulp::Arch;
 /// The dead moments as of the last assembly, with the workspace of their equations.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeadMoments {
-    /// Nodes (from 1) and moments.
+    /// Nodes with equations (from 0) and moments.
     on_nodes: Vec<(usize, DVec3)>,
     /// Their equations, row after row, each with its right-hand side last.
     rows: Vec<f64>,
@@ -41,7 +41,7 @@ impl DeadMoments {
     fn set_column(&mut self, column: usize, rotations: &[Increments]) {
         let width = 3 * self.on_nodes.len() + 1;
         for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
-            let turn = rotation(&rotations[node - 1]);
+            let turn = rotation(&rotations[*node]);
             let by = turn.cross(0.5 * *moment);
             for c in 0..3 {
                 self.rows[(3 * a + c) * width + column] = by[c];
@@ -89,12 +89,12 @@ impl System {
 }
 
 impl Group {
-    /// z = B^-1 times moments on nodes (from 1) of the first rod.
+    /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
     fn respond(&mut self, arch: Arch, moments: impl IntoIterator<Item = (usize, DVec3)>) {
         self.residual.fill(Increments::default());
         for (node, moment) in moments {
             for c in 0..3 {
-                self.residual[node - 1][c].0[0] += moment[c];
+                self.residual[node][c].0[0] += moment[c];
             }
         }
         self.matrix.forward(arch, &self.residual, &mut self.z);

@@ -181,7 +181,7 @@ impl System {
     /// z = B^-1 residual, including the tip's displacement in every rod's last slot; returns
     /// that displacement and residual . z over all unknowns.
     fn precondition(&mut self, tip_residual: DVec3) -> (DVec3, f64) {
-        let (last, arch) = (self.segments - 1, self.arch);
+        let (last, arch) = (self.nodes() - 1, self.arch);
         each_group(self.parallel, &mut self.groups, |_, group| {
             group.matrix.forward(arch, &group.residual, &mut group.z);
         });

@@ -103,9 +103,12 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
         weight: leaf.grid.weight(i) * leaf.leaf.length(j),
         ..Node::default()
     };
-    if i > 0 || !physics.clamped() {
+    let [turns, shifts] = match i == 0 && !physics.clamped() {
+        true => [true; 2],
+        false => leaf.moves(j, i),
+    };
+    if turns || shifts {
         let inertia = physics.inertia(leaf, j, i);
-        let [turns, shifts] = leaf.moves(j, i);
         if turns {
             node.per_inertia = 1.0 / inertia.transverse;
             node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;

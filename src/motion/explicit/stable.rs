@@ -107,7 +107,11 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
         let stiffness = stiffness(leaf, state, j, i);
         // Inverse square root of the masses of an end, along the lab axes.
         let root = |end: usize| {
-            if i + end == 0 && physics.clamped() {
+            let free = match i + end == 0 && physics.clamped() {
+                true => leaf.moves(j, 0),
+                false => [true; 2],
+            };
+            if free == [false; 2] {
                 return [DMat3::ZERO; 2];
             }
             let node = state.base(j) + i + end;
@@ -120,9 +124,12 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
             let (j1, j2) = (inertia.polar(), inertia.transverse);
             let turning = DVec3::new(j1, j2, j2) * turn / held[node][1];
             let frame = DMat3::from_quat(state.q[node]);
-            [moving, turning].map(|mass| {
-                let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
-                frame * root * frame.transpose()
+            [(moving, free[1]), (turning, free[0])].map(|(mass, free)| match free {
+                true => {
+                    let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
+                    frame * root * frame.transpose()
+                }
+                false => DMat3::ZERO,
             })
         };
         let (left, right) = (root(0), root(1));
@@ -220,14 +227,14 @@ fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
             let inertia = physics.inertia(leaf, rod, i);
             let ends = [0, leaf.rods() - 1].contains(&rod);
             let share = if ends { 1.0 } else { 0.5 };
-            // Clamped bases do not move.
-            let free = if i == 0 && physics.clamped() {
-                0.0
-            } else {
-                1.0 / share
+            // Bases that are held do not move.
+            let [turns, shifts] = match i == 0 && physics.clamped() {
+                true => leaf.moves(rod, 0),
+                false => [true; 2],
             };
+            let part = |free: bool| if free { 1.0 / share } else { 0.0 };
             let turning = inertia.polar().min(inertia.transverse);
-            [free / turning, free / inertia.mass].map(f64::sqrt)
+            [part(turns) / turning, part(shifts) / inertia.mass].map(f64::sqrt)
         };
         let (a, b) = (inverse(g), inverse(g + 1));
         let roots = [a[0], a[1], b[0], b[1]];

@@ -11,7 +11,7 @@ impl SemiImplicit {
     pub(super) fn add_drag(&mut self, time: f64, rate: f64) {
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_moving);
-        let moves = |j: usize, i: usize| i > 0 && leaf.moves(j, i)[1];
+        let moves = |j: usize, i: usize| leaf.moves(j, i)[1];
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
             let (half, stiffness) = (0.5 * drag.force(), 0.25 * rate * drag.by_velocity());

@@ -98,7 +98,7 @@ impl SemiImplicit {
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
-        for (j, i) in self.leaf.each(1..=n) {
+        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
             let k = self.state.base(j) + i;
             let (moment, force) = self.system.unbalanced(j, i);
             let Inertia { mass, .. } = self.inertia[k];

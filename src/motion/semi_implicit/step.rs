@@ -57,10 +57,7 @@ impl SemiImplicit {
     /// base or tip.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
         let nodes = self.leaf.segments() + 1;
-        let [turns, shifts] = match k % nodes {
-            0 => [false; 2],
-            i => self.leaf.moves(k / nodes, i),
-        };
+        let [turns, shifts] = self.leaf.moves(k / nodes, k % nodes);
         let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
         let shift = || self.trial.x[k] - self.state.x[k];
         [
@@ -75,7 +72,8 @@ impl SemiImplicit {
         let w = self.weights;
         let (of_increment, of_mean) = (1.0 / (w.beta * h * h), 1.0 / (1.0 - w.alpha_f));
         let of_before = (0.5 - w.beta) / w.beta;
-        for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
+        let first = self.leaf.first_node();
+        for k in (0..self.state.x.len()).filter(|k| k % nodes >= first) {
             let (m, d) = (self.moving[k], self.increment(k));
             let next = &mut self.next_moving[k];
             for c in 0..2 {
@@ -251,7 +249,7 @@ impl SemiImplicit {
 }
 
 /// Adds mass times `per_mass` to the matrix, and a moment and a force to the
-/// right-hand side, at all nodes except the bases.
+/// right-hand side, at all nodes with equations.
 pub(super) fn add_inertia(
     system: &mut System,
     state: &State,
@@ -261,7 +259,7 @@ pub(super) fn add_inertia(
 ) {
     let n = state.segments();
     for j in 0..state.rods() {
-        for i in 1..=n {
+        for i in system.first()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
             let matrix = (tensor * per_mass, inertia[k].mass * per_mass);

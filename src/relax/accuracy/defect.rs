@@ -286,7 +286,7 @@ impl Integrated {
     }
 }
 
-/// Makes forces and moments at the tips satisfy the end conditions, which unfinished
+/// Makes forces and moments at the tips, and moments at hinges, satisfy the end conditions, which unfinished
 /// iterations violate slightly: the linear equations assume them. For a rod in the mirror
 /// plane the components that would move it out of the plane are set to zero.
 fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
@@ -295,6 +295,9 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
             node.n.y = 0.0;
             (node.m.x, node.m.z) = (0.0, 0.0);
         }
+    }
+    for rod in known.iter_mut().filter(|_| leaf.leaf.hinged()) {
+        rod[0].m = DVec3::ZERO;
     }
     let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
     let held = leaf.leaf.held.as_ref();

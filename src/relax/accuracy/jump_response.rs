@@ -28,8 +28,9 @@ pub struct Tangents<'a> {
 
 /// The first-order response to jumps.
 pub struct Response {
-    /// Displacements and rotations of all nodes but the bases.
+    /// Displacements and rotations of all nodes from the `first` on.
     solution: Field,
+    first: usize,
     /// The largest displacements at the ends of the parts, and on either side of the midpoints.
     pub largest: [f64; 2],
 }
@@ -66,7 +67,9 @@ impl<'a> Tangents<'a> {
         let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);
         let solution = system.solution();
         for (rod, jumps) in solution.iter().zip(jumps) {
-            for (nodes, jump) in rod.chunks(self.part).zip(jumps) {
+            // The ends of parts, without the bases.
+            let nodes = &rod[1 - system.first()..];
+            for (nodes, jump) in nodes.chunks(self.part).zip(jumps) {
                 let before = shift(&nodes[self.part / 2 - 1]);
                 let middle = larger(before.length(), (before + jump[0]).length());
                 between = larger(between, middle);
@@ -75,6 +78,7 @@ impl<'a> Tangents<'a> {
         }
         Some(Response {
             solution,
+            first: system.first(),
             largest: [at_ends, between],
         })
     }
@@ -127,7 +131,12 @@ impl<'a> Tangents<'a> {
         // A moment with fixed lab components does not rotate with its node.
         if i == 0 {
             let moment = second.xa.transpose() * across + second.aa * a + second.ab * b;
-            return [zero, zero, force, -moment - 0.5 * a.cross(g_a)];
+            return [
+                zero,
+                response.at(j, 0)[1],
+                force,
+                -moment - 0.5 * a.cross(g_a),
+            ];
         }
         let moment = second.xb.transpose() * across + second.ab.transpose() * a + second.bb * b;
         let left = leaf.grid.width(i - 1);
@@ -146,9 +155,9 @@ impl<'a> Tangents<'a> {
 impl Response {
     /// Displacement and rotation of node `i` of rod `j`.
     fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
-        match i {
-            0 => [DVec3::ZERO; 2],
-            _ => [shift, turn].map(|of| of(&self.solution[j][i - 1])),
+        match i < self.first {
+            true => [DVec3::ZERO; 2],
+            false => [shift, turn].map(|of| of(&self.solution[j][i - self.first])),
         }
     }
 }
@@ -177,7 +186,7 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
 fn moved(state: &State, response: &Response) -> State {
     let mut moved = state.clone();
     for j in 0..state.rods() {
-        for i in 1..=state.segments() {
+        for i in 0..=state.segments() {
             let (k, [shift, turn]) = (state.base(j) + i, response.at(j, i));
             moved.x[k] += shift;
             moved.q[k] = (rotation::exp(turn) * moved.q[k]).normalize();

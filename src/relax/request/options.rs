@@ -158,6 +158,11 @@ pub enum RelaxError {
         "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
     )]
     ChangingWind,
+    /// Hinges in one place, about which an unloaded leaf turns to anywhere.
+    #[error(
+        "leaf.base_held: without a load nothing holds the leaf against turning about its hinge: give it a load or another hinge, hold its tip, or clamp its base"
+    )]
+    TurnsFreely,
 }
 
 /// Refuses scenarios with grips for what does not take them into account.
@@ -173,6 +178,14 @@ pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), Relax
     match scenario.wind {
         None => Ok(()),
         Some(_) => Err(RelaxError::Wind { what }),
+    }
+}
+
+/// Refuses a leaf on hinges that may point anywhere.
+pub fn points_somewhere(scenario: &Scenario) -> Result<(), RelaxError> {
+    match scenario.turns_freely() {
+        true => Err(RelaxError::TurnsFreely),
+        false => Ok(()),
     }
 }
 

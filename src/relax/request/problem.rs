@@ -86,10 +86,11 @@ impl<'a> Problem<'a> {
             Method::SemiImplicit(how) => disturbed(how),
             _ => false,
         };
-        // What is held is moved to its holder by a method of its own.
+        // What is held is moved to its holder by a method of its own; without loads hinges turn freely.
         self.options.route == Route::Loading
             && !released
             && !self.leaf.is_held()
+            && !self.leaf.hinged()
             && self.leaf.loads != Loads::default()
             && !self.leaf.loads.has_moments()
     }
@@ -103,6 +104,7 @@ impl<'a> Problem<'a> {
         settles
             && self.options.route == Route::Loading
             && !self.leaf.is_held()
+            && !self.leaf.hinged()
             && !self.leaf.loads.has_moments()
             && !self.out_of_time()
     }

@@ -184,7 +184,7 @@ pub struct Stability {
     #[serde(flatten, serialize_with = "serialize_index")]
     pub negative_eigenvalues: Option<usize>,
     /// Number of directions in which the leaf can move without resistance, as round veins
-    /// clamped in line can: eigenvalues that are exactly zero, at no bifurcation.
+    /// clamped in line can, and veins on hinges: eigenvalues that are exactly zero, at no bifurcation.
     pub neutral_directions: usize,
     /// The lowest modes, ascending, without omissions. `None` if they were not requested or
     /// not found, if the leaf is not at rest, or for shooting.

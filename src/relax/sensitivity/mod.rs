@@ -200,11 +200,11 @@ impl Grid<'_> {
                 .filter(|_| !rate.changes_moments())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
             let n = leaf.segments();
-            let tip = |j: usize| shift(&response.nodes[j][n - 1]);
+            let tip = |j: usize| shift(&response.of_node(leaf, j, n));
             // The work of dead moments is not part of the energy.
             let works = leaf
                 .moments()
-                .map(|(node, moment)| moment.dot(turn(&response.nodes[0][node - 1])));
+                .map(|(node, moment)| moment.dot(turn(&response.of_node(leaf, 0, node))));
             let work: f64 = works.sum();
             [
                 self.tips().map(tip).collect(),
@@ -264,8 +264,10 @@ impl Grid<'_> {
     fn positions(&self, rate: &LeafRate, response: &Response) -> Vec<DVec3> {
         let rods = response.nodes.iter().enumerate();
         let of = |(j, rod): (usize, &Vec<[f64; 6]>)| -> Vec<DVec3> {
-            let nodes = rod.iter().skip(self.stride - 1).step_by(self.stride);
-            let [base, _] = rate.of_base(j);
+            // A clamped base has no equations; a hinged one moves with its hinge.
+            let (bases, nodes) = rod.split_at(1 - self.level.leaf.first_node());
+            let base = bases.first().map_or(rate.of_base(j)[0], shift);
+            let nodes = nodes.iter().skip(self.stride - 1).step_by(self.stride);
             [base].into_iter().chain(nodes.map(shift)).collect()
         };
         rods.flat_map(of).collect()
@@ -292,7 +294,7 @@ impl Grid<'_> {
 
 /// A unit force on every tip along every axis.
 pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
-    let n = leaf.segments();
+    let n = leaf.moving_nodes().len();
     let force = |(tip, axis): (usize, usize)| {
         let mut unit = Forces::zeros(leaf.rods());
         unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;

@@ -120,7 +120,7 @@ fn response(
     load: &Forces,
     solve: &mut dyn FnMut(&Field) -> Option<Field>,
 ) -> Option<Response> {
-    let (mut rhs, mut gaps) = load.dense(leaf.segments());
+    let (mut rhs, mut gaps) = load.dense(leaf);
     let mut response = Response {
         nodes: Field::new(),
         carried: vec![DVec3::ZERO; gaps.len()],

@@ -24,6 +24,7 @@ pub fn predict(levels: &[&Level], state: &mut State) {
         first: ends[0],
         last: ends[1],
         coarsest: first.segments(),
+        known: usize::from(ends[0] > 0 || !first.leaf.hinged()),
     };
     let panels: Vec<Panel> = edges.windows(2).map(panel).collect();
     for panel in &panels {
@@ -71,6 +72,8 @@ struct Panel {
     first: usize,
     last: usize,
     coarsest: usize,
+    /// Whether its first node is known: a clamped base, or the last of the panel before.
+    known: usize,
 }
 
 impl Panel {
@@ -149,8 +152,7 @@ impl Panel {
             };
             let changes: Vec<_> = (start..=start + count).map(change).collect();
             let first = to.base(j) + self.first(to);
-            // The first node is the base, or was the last of the panel before.
-            for (k, node) in nodes.iter().enumerate().skip(1) {
+            for (k, node) in nodes.iter().enumerate().skip(self.known) {
                 let turn = node.value(|i| changes[i - start].1);
                 to.x[first + k] += node.value(|i| changes[i - start].0);
                 to.q[first + k] = (rotation::exp(turn) * to.q[first + k]).normalize();

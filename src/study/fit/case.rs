@@ -208,7 +208,7 @@ impl CaseAt {
     /// Its response to steps of the numbers on these grids, each of which must be one of its
     /// own; empty if there are no steps.
     pub fn answer(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
-        let none = |level: &Level| Response::zeros(level.leaf.rods(), level.leaf.segments());
+        let none = |level: &Level| Response::zeros(&level.leaf);
         match &self.responses {
             Some(responses) if steps.iter().any(|step| *step != 0.0) => responses.to(levels, steps),
             _ => Ok(levels.iter().map(none).collect()),
@@ -280,7 +280,7 @@ impl CaseAt {
         match quantity {
             Quantity::Tip(axis) => {
                 let tip = |k: usize, level: &Level| {
-                    shift(&responses[k].nodes[0][level.leaf.segments() - 1])
+                    shift(&responses[k].of_node(&level.leaf, 0, level.leaf.segments()))
                 };
                 self.at.best(tip)[axis] * self.length()
             }
@@ -334,11 +334,8 @@ impl CaseAt {
             along = along.normalize_or_zero();
         }
         let change = |responses: &Vec<Response>| {
-            let change = self.at.best(|k, _| {
-                stencils[k][0].value(|i| match i {
-                    0 => DVec3::ZERO,
-                    _ => shift(&responses[k].nodes[rod][i - 1]),
-                })
+            let change = self.at.best(|k, level| {
+                stencils[k][0].value(|i| shift(&responses[k].of_node(&level.leaf, rod, i)))
             }) * self.length();
             let mut seen = DVec3::ZERO;
             axes.iter().for_each(|&axis| seen[axis] = change[axis]);

@@ -80,15 +80,14 @@ impl Responses {
     /// The response on each of these grids to steps of the numbers.
     pub fn to(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
         let on = |(k, level): (usize, &Level)| {
-            let (rods, segments) = (level.leaf.rods(), level.leaf.segments());
             if !self.each.is_empty() {
-                let mut sum = Response::zeros(rods, segments);
+                let mut sum = Response::zeros(&level.leaf);
                 for (responses, step) in self.each.iter().zip(steps) {
                     sum.add(*step, &responses[k]);
                 }
                 return Ok(sum);
             }
-            let mut sum = Forces::zeros(rods);
+            let mut sum = Forces::zeros(level.leaf.rods());
             for (forces, step) in self.forces[k].iter().zip(steps) {
                 sum.add(*step, forces);
             }

@@ -99,7 +99,7 @@ fn on_refined(stable: &Stable, start: &StartPoint) -> Option<StartPoint> {
     (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| StartPoint {
         grid: start.grid.refined(),
         state: prolong(leaf, &start.state),
-        direction: prolong_field(&start.direction),
+        direction: prolong_field(&start.direction, leaf.first_node()),
     })
 }
 
@@ -142,7 +142,7 @@ fn beyond(stable: &Stable, pass: &Pass) -> Option<State> {
     let distance = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * distance);
     let mut equations = Equations::new(stable.family, pass.grid.clone());
-    let towards = between(&pass.saddle.state, &pass.leaf.state);
+    let towards = between(&pass.saddle.state, &pass.leaf.state, equations.first_node());
     let stop = || stable.limit.reached();
     let both = equations.fall(&pass.saddle, &towards, &stop).ok()?;
     let rest = |fallen: Result<Point, State>| match fallen {

@@ -337,7 +337,9 @@ fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
         _ => scenario.turnings(),
     };
     let along = |direction: &Direction| {
-        let mut axes = turnings.iter().map(|it| it.axis.to_array());
+        // What only spins turns towards nothing.
+        let axes = turnings.iter().map(|it| it.axis.to_array());
+        let mut axes = axes.filter(|axis| *axis != [0.0; 3]);
         axes.all(|axis| (axis[direction.axis].abs() - 1.0).abs() < IMAGES)
     };
     let mirrored = [false, is_own_image(scenario, rest), rest.model.planar];

@@ -44,7 +44,7 @@ pub(in crate::relax::settle::methods) struct Motion {
 impl Motion {
     /// At rest, with the longest step.
     pub(in crate::relax::settle::methods) fn new(leaf: &DiscreteLeaf) -> Self {
-        let velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
+        let velocity = vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()];
         Motion {
             dt: f64::INFINITY,
             growth: MAX_GROWTH,

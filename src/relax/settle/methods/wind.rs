@@ -120,17 +120,20 @@ struct Air {
     /// Whether each node may be displaced, rod after rod.
     free: Vec<bool>,
     segments: usize,
+    /// The first node of a rod with equations.
+    first: usize,
 }
 
 impl Air {
     fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
         let segments = leaf.segments();
-        let free = |(j, i)| i > 0 && leaf.moves(j, i)[1];
+        let free = |(j, i)| leaf.moves(j, i)[1];
         Some(Air {
             wind: Wind::new(leaf, physics)?,
             velocity: physics.air(0.0),
             free: leaf.each(0..segments + 1).map(free).collect(),
             segments,
+            first: leaf.first_node(),
         })
     }
 
@@ -157,13 +160,13 @@ impl Following for Air {
 
     fn add_change(&self, state: &State, increments: &Field, forces: &mut Field) {
         for ((j, i), drag) in self.drags(state) {
-            let moved = |i: usize| match i.checked_sub(1) {
+            let moved = |i: usize| match i.checked_sub(self.first) {
                 Some(i) => shift(&increments[j][i]),
                 None => DVec3::ZERO,
             };
             let half = 0.5 * (drag.by_chord() * (moved(i + 1) - moved(i)));
             for node in self.ends(j, i) {
-                add(&mut forces[j][node - 1], DVec3::ZERO, half);
+                add(&mut forces[j][node - self.first], DVec3::ZERO, half);
             }
         }
     }

@@ -1,0 +1,211 @@
+//! Columns and beams on hinges: where they buckle, how they vibrate, and in how many directions
+//! nothing holds them.
+
+use leafdyn::internals::leaf::Leaf;
+use leafdyn::internals::motion::Physics;
+use leafdyn_testing::branch::{changes_at, follow};
+use leafdyn_testing::motion::{discrete, state_of};
+use leafdyn_testing::vibration::Linear;
+use leafdyn_testing::*;
+use nalgebra::SymmetricEigen;
+
+/// A rod on a hinge whose tip is held on its axis.
+const COLUMN: &str = r#"
+    name = "column"
+    leaf = { rods = 1, length = 1.0, fan = [0.0], base_held = "pinned" }
+    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1e3, shear_2 = 400.0, shear_3 = 400.0 }
+    tip = { held = "pinned", position = [1.0, 0.0, 0.0] }
+    dynamics = { density = 1.0, rotary_inertia = 1e-10 }
+"#;
+
+/// Roots of tan b = b.
+const TAN: [f64; 2] = [4.493409457909064, 7.725251836937707];
+
+/// Roots of tan b = tanh b, of the beam on a hinge and in a clamp (S. Timoshenko, Vibration problems
+/// in engineering).
+const HINGED_CLAMPED: [f64; 3] = [3.926602312047919, 7.068582745628732, 10.210176122813031];
+
+/// P (1 + P/GA - P/EA) = k^2 EI/L^2 (Engesser and Reissner).
+fn reissner(k: f64, axial: f64, shear: f64) -> f64 {
+    let a = 1.0 / shear - 1.0 / axial;
+    2.0 * k * k / (1.0 + (1.0 + 4.0 * a * k * k).sqrt())
+}
+
+/// Pushed together, a column with the loads P = EA (1 - x) buckles at these, by so many ways each:
+/// along the branch, and where it is kept straight.
+#[test]
+fn columns_buckle_at_the_loads_of_euler_and_reissner() {
+    close("P", reissner(PI, 1e3, 400.0), 9.727663252556647, 1e-14);
+    close("P", reissner(PI, 100.0, 40.0), 8.72715570151268, 1e-14);
+    let rigid = f64::INFINITY;
+    let mut cases = Vec::new();
+    for (axial, shear) in [(1e3, 400.0), (100.0, 40.0), (1e4, rigid)] {
+        for (other, ways) in [(1.0, 2), (1000.0, 1)] {
+            let entries = format!(
+                "{}; stiffness.bending_2={other:?}",
+                set_stiffness(axial, shear)
+            );
+            let both = [PI, 2.0 * PI].map(|k| reissner(k, axial, shear)).to_vec();
+            cases.push((entries.clone(), axial, both, ways));
+            if shear == rigid {
+                // Beside a clamp the ends' shear forces matter, too, if it shears.
+                let both = TAN.map(|k| reissner(k, axial, shear)).to_vec();
+                cases.push((format!("{entries}; tip.held=clamped"), axial, both, ways));
+            }
+        }
+    }
+    for (entries, axial, loads, ways) in cases {
+        let places: Vec<f64> = loads.iter().map(|load| 1.0 - load / axial).collect();
+        let last = 1.0 - 1.15 * loads[1] / axial;
+        let vary = format!("tip.position[0]={}..{last}", 1.0 - 0.1 / axial);
+        let found = follow(COLUMN, &entries, &vary, false);
+        let wanted: Vec<_> = places.iter().map(|place| (*place, ways)).collect();
+        changes_at(&entries, &found, &wanted, 1e-8 * (1.0 - places[0]));
+        let mut index = 0;
+        for load in loads {
+            for (part, change) in [(0.999, 0), (1.001, ways)] {
+                index += change;
+                let place = 1.0 - part * load / axial;
+                let at = format!("{entries}; tip.position=[{place}, 0, 0]");
+                let leaf = settle_on(base(COLUMN, &at).scenario(), 512, true);
+                let found = leaf.stability.negative_eigenvalues;
+                assert_eq!(found, Some(index as usize), "{at}");
+                assert_eq!(
+                    leaf.stability.neutral_directions,
+                    usize::from(!entries.contains("clamped"))
+                );
+            }
+        }
+    }
+}
+
+/// A slender beam between two hinges, or a hinge and a clamp, has the frequencies of Euler and
+/// Bernoulli, each twice; between two hinges it spins.
+#[test]
+fn slender_beams_vibrate_as_euler_and_bernoulli_say() {
+    let hinges = [1.0, 2.0, 3.0].map(|k| k * PI);
+    for (held, roots, spins) in [("pinned", hinges, 1), ("clamped", HINGED_CLAMPED, 0)] {
+        let stiff = set_stiffness(1e5, f64::INFINITY);
+        let beam = base(COLUMN, &format!("{stiff}; tip.held={held}"));
+        let options = Options {
+            mode_shapes: true,
+            ..with_modes(6 + spins, Options::default())
+        };
+        let leaf = settled(beam.scenario(), &options);
+        assert_eq!(leaf.stability.neutral_directions, spins);
+        let modes = leaf.stability.modes.as_deref().unwrap();
+        assert_eq!(modes.len(), 6 + spins);
+        assert!(modes[..spins].iter().all(|mode| mode.eigenvalue == 0.0));
+        let known = roots.iter().flat_map(|b| [b * b; 2]);
+        for (mode, known) in modes[spins..].iter().zip(known) {
+            let found = mode.frequency().unwrap();
+            let error = (found / known - 1.0).abs();
+            let estimate = mode.error.unwrap() / (2.0 * known * known);
+            let what = format!("{held}: {found} for {known}, {error:.1e}, estimate {estimate:.1e}");
+            assert!(error < 1e-6 && error <= estimate + 1e-8, "{what}");
+        }
+    }
+}
+
+/// Of leaves at rest on one grid the dense matrix, without a phase condition, has as many eigenvalues
+/// that are negative, and that are zero, as are told.
+#[test]
+fn counts_are_those_of_the_dense_matrix() {
+    let plain = "dynamics.rotary_inertia=0.01";
+    let oval = "stiffness.bending_3=2.0";
+    let lines = COLUMN.lines().filter(|line| !line.contains("tip ="));
+    let free = lines.collect::<Vec<_>>().join("\n");
+    let hanging = "load.gravity=[0, 0, -2.0]";
+    let mut seen = Vec::new();
+    for entries in [
+        "",
+        oval,
+        "tip.position=[0.98, 0, 0]",
+        "tip.position=[0.95, 0, 0]; stiffness.bending_3=2.0",
+        "tip.position=[0.97, 0, 0]; load.gravity=[0, 1, -3]",
+        "tip.position=[0.97, 0, 0]; load.gravity=[0, 1, -3]; stiffness.bending_3=2.0",
+        "tip.held=clamped; tip.position=[0.9, 0, 0]",
+        hanging,
+        &format!("{hanging}; {oval}"),
+        &format!("{hanging}; rest.bend_3=0.4"),
+        &format!("{hanging}; {oval}; rest.bend_3=0.4"),
+    ] {
+        let text = if entries.starts_with(hanging) {
+            &free
+        } else {
+            COLUMN
+        };
+        let column = base(text, &format!("{plain}; {entries}"));
+        let scenario = column.scenario();
+        for options in [iterated(1e-12, 16), keeping(iterated(1e-12, 16))] {
+            let leaf = settled(scenario, &options);
+            let own = Leaf::new(scenario);
+            let grid = discrete(&own, 16);
+            let linear = Linear::new(&grid, &Physics::new(&own), &state_of(scenario, &leaf));
+            let values = SymmetricEigen::new(linear.scaled()).eigenvalues;
+            let count = |of: &dyn Fn(f64) -> bool| values.iter().filter(|it| of(**it)).count();
+            let zero = count(&|value| value.abs() < 1e-5);
+            assert_eq!(zero, leaf.stability.neutral_directions, "{entries}");
+            let negative = count(&|value| value <= -1e-5);
+            assert_eq!(
+                leaf.stability.negative_eigenvalues,
+                Some(negative),
+                "{entries}"
+            );
+            seen.push((negative, zero));
+        }
+    }
+    for neutral in 0..=2 {
+        assert!(seen.iter().any(|(_, zero)| *zero == neutral), "{seen:?}");
+    }
+    assert!(seen.iter().any(|(negative, _)| *negative > 1), "{seen:?}");
+}
+
+/// Three veins with tissue from hinges, one of which moves.
+const VEINS: &str = r#"
+    name = "veins"
+    leaf = { rods = 3, length = 1.0, fan = [0.2, 0.0, -0.2], base = [[0.0, -0.2, 0.0], [0.1, 0.0, 0.15], [0.0, 0.2, 0.0]], base_held = "pinned" }
+    stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 2.0, axial = 100.0, shear_2 = 60.0, shear_3 = 80.0 }
+    tissue = { along = 20.0, across = 10.0, normal = 15.0, fold = 0.4 }
+    load.gravity = [0.0, 0.3, -2.0]
+"#;
+
+/// Every point of a branch along which a hinge moves is the leaf that relaxes there.
+#[test]
+fn a_hinge_that_moves_is_followed() {
+    let found = follow(VEINS, "", "leaf.base[0][1]=-0.2..-0.1", false);
+    assert!(found.complete, "{:?}", found.branches[0].remark);
+    let key = "leaf.base[0][1]".parse().unwrap();
+    let points = &found.branches[0].points;
+    assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));
+    for point in points.iter().step_by(4) {
+        let leaf = base(VEINS, "").at(&[(&key, point.value)]).unwrap();
+        let leaf = settle(&leaf.scenario, 1e-9);
+        let bar = point.error.unwrap() + leaf.accuracy.error_estimate.unwrap();
+        for (ours, theirs) in point.tips.iter().zip(&leaf.tips) {
+            let off = ours.distance(*theirs);
+            assert!(off <= bar, "{}: {off:e}", point.value);
+        }
+    }
+}
+
+/// The boundary of a column over its bending stiffness: P (1 + P/GA - P/EA) = pi^2 EI/L^2.
+#[test]
+fn the_boundary_of_a_column_is_reissners() {
+    let strip = "stiffness.bending_3=3.0";
+    let (place, stiffness) = (
+        "tip.position[0]=0.9999..0.98",
+        "stiffness.bending_2=0.5..1.5",
+    );
+    let found = leafdyn_testing::plane::follow(COLUMN, strip, place, stiffness);
+    assert!(found.complete, "{:?}", found.remark);
+    let curve = only(&found.curves);
+    assert!(curve.points.len() > 5);
+    for point in &curve.points {
+        let [place, bending] = point.values;
+        let wanted = reissner(PI * bending.sqrt(), 1e3, 400.0);
+        let load = 1e3 * (1.0 - place);
+        close("P", load, wanted, 1e-9 * wanted);
+        assert_eq!([point.index_before, point.index_behind], [0, 1]);
+    }
+}
