@@ -84,7 +84,7 @@ function widen() {
 }
 
 function draw(again) {
-  const leaf = shown.mode >= 0 && view.modes.length ? inMode(view.modes[shown.mode], Math.sin(shown.phase)) : current;
+  const leaf = shown.mode >= 0 && view.modes.length ? inMode(view.modes[shown.mode], shown.swing * Math.sin(shown.phase)) : current;
   leaves = [leaf];
   if (!space) return;
   if (!shown.plain) widen();
@@ -128,8 +128,9 @@ function moving(given) {
   draw(false);
 }
 
-/// Lets it vibrate in its first mode, or not.
-function vibrate(on) {
+/// Lets it vibrate in its first mode by so much of the usual displacement, or not.
+function vibrate(on, swing) {
+  shown.swing = swing;
   shown.mode = on && view.modes.length ? 0 : -1;
   plainly(shown.mode >= 0);
   shown.phase = Math.PI / 2;

@@ -14,6 +14,8 @@ const past = [];
 
 /// Milliseconds without a change after which it is asked what comes.
 const IDLE = 250;
+/// The part of the largest lowest eigenvalue below which a leaf is soft.
+const SOFT = 0.02;
 /// Milliseconds between numbers that are told.
 const TOLD = 120;
 /// Milliseconds that a frame may take with a mode.
@@ -95,7 +97,8 @@ function tellLeaf(known) {
   const { view } = known;
   find("title").textContent = document.title = view.title;
   find("found").textContent = view.verdict;
-  const soft = known.eigenvalues.length > 0 && known.eigenvalues[0] < 0.02 * stiffness(known);
+  const soft = known.eigenvalues.length > 0 && known.eigenvalues[0] < SOFT * stiffness(known);
+  if (stage.shown.mode >= 0) stage.vibrate(true, swing());
   find("lamp").className = known.stable === false || !view.success ? "bad" : known.stable ? (soft ? "soft" : "good") : "";
   find("what").textContent = view.rods === 1 ? "1 vein" : `${view.rods} veins`;
   const lines = [...view.summary];
@@ -112,6 +115,12 @@ function stiffness(known) {
   now.stiffest = Math.max(now.stiffest && now.stiffestOf === now.text ? now.stiffest : 0, known.eigenvalues[0]);
   now.stiffestOf = now.text;
   return now.stiffest;
+}
+
+/// How far it swings: the more, the softer it is; as far as can be where its lowest eigenvalue is zero.
+function swing() {
+  const [lowest] = now.known.eigenvalues;
+  return lowest > 0 ? Math.min(1, Math.max(0.15, Math.sqrt((SOFT * now.stiffest) / lowest))) : 1;
 }
 
 function differences(pinned, known) {

@@ -79,7 +79,7 @@ function listen() {
   for (const id of ["vein", "station"]) find(id).addEventListener("input", () => stage.fillProbe());
   find("probe").addEventListener("toggle", () => stage.fillProbe());
   find("turned").addEventListener("change", turnGravity);
-  toggle("vibrate", (on) => stage.vibrate(on));
+  toggle("vibrate", (on) => stage.vibrate(on, swing()));
   toggle("pull", (on) => document.body.classList.toggle("pulling", on));
   toggle("foresee", (on) => {
     if (!on) sliders.forget(null);
