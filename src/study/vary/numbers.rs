@@ -56,7 +56,9 @@ impl Base {
     fn number_of(&self, part: Part) -> Option<Number> {
         let keys = Keys(vec![Target::Entry(part)]);
         let value = self.entries.number_at(part)?;
-        let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance;
+        // Some defaults are those of tables that would stand beside what is given in their place.
+        let allowed = || self.at(&[(&keys, value)]).is_ok();
+        let can_vary = part.is_number().is_ok() && part.key != Key::Tolerance && allowed();
         let is_length = part.key.dimension() == [1, 0, 0];
         can_vary.then(|| Number {
             value,
