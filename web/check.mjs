@@ -165,6 +165,22 @@ async function fast() {
   await page.done("fast");
 }
 
+/// The picture in the documents: the undulating leaf, its torsion lowered until it goes flat.
+async function picture() {
+  const page = await open();
+  await page.choose("paper/fig10.toml");
+  await page.evaluate(() => window.leafdyn.sliders.add("scale:stiffness.torsion") || window.leafdyn.sliders.add("stiffness.torsion"));
+  const key = await page.evaluate(() => window.leafdyn.sliders.shown[0].key);
+  const value = await page.evaluate((key) => window.leafdyn.sliders.value(key), key);
+  for (let k = 0; k <= 12; k++) {
+    await page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, value * (1 - 0.05 * k)]);
+    await page.rest();
+  }
+  await page.waitForFunction(() => document.querySelector(".marks[aria-label]:not([aria-label=''])"), null, { timeout: 30000 }).catch(() => {});
+  await page.waitForTimeout(500);
+  await page.done("picture");
+}
+
 /// On a telephone, in the dark.
 async function narrow() {
   const page = await open("", { viewport: { width: 400, height: 800 }, colorScheme: "dark" });
@@ -179,6 +195,7 @@ try {
   await moves();
   await hostile();
   await narrow();
+  if (keep) await picture();
   await fast();
   console.log("the live page is as it should be");
 } finally {

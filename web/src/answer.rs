@@ -64,6 +64,9 @@ impl Answer {
     }
 }
 
+/// What is said of a leaf in wind.
+const CALM: &str = "blows when the leaf is let go: here it rests without wind";
+
 /// A leaf at rest: as the page of a result shows it, and in numbers.
 #[derive(Serialize)]
 pub struct Known {
@@ -85,8 +88,12 @@ impl Known {
     /// Of a leaf.
     pub fn new(leaf: &Equilibrium, scenario: &Scenario) -> Known {
         let modes = leaf.stability.modes.iter().flatten();
+        let mut view = page::view(leaf, scenario);
+        if scenario.wind.is_some() {
+            view.summary.push(("wind", CALM.into()));
+        }
         Known {
-            view: page::view(leaf, scenario),
+            view,
             tips: leaf.tips.iter().map(|tip| tip.to_array()).collect(),
             energy: leaf.energy,
             error: leaf.accuracy.error_estimate,

@@ -314,7 +314,7 @@ impl Open {
         let answer = match followed {
             Followed::There(leaf) => {
                 self.leaf = *leaf;
-                Answer::Followed(Known::new(&self.leaf, &scenario))
+                Answer::Followed(Known::new(&self.leaf, &bare))
             }
             Followed::Left { part } => Answer::Left {
                 values: told(&between(base, before, &values, part)),
