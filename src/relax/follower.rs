@@ -38,7 +38,7 @@ const SAME: f64 = 0.1;
 /// A leaf at rest, which can follow.
 ///
 /// ```
-/// use leafdyn::relax::{Followed, Follower, Options};
+/// use leafdyn::relax::{Followed, Follower, Options, RelaxError};
 /// use leafdyn::scenario::Scenario;
 ///
 /// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
@@ -48,7 +48,7 @@ const SAME: f64 = 0.1;
 /// let heavier = |part: f64| {
 ///     let mut scenario = scenario.clone();
 ///     scenario.gravity[2] = weight * (1.0 + part);
-///     Ok(scenario)
+///     Ok::<_, RelaxError>(scenario)
 /// };
 /// let Followed::There(heavy) = follower.follow(&heavier)? else {
 ///     panic!("it bends further");
