@@ -226,7 +226,8 @@ impl Follower {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = Effort::new(ignored);
         effort.work = self.at.work;
-        let (at, result) = decide(&problem, self.at.grids(), clock, &mut effort);
+        let found = std::mem::replace(&mut self.at, NestedEquilibrium::begun(&problem));
+        let (at, result) = decide(&problem, found, clock, &mut effort);
         self.at = at;
         result
     }

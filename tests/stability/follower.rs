@@ -131,6 +131,8 @@ fn leaves_of_all_kinds_follow_to_where_they_rest() {
                 bars[0] + bars[1]
             );
             assert!(off <= bars[0] + bars[1], "{name} {key}");
+            let wanted = (TOLERANCE * found.shape.longest()).max(1.5 * bars[1]);
+            assert!(bars[0] <= wanted, "{name} {key}: {:e}", bars[0]);
             assert_eq!(found.stable(), Some(true));
         }
     }

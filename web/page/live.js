@@ -18,8 +18,6 @@ const IDLE = 250;
 const SOFT = 0.02;
 /// Milliseconds between numbers that are told.
 const TOLD = 120;
-/// Milliseconds that a frame may take with a mode.
-const FRAME = 12;
 
 function tell(message) {
   find("message").hidden = !message;
@@ -159,7 +157,8 @@ async function pump() {
   now.busy = true;
   while (now.wanted) {
     now.wanted = false;
-    await follow(front.took < FRAME || !front.took ? 1 : 0);
+    // A mode takes longer than the leaf.
+    await follow(pressed("vibrate") ? 1 : 0);
   }
   now.busy = false;
   later();
