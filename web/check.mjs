@@ -165,18 +165,18 @@ async function fast() {
   await page.done("fast");
 }
 
-/// The picture in the documents: the undulating leaf, its torsion lowered until it goes flat.
+/// The picture in the documents: an undulating leaf, whose veins are made stiffer.
 async function picture() {
-  const page = await open();
-  await page.choose("paper/fig10.toml");
-  await page.evaluate(() => window.leafdyn.sliders.add("scale:stiffness.torsion") || window.leafdyn.sliders.add("stiffness.torsion"));
-  const key = await page.evaluate(() => window.leafdyn.sliders.shown[0].key);
-  const value = await page.evaluate((key) => window.leafdyn.sliders.value(key), key);
-  for (let k = 0; k <= 12; k++) {
-    await page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, value * (1 - 0.05 * k)]);
+  const page = await open("", { viewport: { width: 1280, height: 860 } });
+  await page.choose("study/undulation.toml");
+  await page.check("#surface");
+  const key = "scale:stiffness.bending_2";
+  await page.evaluate((key) => window.leafdyn.sliders.add(key), key);
+  for (let k = 0; k <= 10; k++) {
+    await page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, 1.1 ** k]);
     await page.rest();
   }
-  await page.waitForFunction(() => document.querySelector(".marks[aria-label]:not([aria-label=''])"), null, { timeout: 30000 }).catch(() => {});
+  await page.waitForFunction(() => document.querySelector(".marks[aria-label]:not([aria-label=''])"), null, { timeout: 60000 });
   await page.waitForTimeout(500);
   await page.done("picture");
 }
