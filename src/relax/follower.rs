@@ -288,6 +288,7 @@ impl Follower {
         let (own, other) = (&*self.scenario, leaf.scenario());
         let held = |of: &Scenario| of.held_tip.as_ref().map(|tip| tip.clamps.is_some());
         let grips = own.grips.iter().zip(&other.grips);
+        let points = own.points.iter().zip(&other.points);
         own.rods.len() == other.rods.len()
             && own.joined == other.joined
             && own.base_held == other.base_held
@@ -295,7 +296,9 @@ impl Follower {
             && own.wind.is_none()
             && other.wind.is_none()
             && held(own) == held(other)
+            && own.points.len() == other.points.len()
             && own.grips.len() == other.grips.len()
+            && { points }.all(|(a, b)| (a.vein, a.at) == (b.vein, b.at))
             && { grips }.all(|(a, b)| (a.vein, a.at, a.held) == (b.vein, b.at, b.held))
             && self.at.levels[0].leaf.leaf.kinks() == leaf.kinks()
     }
