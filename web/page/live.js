@@ -263,6 +263,7 @@ async function wonder() {
     tellLeaf(exact);
   }
   const { text, name } = now;
+  back = back.free();
   const opened = await back.ask({ ask: "open", text, name, values });
   if (opened.answer !== "opened" || !same()) return;
   if (find("unloaded").checked) {
@@ -287,9 +288,11 @@ async function others() {
   if (!on) return;
   find("now").textContent = "looking for other equilibria";
   const values = [...sliders.values];
+  back = back.free();
   await back.ask({ ask: "open", text: now.text, name: now.name, values });
   const found = await back.ask({ ask: "equilibria" });
   find("now").textContent = "";
+  if (found.answer === "gone") return press("others", false);
   if (found.answer !== "equilibria") return tell(found.error);
   const apart = ({ tips }) => Math.hypot(...tips[0].map((x, k) => x - now.known.tips[0][k]));
   const rest = found.list.filter((known) => apart(known) > 1e-3 * now.known.view.longest).slice(0, 12);

@@ -3,6 +3,7 @@
 /// A solver in a thread; `ask` gives a promise of the answer.
 class Solver {
   constructor(source, code) {
+    Object.assign(this, { source, code });
     this.waiting = new Map();
     this.count = 0;
     this.worker = new Worker(source);
@@ -21,6 +22,14 @@ class Solver {
       this.waiting.set(id, settle);
       this.worker.postMessage({ id, ...message });
     });
+  }
+
+  /// One that is free: another, where this is still at something that nobody waits for any more.
+  free() {
+    if (this.waiting.size === 0) return this;
+    this.worker.terminate();
+    for (const settle of this.waiting.values()) settle({ answer: "gone" });
+    return new Solver(this.source, this.code);
   }
 
   ask(question) {

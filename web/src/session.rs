@@ -17,6 +17,12 @@ use std::time::Duration;
 /// What a leaf on a screen needs.
 const TOLERANCE: f64 = 1e-4;
 
+/// Seconds after which a leaf that does not come to rest is given up.
+const PATIENCE: u64 = 8;
+
+/// How far a point is pulled at most, in lengths.
+const FARTHEST: f64 = 2.0;
+
 /// Points of a branch that are drawn, and seconds for all that is asked in the background.
 const MOST_POINTS: usize = 400;
 const SECONDS: u64 = 20;
@@ -103,7 +109,8 @@ impl Pull {
     fn on(self, mut scenario: Scenario) -> Scenario {
         let (scale, rods) = (scenario.scale(), scenario.rods.len());
         let stiffness = SPRING * rods as f64 * scale.force() / scale.length;
-        let force = self.displacement.map(|x| stiffness * x);
+        let farthest = FARTHEST * scale.length;
+        let force = (self.displacement).map(|x| stiffness * x.clamp(-farthest, farthest));
         let vein = self.vein.clamp(1, rods) - 1;
         let tip = self.at >= 1.0 && scenario.joined && rods > 1;
         if force.iter().any(|x| !x.is_finite()) || !(self.at > 0.0 && self.at <= 1.0) {
@@ -250,10 +257,16 @@ fn calm(scenario: Scenario) -> Scenario {
     }
 }
 
+/// So many seconds from now.
+fn within(seconds: u64) -> Limit {
+    Limit::at(leafdyn::clock::Instant::now() + Duration::from_secs(seconds))
+}
+
 /// How leaves are relaxed.
 fn options(scenario: &Scenario, modes: usize) -> Options {
     Options {
         tolerance: Some(TOLERANCE.max(scenario.tolerance)),
+        limit: within(PATIENCE),
         modes,
         mode_shapes: modes > 0,
         ..Options::default()
@@ -327,6 +340,9 @@ impl Open {
     /// The leaf at rest from where it is, or from where a motion has brought it.
     fn settle(&mut self, motion: Option<Motion>) -> Result<Answer, Refusal> {
         let scenario = &calm(self.scenario.clone());
+        if let Some(follower) = &mut self.follower {
+            follower.options(&options(scenario, 0));
+        }
         match (&mut self.follower, motion) {
             (Some(follower), Some(mut motion)) => {
                 self.leaf = motion.land(follower, scenario)?;
@@ -371,7 +387,7 @@ impl Open {
 
     fn equilibria(&self) -> Result<Answer, Refusal> {
         let how = SemiImplicit::default();
-        let limit = Limit::at(leafdyn::clock::Instant::now() + Duration::from_secs(SECONDS));
+        let limit = within(SECONDS);
         let found = equilibria(
             &calm(self.scenario.clone()),
             how,
