@@ -19,8 +19,11 @@ from ._view import Viewed
 def _points(columns: dict[str, NDArray[Any]], lines: list[Array], units: Mapping[str, str]) -> Any:
     """Columns and centerlines of points as a data set."""
     variables = column_variables(columns, ("point",))
-    if lines and len({line.shape for line in lines}) == 1:
-        variables["curves"] = (("point", "rod", "node", "component"), np.stack(lines), (1, 0, 0))
+    least = min((line.shape[1] - 1 for line in lines), default=0)
+    # Finer grids, as of critical points, have the nodes of coarser ones.
+    if least > 0 and all((line.shape[1] - 1) % least == 0 for line in lines):
+        thinned = [line[:, :: (line.shape[1] - 1) // least] for line in lines]
+        variables["curves"] = (("point", "rod", "node", "component"), np.stack(thinned), (1, 0, 0))
     return dataset(variables, {}, units, {})
 
 
@@ -100,7 +103,7 @@ class Branch:
         return table(self.columns, self._units, {})
 
     def to_xarray(self) -> Any:
-        """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `curves` as ``curves``."""
+        """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `curves` at the nodes that all have."""
         return _points(self.columns, self.curves, self._units)
 
     def __repr__(self) -> str:
@@ -246,7 +249,7 @@ class Curve:
         return table(self.columns, self._units, {})
 
     def to_xarray(self) -> Any:
-        """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `lines` as ``curves``."""
+        """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `lines` as ``curves``, at the nodes that all have."""
         return _points(self.columns, self.lines, self._units)
 
     def __repr__(self) -> str:

@@ -240,8 +240,7 @@ def _chart(said: Said, files: Kept) -> Chart:
     _table(files, "chart.csv")
     rods = {name: text for name, text in files.files.items() if name.startswith("chart_rods")}
     kept = {name: text for name, text in files.files.items() if name not in rods}
-    scaling = Kept({"chart.json": kept["chart.json"], **rods}) if rods else None
-    return Chart(Kept(kept), scaling, said["reference"]["confirmed"], said["remarks"])
+    return Chart(Kept(kept), Kept(rods) if rods else None, said["reference"]["confirmed"], said["remarks"])
 
 
 def _motion(said: Said, files: Kept) -> Motion:

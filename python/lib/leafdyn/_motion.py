@@ -53,6 +53,7 @@ class Motion(Viewed):
     ``energy.csv`` and what shows it as a film: `save` writes ``json``, ``svg`` and ``png`` only.
     """
 
+    name = Attribute[str]("The name of the scenario.")
     outcome = Attribute[str]("""``"completed"``, or why it ended early.""")
     remark = Attribute[str | None]("The same in a sentence.")
     doubts = Attribute[list[str]](

@@ -112,14 +112,18 @@ class Result:
     @property
     def _units(self) -> dict[str, str]:
         """The names of the units of its scenario."""
-        units: dict[str, str] = self.to_dict().get("input", {}).get("units", {})
+        units: dict[str, str] = self._said.get("input", {}).get("units", {})
         return units
 
     @property
     def _attrs(self) -> dict[str, Any]:
         """What tables and data sets say of all of it."""
-        said = self.to_dict()
-        return {name: said[name] for name in ("scenario", "version") if name in said}
+        return {name: word for name, word in self._said.items() if name in ("scenario", "version")}
+
+    @property
+    def _said(self) -> dict[str, Any]:
+        """Its JSON, if it has one of its own."""
+        return self.to_dict() if self._files.names()[0].endswith(".json") else {}
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_files": keep(self._files)}

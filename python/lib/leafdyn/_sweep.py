@@ -103,9 +103,9 @@ def sweep(
     >>> grid = {"leaf.rods": [3, 5], "load.gravity[2]": (-1, -2, 2)}
     >>> leafdyn.sweep("scenarios/paper/fig04.toml", grid, ["tip_z", "stable"]).round(4)
        leaf.rods  load.gravity[2]   tip_z  stable
-    0          3             -1.0 -0.1446    True
-    1          3             -2.0 -0.2766    True
-    2          5             -1.0  -0.146    True
+    0          3             -1.0 -0.1436    True
+    1          3             -2.0 -0.2751    True
+    2          5             -1.0 -0.1460    True
     3          5             -2.0 -0.2791    True
     """
     package = pandas()
