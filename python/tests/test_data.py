@@ -19,7 +19,7 @@ def test_a_leaf_is_a_table_of_its_rods_and_stations(tmp_path: Path) -> None:
     table = leaf.to_pandas()
     leaf.save(tmp_path, "csv")
     written = np.genfromtxt(tmp_path / "centerlines.csv", delimiter=",", names=True)
-    assert tuple(table.columns) == written.dtype.names[2:]
+    assert list(table.columns) == list(written.dtype.names or ())[2:]
     assert table.reset_index().to_numpy().tolist() == [list(row) for row in written]
     assert table.index.names == ["rod", "station"]
     assert (table.loc[2, ["n1", "n2", "n3"]].to_numpy() == leaf.forces[1]).all()
@@ -31,6 +31,7 @@ def test_a_leaf_is_a_table_of_its_rods_and_stations(tmp_path: Path) -> None:
 def test_stresses_have_columns_where_there_are_any() -> None:
     pytest.importorskip("pandas")
     blade = leafdyn.relax(leafdyn.new("blade"))
+    assert blade.stresses is not None
     assert (blade.to_pandas()["equivalent_stress"].to_numpy() == blade.stresses[..., 2].ravel()).all()
     assert "equivalent_stress" not in leafdyn.relax(fan(3)).to_pandas()
 
@@ -46,7 +47,7 @@ def test_a_leaf_is_a_data_set() -> None:
     assert found.mode_rotations.dims == ("mode", "rod", "curve_station", "component")
     assert found.sel(rod=2, station=0.5).forces.attrs["units"] == "N"
     assert float(found.energy) == leaf.energy and found.energy.attrs["units"] == "N cm"
-    assert np.array_equal(found.frequencies, leaf.frequencies)
+    assert leaf.frequencies is not None and np.array_equal(found.frequencies, leaf.frequencies)
     assert found.attrs == {"scenario": "fan", "method": "semi-implicit", "outcome": "converged"}
     fixed = leafdyn.relax(fan(3), segments=8).to_xarray()
     assert "error_estimate" not in fixed and "eigenvalues" not in fixed
@@ -71,7 +72,7 @@ def test_a_motion(tmp_path: Path) -> None:
 
 def test_a_trace_and_its_branches() -> None:
     pytest.importorskip("xarray")
-    found = leafdyn.trace(column(), {"load.tip_force[0]": (-1, -6)}, switch=True)
+    found = leafdyn.trace(column(), {"load.tip_force[0]": (-1, -6)}, switch=True, set=UNITS)
     whole, first = found.to_xarray(), found.branches[0]
     assert len(found.branches) > 1
     assert whole.tip.dims == ("point", "component")
@@ -85,6 +86,9 @@ def test_a_trace_and_its_branches() -> None:
     assert np.array_equal(one.curves[fold], first.curves[fold][:, ::2])
     assert (first.to_pandas()["value"] == first.values).all()
     assert len(found.to_pandas()) == len(whole.point)
+    for units in (found.to_pandas().attrs["units"], first.to_pandas().attrs["units"]):
+        assert (units["value"], units["tip_x"], units["energy"]) == ("N", "cm", "N cm")
+    assert whole.value.attrs["units"] == one.value.attrs["units"] == "N"
 
 
 def test_a_boundary_and_a_map() -> None:
@@ -121,7 +125,9 @@ def test_a_fit() -> None:
     pytest.importorskip("xarray")
     pull = {"load.tip_force[0]": [4, 12, 20], "tip_x": [0.9707, 1.0090, 1.0399], "sd_tip_x": 0.0005}
     with pytest.warns(leafdyn.LeafWarning):
-        found = leafdyn.fit("scenarios/measured/pull.toml", pull, {"stiffness.axial": (1, 1e4), "stiffness.torsion": None})
+        found = leafdyn.fit(
+            "scenarios/measured/pull.toml", pull, {"stiffness.axial": (1, 1e4), "stiffness.torsion": None}
+        )
     assert not found.parameters["stiffness.torsion"].determined
     # An interval that has no end.
     ends = found.parameters["stiffness.torsion"]

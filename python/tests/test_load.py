@@ -44,7 +44,10 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
     kept = pickle.loads(pickle.dumps(again))
     assert np.array_equal(kept.forces, leaf.forces)
     assert {path.name for path in again.save(tmp_path / "copy")} == {
-        "summary.json", "centerlines.csv", "figure.svg", "figure.png"
+        "summary.json",
+        "centerlines.csv",
+        "figure.svg",
+        "figure.png",
     }
     with pytest.raises(AttributeError, match="solve it again"):
         again.mode_displacements
@@ -82,9 +85,7 @@ def test_every_other_result(tmp_path: Path) -> None:
         "chart": leafdyn.chart(
             fan(2), set={"leaf.fan": "symmetric"}, seconds=0.1, methods=["semi-implicit"], rods=[2, 3]
         ),
-        "fit": leafdyn.fit(
-            "scenarios/measured/pull.toml", pull, "stiffness.axial", set={"stiffness.bending_2": 50.0}
-        ),
+        "fit": leafdyn.fit("scenarios/measured/pull.toml", pull, "stiffness.axial", set={"stiffness.bending_2": 50.0}),
         "motion": leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2}),
     }
     for name, result in results.items():

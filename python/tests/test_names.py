@@ -13,6 +13,7 @@ from leaves import column, fan, program
 import leafdyn
 
 ROOT = Path(__file__).parents[2]
+PLAIN: Any = getattr(pydoc, "plaintext")
 
 
 def test_a_star_replaces_no_builtin() -> None:
@@ -22,7 +23,7 @@ def test_a_star_replaces_no_builtin() -> None:
     assert not replaced
     assert names["stability_map"] is leafdyn.map is leafdyn.stability_map
     assert leafdyn.all_shapes is leafdyn.equilibria
-    assert "chart" not in names and callable(leafdyn.chart)
+    assert "map" not in names
 
 
 def test_ranges_are_those_of_the_text() -> None:
@@ -44,10 +45,8 @@ def test_ranges_are_those_of_the_text() -> None:
         assert vary[0] == vary[1], span
     uneven = leafdyn.map(fan(2), {"load.gravity[2]": [-1, -1.5, -4]}, methods="semi-implicit")
     assert uneven.columns["load.gravity[2]"].tolist() == [-1.0, -1.5, -4.0]
-    assert leafdyn.map(fan(2), {"leaf.rods": np.array([2, 3])}, methods="semi-implicit").columns["leaf.rods"].tolist() == [
-        2,
-        3,
-    ]
+    rods = leafdyn.map(fan(2), {"leaf.rods": np.array([2, 3])}, methods="semi-implicit")
+    assert rods.columns["leaf.rods"].tolist() == [2, 3]
 
 
 def test_traces_and_boundaries_of_ranges() -> None:
@@ -109,7 +108,7 @@ def test_the_keys_are_those_of_the_format() -> None:
     rows = re.findall(r'/// (.*)\n\s+\w+ "([\w.]+)": [^;]*?, \[(-?\d+), (-?\d+), (-?\d+)\], (\w+)', source)
     keys = {key.path: key for key in leafdyn.keys()}
     assert {path for _, path, *_ in rows} == set(keys)
-    from leafdyn._format import DIMENSIONS
+    from leafdyn._dimensions import DIMENSIONS
 
     assert set(DIMENSIONS) <= set(keys)
     for description, path, *exponents, left_out in rows:
@@ -171,12 +170,12 @@ def test_help_describes_every_attribute() -> None:
         leafdyn.keys()[0],
     ]
     for result in results:
-        shown = pydoc.render_doc(type(result), renderer=pydoc.plaintext)
+        shown = pydoc.render_doc(type(result), renderer=PLAIN)
         attributes = [name for name in dir(result) if not name.startswith("_") and name not in ("count", "index")]
         for name in attributes:
             described = re.search(rf"^[ |]+{name}(\(.*)?\n[ |]+\S", shown, re.MULTILINE)
             assert described, f"{type(result).__name__}.{name}"
-    assert "shape (N, K + 1, 3)" in pydoc.render_doc(leafdyn.Equilibrium, renderer=pydoc.plaintext)
+    assert "shape (N, K + 1, 3)" in pydoc.render_doc(leafdyn.Equilibrium, renderer=PLAIN)
 
 
 def test_a_value_that_is_made_once_cannot_be_set() -> None:

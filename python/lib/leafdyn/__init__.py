@@ -31,7 +31,7 @@ from ._sweep import sweep
 from ._verbs import chart, check, equilibria, stability_map
 from ._view import Page
 
-# Names of the verbs that are attributes only, so that `import *` replaces no builtin.
+# An attribute only: `from leafdyn import *` replaces no builtin.
 map = stability_map
 
 # The name under which scripts may know it.
@@ -65,6 +65,7 @@ __all__ = [
     "Trace",
     "__version__",
     "boundary",
+    "chart",
     "check",
     "equilibria",
     "example",

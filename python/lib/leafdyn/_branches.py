@@ -16,9 +16,11 @@ from ._result import Contents, Table, read_only
 from ._view import Viewed
 
 
-def _points(columns: dict[str, NDArray[Any]], lines: list[Array], units: Mapping[str, str]) -> Any:
+def _points(
+    columns: dict[str, NDArray[Any]], lines: list[Array], units: Mapping[str, str], value: str = "value"
+) -> Any:
     """Columns and centerlines of points as a data set."""
-    variables = column_variables(columns, ("point",))
+    variables = column_variables(columns, ("point",), value)
     least = min((line.shape[1] - 1 for line in lines), default=0)
     # Finer grids, as of critical points, have the nodes of coarser ones.
     if least > 0 and all((line.shape[1] - 1) % least == 0 for line in lines):
@@ -41,12 +43,15 @@ class Branch:
         Centerlines at each point, shape (N, M + 1, 3).
     remark
         Why it is not known as far as was asked.
+    key
+        The number that varies.
     """
 
     end: str
     columns: dict[str, NDArray[Any]]
     curves: list[Array]
     remark: str | None = None
+    key: str = "value"
     _units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
@@ -100,11 +105,11 @@ class Branch:
 
     def to_pandas(self) -> Any:
         """Its `columns` as a ``pandas.DataFrame``."""
-        return table(self.columns, self._units, {})
+        return table(self.columns, self._units, {}, value=self.key)
 
     def to_xarray(self) -> Any:
         """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `curves` at the nodes that all have."""
-        return _points(self.columns, self.curves, self._units)
+        return _points(self.columns, self.curves, self._units, self.key)
 
     def __repr__(self) -> str:
         return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
@@ -137,10 +142,14 @@ class Trace(Table, Viewed):
         for number, (branch, lines) in enumerate(zip(said["branches"], curves), start=1):
             here = table["branch"] == number
             rows = read_only({name: column[here] for name, column in table.items()})
-            self.branches.append(Branch(branch["end"], rows, lines, branch.get("remark"), units))
+            self.branches.append(Branch(branch["end"], rows, lines, branch.get("remark"), self.vary, units))
         if remark is None:
             remarks = (f"branch {k}: {branch.remark}" for k, branch in enumerate(self.branches, 1) if branch.remark)
             self.remark = next(remarks, None)
+
+    @property
+    def _value(self) -> str:
+        return self.vary
 
     def plot(self, ax: Any = None, *, show: str | None = None, **style: Any) -> Any:
         """Draw it with matplotlib: solid where the leaf is stable, dashed where not, dots where branches fold or cross.

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._dimensions import Dimension, dimension_of_key
+
 Units = Mapping[str, str]
 """Names of the units of length and force, as far as a scenario gives them."""
-
-Dimension = tuple[int, int, int]
-"""Exponents of length, force and time."""
 
 LABELS = {
     "component": ("x", "y", "z"),
@@ -98,10 +98,13 @@ def xarray() -> Any:
     return xarray
 
 
-def table(columns: Mapping[str, Any], units: Units, attrs: Mapping[str, Any], index: Any = None) -> Any:
-    """A ``pandas.DataFrame``; ``attrs["units"]`` has the units that have names, by the columns."""
+def table(
+    columns: Mapping[str, Any], units: Units, attrs: Mapping[str, Any], index: Any = None, value: str = "value"
+) -> Any:
+    """A ``pandas.DataFrame``; ``attrs["units"]`` has the units that have names, by the columns. The column ``value`` is
+    of the key of this name."""
     found = pandas().DataFrame(columns, index=index)
-    named = {str(column): column_unit(units, str(column)) for column in found.columns}
+    named = {str(column): column_unit(units, value if column == "value" else str(column)) for column in found.columns}
     found.attrs = {**attrs, "units": {column: name for column, name in named.items() if name is not None}}
     return found
 
@@ -152,15 +155,18 @@ def node_variables(arrays: Mapping[str, Any], axes: Sequence[str]) -> dict[str, 
     }
 
 
-def column_variables(columns: Mapping[str, NDArray[Any]], axes: Sequence[str]) -> dict[str, Variable]:
-    """Columns with the same axes; those of ``tip_x``, ``tip_y`` and ``tip_z`` as one, and so on."""
+def column_variables(
+    columns: Mapping[str, NDArray[Any]], axes: Sequence[str], value: str = "value"
+) -> dict[str, Variable]:
+    """Columns with the same axes; those of ``tip_x``, ``tip_y`` and ``tip_z`` as one, and so on. The column ``value`` is
+    of the key of this name."""
     found: dict[str, Variable] = {}
     for name, column in columns.items():
         stem, _, axis = name.rpartition("_")
         parts = [f"{stem}_{axis}" for axis in LABELS["component"]]
         whole = bool(stem) and all(part in columns for part in parts)
         if not whole or name not in parts:
-            found[name] = (axes, column, dimension_of(name))
+            found[name] = (axes, column, dimension_of(value if name == "value" else name))
         elif axis == "x":
             vectors = np.stack([columns[part] for part in parts], axis=-1)
             found[stem] = ((*axes, "component"), vectors, dimension_of(name))
@@ -168,5 +174,7 @@ def column_variables(columns: Mapping[str, NDArray[Any]], axes: Sequence[str]) -
 
 
 def dimension_of(column: str) -> Dimension | None:
-    """That of a column, if it is known by its name."""
-    return (0, 1, 0) if column.startswith("grip_") else _COLUMNS.get(column)
+    """That of a column, if it is known by its name, also as a key."""
+    if re.match(r"grip_\d", column):
+        return (0, 1, 0)
+    return _COLUMNS.get(column) or dimension_of_key(column)

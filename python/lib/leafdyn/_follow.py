@@ -175,7 +175,10 @@ def boundary(
     >>> column = {
     ...     "name": "column",
     ...     "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
-    ...     "stiffness": {"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0, "axial": "inf", "shear_2": "inf", "shear_3": "inf"},
+    ...     "stiffness": {
+    ...         **{"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0},
+    ...         **{"axial": "inf", "shear_2": "inf", "shear_3": "inf"},
+    ...     },
     ... }
     >>> found = leafdyn.boundary(column, {"load.tip_force[0]": (-1, -6), "stiffness.bending_2": (0.5, 2, 3)})
     >>> force, bending = found.curves[0].values.T

@@ -77,7 +77,7 @@ class Equilibrium(Viewed):
 
     @property
     def tip(self) -> Array | None:
-        """The joint tip, or the only rod's: shape (3,); none if there are several."""
+        """The joint tip, or the only rod's: shape (3,), lengths; none if there are several."""
         return self.tips[0] if len(self.tips) == 1 else None
 
     @computed
@@ -87,12 +87,12 @@ class Equilibrium(Viewed):
 
     @computed
     def tips(self) -> Array:
-        """The joint tip alone, shape (1, 3), or every tip, shape (N, 3)."""
+        """The joint tip alone, shape (1, 3), or every tip, shape (N, 3); lengths."""
         return self._core.tips()
 
     @computed
     def tip_force_sum(self) -> Array:
-        """The sum of the forces that the rods pass to their tips, shape (3,)."""
+        """The sum of the forces that the rods pass to their tips, shape (3,), in units of force."""
         return self._core.tip_force_sum()
 
     @computed
@@ -116,17 +116,17 @@ class Equilibrium(Viewed):
 
     @computed
     def stations(self) -> Array:
-        """Fractions of the length, base to tip, shape (K + 1,)."""
+        """Fractions of the length, base to tip, shape (K + 1,), from 0 to 1."""
         return self._core.stations()
 
     @computed
     def lengths(self) -> Array:
-        """The lengths of the rods, shape (N,)."""
+        """The lengths of the rods, shape (N,), in units of length."""
         return self._core.lengths()
 
     @computed
     def positions(self) -> Array:
-        """Centerlines, shape (N, K + 1, 3): the best values known, within `error_estimate`."""
+        """Centerlines, shape (N, K + 1, 3), lengths: the best values known, within `error_estimate`."""
         return self._core.nodes("positions")
 
     @computed
@@ -146,12 +146,12 @@ class Equilibrium(Viewed):
 
     @computed
     def forces(self) -> Array:
-        """Axial force and shear forces n along the directors, shape (N, K + 1, 3)."""
+        """Axial force and shear forces n along the directors, shape (N, K + 1, 3), in units of force."""
         return self._core.nodes("forces")
 
     @computed
     def moments(self) -> Array:
-        """Twisting and bending moments m along the directors, shape (N, K + 1, 3)."""
+        """Twisting and bending moments m along the directors, shape (N, K + 1, 3), force times length."""
         return self._core.nodes("moments")
 
     @computed
@@ -179,17 +179,17 @@ class Equilibrium(Viewed):
 
     @property
     def eigenvalues(self) -> Array | None:
-        """The lowest eigenvalues omega^2 over the masses, ascending, shape (modes,); none if they are not known."""
+        """The lowest eigenvalues omega^2 over the masses, ascending, shape (modes,), per time squared; none if not known."""
         return None if self._modes is None else self._modes[0]
 
     @property
     def eigenvalue_errors(self) -> Array | None:
-        """Bounds on their errors, not a number on a single grid."""
+        """Bounds on their errors, shape (modes,), not a number on a single grid."""
         return None if self._modes is None else self._modes[1]
 
     @property
     def frequencies(self) -> Array | None:
-        """Angular frequencies omega, radians per time (over 2 pi: cycles per time); not a number of unstable modes."""
+        """Angular frequencies omega, shape (modes,), radians per time (over 2 pi: cycles); not a number of unstable modes."""
         if self.eigenvalues is None:
             return None
         with np.errstate(invalid="ignore"):

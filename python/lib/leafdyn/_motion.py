@@ -59,14 +59,18 @@ class Motion(Viewed):
     doubts = Attribute[list[str]](
         """What makes it doubtful from its beginning, such as a start at an unstable equilibrium."""
     )
-    method = Attribute[str]("The method.")
+    method = Attribute[str]("""``"explicit"`` or ``"semi-implicit"``.""")
     stations = Attribute[Array]("Fractions of the length at which the nodes are, shape (M + 1,).")
     times = Attribute[Array]("Times of the outputs, shape (T,).")
-    positions = Attribute[Array]("Positions, shape (T, N, M + 1, 3).")
+    positions = Attribute[Array]("Positions, shape (T, N, M + 1, 3), in units of length.")
     rotations = Attribute[Array]("The directors as unit quaternions w, x, y, z, shape (T, N, M + 1, 4).")
-    velocities = Attribute[Array]("Velocities along the lab axes, shape (T, N, M + 1, 3).")
-    angular_velocities = Attribute[Array]("Angular velocities along the lab axes, shape (T, N, M + 1, 3).")
-    energies = Attribute[dict[str, Array]]("Energies by their names, shape (T,) each: as in ``energy.csv``.")
+    velocities = Attribute[Array]("Velocities along the lab axes, shape (T, N, M + 1, 3), length per time.")
+    angular_velocities = Attribute[Array](
+        "Angular velocities along the lab axes, shape (T, N, M + 1, 3), radians per time."
+    )
+    energies = Attribute[dict[str, Array]](
+        "Energies by their names, shape (T,) each, force times length: as in ``energy.csv``."
+    )
 
     def __init__(self, core: _leafdyn.Motion, name: str, joined: bool) -> None:
         self._files = core.files()

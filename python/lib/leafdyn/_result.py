@@ -158,14 +158,19 @@ class Table(Result):
 
     _row = "row"
 
+    @property
+    def _value(self) -> str:
+        """The key of which its column ``value`` is."""
+        return "value"
+
     def to_pandas(self) -> Any:
         """Its table as a ``pandas.DataFrame``; ``attrs["units"]`` has the units that the scenario names, by columns."""
-        return table(self.columns, self._units, self._attrs)
+        return table(self.columns, self._units, self._attrs, value=self._value)
 
     def to_xarray(self) -> Any:
         """Its table as an ``xarray.Dataset``, with vectors along ``component``; with the units that the scenario
         names in the attributes of the variables."""
-        return dataset(column_variables(self.columns, (self._row,)), {}, self._units, self._attrs)
+        return dataset(column_variables(self.columns, (self._row,), self._value), {}, self._units, self._attrs)
 
 
 def chosen(write: str | Iterable[str] | None, known: Iterable[str], must: str = "must be of") -> set[str]:

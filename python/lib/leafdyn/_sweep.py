@@ -128,7 +128,9 @@ def sweep(
         {key: _varied([point[at] for point in grid]) for at, key in enumerate(axes)}
         | {name: _column(package, name, [row[at] for _, row in rows]) for at, name in enumerate(wanted)}
     )
-    units = {name: column_unit(base.units, name) for name in wanted}
+    # That of a table of a map is relative.
+    like = {"error_estimate": "tip_x"}
+    units = {name: column_unit(base.units, like.get(name, name)) for name in (*axes, *wanted)}
     found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
     return found
 
