@@ -117,13 +117,15 @@ def trace(
     given = ranges(vary)
     if not isinstance(vary, str) and len(given) != 2 and not (isinstance(vary, Mapping) and len(given) == 1):
         raise ValueError(f"vary has {len(given)} numbers: give one as a text, or a list of two")
+    found: Trace | Boundary
     if len(given) == 2:
-        return _boundary(
+        found = _boundary(
             scenario, given[0], given[1], set, switch, keep_unstable, segments, tolerance, points, progress
         )
-    leaf, asked = _followed(scenario, set, switch, keep_unstable, segments, tolerance, points)
-    with reporter(progress) as heard:
-        found = Trace(*_leafdyn.trace(leaf._core, given[0], asked, heard))
+    else:
+        leaf, asked = _followed(scenario, set, switch, keep_unstable, segments, tolerance, points)
+        with reporter(progress) as heard:
+            found = Trace(*_leafdyn.trace(leaf._core, given[0], asked, heard))
     warn(found.name, found.remark)
     return found
 
@@ -188,7 +190,9 @@ def boundary(
     both = ranges(vary)
     if isinstance(vary, str) or len(both) != 2:
         raise ValueError(f"vary has {len(both)} number{'s' * (len(both) != 1)}: give two, in a dict or a list")
-    return _boundary(scenario, both[0], both[1], set, switch, keep_unstable, segments, tolerance, points, progress)
+    found = _boundary(scenario, both[0], both[1], set, switch, keep_unstable, segments, tolerance, points, progress)
+    warn(found.name, found.remark)
+    return found
 
 
 def _boundary(
@@ -205,9 +209,7 @@ def _boundary(
 ) -> Boundary:
     leaf, asked = _followed(scenario, set, switch, keep_unstable, segments, tolerance, points)
     with reporter(progress) as heard:
-        found = Boundary(*_leafdyn.boundary(leaf._core, along, across, asked, heard))
-    warn(found.name, found.remark)
-    return found
+        return Boundary(*_leafdyn.boundary(leaf._core, along, across, asked, heard))
 
 
 def _followed(
