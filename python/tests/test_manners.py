@@ -1,5 +1,6 @@
 """How computations behave towards the interpreter that waits for them."""
 
+import gc
 import importlib.metadata
 import multiprocessing
 import os
@@ -51,6 +52,8 @@ LONG: dict[str, Callable[[], Any]] = {
 
 @pytest.fixture(autouse=True)
 def ctrl_c() -> Iterator[None]:
+    # What earlier tests left behind is collected first: Python loses an interrupt in a callback of its collector.
+    gc.collect()
     # A shell's job in the background ignores it from birth.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
