@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeAlias, Union
 
 import numpy as np
 
@@ -185,6 +185,9 @@ class Fit(Table):
         return f"<Fit {self.name}: {', '.join(words)}>"
 
 
+Bounds: TypeAlias = Union[Sequence[float], Array, None]
+"""Of a free number: the lower and the upper one, or none."""
+
 TOLD = 4
 """Numbers that a fit shows."""
 
@@ -192,7 +195,7 @@ TOLD = 4
 def fit(
     scenario: Source,
     data: Measured | Iterable[Measured],
-    free: str | Iterable[str] | Mapping[str, tuple[float, float] | None],
+    free: str | Iterable[str] | Mapping[str, Bounds],
     *,
     set: Mapping[str, Any] | None = None,
     robust: bool = False,
@@ -215,7 +218,7 @@ def fit(
         not a number, is what was not measured.
     free
         Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
-        dict of a pair of them, or none, for each key.
+        dict of a pair ``(low, high)``, or none, for each key.
     robust
         Whether data far off the others count less.
     candidates
@@ -276,7 +279,7 @@ def fit(
     return found
 
 
-def _free(number: str, free: str | Iterable[str] | Mapping[str, tuple[float, float] | None]) -> str:
+def _free(number: str, free: str | Iterable[str] | Mapping[str, Bounds]) -> str:
     """A free number as the program reads it: its key, and its bounds if it has any."""
     if isinstance(free, Mapping):
         bounds: Any = free[number]
