@@ -235,6 +235,8 @@ def fit(
     ------
     ScenarioError
         If the scenario is refused.
+    FileNotFoundError
+        If the path of a table, or of the scenario, is not there.
     ValueError
         If the data or the free numbers cannot be used: it says what to change. The first row of columns is line 2.
 
