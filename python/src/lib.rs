@@ -6,9 +6,11 @@ use pyo3::prelude::*;
 mod arrays;
 mod dictionary;
 mod errors;
+mod examples;
 mod fit;
 mod live;
 mod motion;
+mod range;
 mod relax;
 mod result;
 mod run;
@@ -27,6 +29,8 @@ mod _leafdyn {
 
     #[pymodule_export]
     use super::dictionary::overrides;
+    #[pymodule_export]
+    use super::examples::{examples, schema, templates};
     #[pymodule_export]
     use super::fit::fit;
     #[pymodule_export]

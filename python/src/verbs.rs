@@ -7,12 +7,13 @@ use leafdyn::relax::SemiImplicit;
 use leafdyn::scenario;
 use leafdyn::study::{
     self, BoundaryRequest, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender,
-    MOST_POINTS, Map, MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn, Vary,
+    MOST_POINTS, Map, MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn,
 };
 use pyo3::prelude::*;
 
 use crate::arrays::{array, curves, nodes};
 use crate::errors::{value_error, vary_error};
+use crate::range::Range;
 use crate::relax::{check_stations, refuse, reporter};
 use crate::result::{Files, Leaf};
 use crate::run::{elapsed, on_pool, run};
@@ -113,11 +114,10 @@ pub struct Asked {
 }
 
 impl Asked {
-    fn request(&self, py: Python, scenario: &Scenario, vary: &str) -> PyResult<TraceRequest> {
-        let vary: Vary = vary.parse().map_err(|error| vary_error(py, error))?;
+    fn request(&self, py: Python, scenario: &Scenario, vary: &Range) -> PyResult<TraceRequest> {
         Ok(TraceRequest {
+            vary: vary.vary(py)?,
             base: scenario.base(py)?,
-            vary,
             switch: self.switch,
             keep_unstable: self.keep_unstable,
             segments: self.segments,
@@ -139,11 +139,11 @@ fn trace_error(py: Python, error: TraceError) -> PyErr {
 pub fn trace<'py>(
     py: Python<'py>,
     scenario: &Scenario,
-    vary: &str,
+    vary: Range,
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
-    let request = asked.request(py, scenario, vary)?;
+    let request = asked.request(py, scenario, &vary)?;
     let found = run(py, progress, move |monitor| {
         let mut report = |branch: usize, points: usize, value: f64| {
             monitor.report_or_end(points as f64, None, || {
@@ -170,15 +170,15 @@ pub fn trace<'py>(
 pub fn boundary<'py>(
     py: Python<'py>,
     scenario: &Scenario,
-    along: &str,
-    across: &str,
+    along: Range,
+    across: Range,
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
     let request = BoundaryRequest {
         map: None,
-        trace: asked.request(py, scenario, along)?,
-        across: across.parse().map_err(|error| vary_error(py, error))?,
+        trace: asked.request(py, scenario, &along)?,
+        across: across.vary(py)?,
     };
     let found = run(py, progress, move |monitor| {
         let mut report = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
@@ -207,14 +207,14 @@ pub fn boundary<'py>(
 pub fn map(
     py: Python,
     scenario: &Scenario,
-    vary: Vec<String>,
+    vary: Vec<Range>,
     methods: Option<Vec<String>>,
     tolerance: Option<f64>,
     cell_seconds: Option<f64>,
     show: &str,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Files> {
-    let axes: Result<Vec<Vary>, _> = vary.iter().map(|axis| axis.parse()).collect();
+    let axes: PyResult<Vec<_>> = vary.iter().map(|axis| axis.vary(py)).collect();
     let methods = methods.map(|words| {
         let methods: Result<Vec<MapMethod>, _> = words.iter().map(|word| word.parse()).collect();
         methods.or_else(|error| refuse(format!("methods = {error}")))
@@ -224,7 +224,7 @@ pub fn map(
         .or_else(|error| refuse(format!("show = {error}")))?;
     let request = MapRequest::new(
         scenario.base(py)?,
-        axes.map_err(|error| vary_error(py, error))?,
+        axes?,
         methods.transpose()?,
         tolerance,
         cell_seconds.unwrap_or(CELL_SECONDS),

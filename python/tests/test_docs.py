@@ -12,6 +12,8 @@ ROOT = Path(__file__).parents[2]
 def test_every_block_of_a_page_runs(page: str, tmp_path: Path) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
     blocks = (ROOT / page).read_text().split("```python\n")[1:]
     assert blocks
     names: dict[str, Any] = {}

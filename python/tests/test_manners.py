@@ -1,5 +1,6 @@
 """How computations behave towards the interpreter that waits for them."""
 
+import gc
 import importlib.metadata
 import multiprocessing
 import os
@@ -31,6 +32,7 @@ LONG: dict[str, Callable[[], Any]] = {
     "dicts": lambda: [leafdyn.Scenario(fan(5)) for _ in range(1_000_000)],
     "modes": lambda: leafdyn.modes(fan(1500), 20, tolerance=1e-8),
     "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
+    "sweep": lambda: leafdyn.sweep(fan(5), {"load.gravity[2]": np.linspace(-1, -4, 20_000)}),
     "check": lambda: leafdyn.check(fan(120), tolerance=1e-10),
     "equilibria": lambda: leafdyn.equilibria(FIG10, tolerance=1e-7),
     "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 41}, tolerance=1e-9),
@@ -50,6 +52,8 @@ LONG: dict[str, Callable[[], Any]] = {
 
 @pytest.fixture(autouse=True)
 def ctrl_c() -> Iterator[None]:
+    # What earlier tests left behind is collected first: Python loses an interrupt in a callback of its collector.
+    gc.collect()
     # A shell's job in the background ignores it from birth.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
@@ -148,6 +152,7 @@ WITH_PROGRESS: dict[str, Callable[[Any], Any]] = {
     ),
     "simulate": lambda heard: leafdyn.simulate(fan(2), set={"dynamics.duration": 0.5}, progress=heard),
     "map": lambda heard: leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"], progress=heard),
+    "sweep": lambda heard: leafdyn.sweep(fan(2), {"load.gravity[2]": (-1, -2)}, progress=heard),
     "chart": lambda heard: leafdyn.chart(fan(2), seconds=0.1, methods=["semi-implicit"], progress=heard),
     "fit": lambda heard: leafdyn.fit(
         "scenarios/measured/pull.toml", "scenarios/measured/pull.csv", "stiffness.axial", progress=heard
@@ -184,13 +189,15 @@ def test_every_verb_tells_how_far_it_is(verb: str, capfd: pytest.CaptureFixture[
         lambda: leafdyn.relax_many([fan(3)], tolerance=1e-12, set={"load.gravity": [0, 0, -10_000.0]}),
         lambda: leafdyn.trace(fan(2), "load.gravity[2]=-1..-60", points=3),
         lambda: leafdyn.trace(fan(2), ["load.gravity[2]=-1..-1.1", "stiffness.torsion=1..2"]),
+        lambda: leafdyn.boundary(fan(2), {"load.gravity[2]": (-1, -1.1), "stiffness.torsion": (1, 2)}),
+        lambda: leafdyn.sweep(fan(3), {"load.gravity[2]": [-10_000.0]}, tolerance=1e-12),
         lambda: leafdyn.fit(
             "scenarios/measured/pull.toml",
             {"load.tip_force[0]": [4, 8, 12], "tip_x": [0.9707, 0.9898, 1.009], "sd_tip_x": 0.0005},
             ["stiffness.axial", "stiffness.torsion"],
         ),
     ],
-    ids=["relax", "relax_many", "trace", "boundary", "fit"],
+    ids=["relax", "relax_many", "trace", "trace of two", "boundary", "sweep", "fit"],
 )
 def test_what_is_said_beside_a_result_is_a_warning(ends: Callable[[], Any]) -> None:
     with pytest.warns(leafdyn.LeafWarning) as said:

@@ -11,19 +11,28 @@ A scenario is a path, a text in TOML, or a dict of the same form. All quantities
 in. Every verb of the program ``leafdyn`` is a function here; it returns what the program writes into files.
 """
 
-from ._errors import LeafWarning, ScenarioError
+from ._branches import Boundary, Branch, Curve, Trace
+from ._errors import LeafWarning, MissingScenarioError, ScenarioError
 from ._explore import Exploration, explore
 from ._fit import Candidate, Fit, Parameter, fit
+from ._follow import boundary, trace
+from ._format import Key, example, keys, new, schema
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
+from ._load import load
 from ._motion import Frame, Motion
 from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
 from ._sensitivity import Sensitivity
-from ._study import Boundary, Branch, Chart, Check, Curve, Equilibria, Map, Trace
-from ._verbs import chart, check, equilibria, frames, map, simulate, trace
+from ._simulate import frames, simulate
+from ._study import Chart, Check, Equilibria, Map
+from ._sweep import sweep
+from ._verbs import chart, check, equilibria, stability_map
 from ._view import Page
+
+# An attribute only: `from leafdyn import *` replaces no builtin.
+map = stability_map
 
 # The name under which scripts may know it.
 all_shapes = equilibria
@@ -40,8 +49,10 @@ __all__ = [
     "Exploration",
     "Fit",
     "Frame",
+    "Key",
     "LeafWarning",
     "Map",
+    "MissingScenarioError",
     "Motion",
     "Page",
     "Parameter",
@@ -53,19 +64,26 @@ __all__ = [
     "Table",
     "Trace",
     "__version__",
+    "boundary",
     "chart",
     "check",
     "equilibria",
+    "example",
     "explore",
     "fit",
     "frames",
-    "map",
+    "keys",
+    "load",
     "modes",
+    "new",
     "relax",
     "relax_many",
+    "schema",
     "sensitivities",
     "set_threads",
     "simulate",
+    "stability_map",
+    "sweep",
     "threads",
     "trace",
 ]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+from typing import Any
+
 
 class ScenarioError(ValueError):
     """A scenario that is refused; its text is the message of the program.
@@ -36,6 +39,25 @@ class ScenarioError(ValueError):
 
     def __reduce__(self) -> tuple[type[ScenarioError], tuple[object, ...]]:
         return type(self), (str(self), self.key, self.file, self.line, self.remedy)
+
+
+class MissingScenarioError(ScenarioError, FileNotFoundError):
+    """A scenario whose file is not there.
+
+    >>> import leafdyn
+    >>> try:
+    ...     leafdyn.relax("fig4.toml")
+    ... except FileNotFoundError as error:
+    ...     print(error)  # doctest: +ELLIPSIS
+    fig4.toml: cannot be read: ...
+    """
+
+    def __init__(self, *parts: Any) -> None:
+        super().__init__(*parts)
+        self.errno, self.filename = errno.ENOENT, self.file
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 class LeafWarning(UserWarning):

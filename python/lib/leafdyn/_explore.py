@@ -61,12 +61,14 @@ class Exploration(Page):
             except ImportError:
                 return None
 
-            class Widget(anywidget.AnyWidget):
-                _esm = _ESM
-                html = traitlets.Unicode().tag(sync=True)
-                height = traitlets.Int().tag(sync=True)
-                state = traitlets.Dict().tag(sync=True)
-
+            parts = {
+                "_esm": _ESM,
+                "html": traitlets.Unicode().tag(sync=True),
+                "height": traitlets.Int().tag(sync=True),
+                "state": traitlets.Dict().tag(sync=True),
+            }
+            # Its base is known only here, so that it is no class of this module.
+            Widget: Any = type("Widget", (anywidget.AnyWidget,), parts)
             self._widget = Widget(html=self.html, height=self.height)
         return self._widget
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, TypeAlias, Union
 
 import numpy as np
 
 from . import _leafdyn
 from ._arguments import numbers, switches, texts
+from ._attribute import Attribute, computed
+from ._data import column_variables, dataset, pandas
 from ._leaf import Array
 from ._measured import Measured, measurements
 from ._progress import Progress, reporter
@@ -21,34 +23,58 @@ from ._scenario import Scenario, Source, checked
 
 @dataclass(frozen=True)
 class Parameter:
-    """A free number as a fit found it."""
+    """A free number as a fit found it.
+
+    Attributes
+    ----------
+    key
+        Its key.
+    value
+        Its value at the minimum; of one that is not determined, one of many.
+    low
+        Lower end of its 95 % interval; ``-inf`` where the data give no end.
+    high
+        Upper end; ``inf`` where the data give no end.
+    determined
+        Whether the data determine it.
+    profiled
+        Whether the interval is that of the profile likelihood, because the curvature is not to be trusted.
+    """
 
     key: str
-    """Its key."""
     value: float
-    """Its value at the minimum; of one that is not determined, one of many."""
-    low: float | None
-    """Lower end of its 95 % interval; none where the data give no end."""
-    high: float | None
-    """Upper end."""
+    low: float
+    high: float
     determined: bool
-    """Whether the data determine it."""
     profiled: bool
-    """Whether the interval is that of the profile likelihood, because the curvature is not to be trusted."""
+
+
+def _parameter(entry: dict[str, Any]) -> Parameter:
+    """As JSON has it, which has no infinity."""
+    open_ = {"low": -math.inf, "high": math.inf}
+    return Parameter(**entry | {name: end for name, end in open_.items() if entry[name] is None})
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An experiment that could be made, and what it would say."""
+    """An experiment that could be made, and what it would say.
+
+    Attributes
+    ----------
+    experiment
+        Its name.
+    bits
+        By how many halvings it shrinks what is open between the numbers.
+    shrinks
+        The least known combination with it, as a part of what it is without.
+    remark
+        Why it cannot be judged.
+    """
 
     experiment: str
-    """Its name."""
     bits: float
-    """By how many halvings it shrinks what is open between the numbers."""
     shrinks: float
-    """The least known combination with it, as a part of what it is without."""
     remark: str | None = None
-    """Why it cannot be judged."""
 
 
 class Fit(Table):
@@ -58,38 +84,29 @@ class Fit(Table):
     ``sigma``, ``data``, ``model``, ``band``, ``sd`` and ``residual``.
     """
 
-    name: str
-    """The name of the scenario."""
-    outcome: str
-    """``"converged"``, ``"undetermined"``, ``"contradicted"`` or ``"not-converged"``."""
-    success: bool
-    """Whether it ended at a minimum, and the data determine every number."""
-    remarks: list[str]
-    """Why it did not converge, and what else is to be known."""
-    parameters: dict[str, Parameter]
-    """The free numbers by their keys: values and 95 % intervals."""
-    correlations: Array
-    """Correlations of the numbers (of their logarithms where they are positive), shape (P, P), in the order of
+    name = Attribute[str]("The name of the scenario.")
+    outcome = Attribute[str]("""``"converged"``, ``"undetermined"``, ``"contradicted"`` or ``"not-converged"``.""")
+    success = Attribute[bool]("Whether it ended at a minimum, and the data determine every number.")
+    remarks = Attribute[list[str]]("Why it did not converge, and what else is to be known.")
+    parameters = Attribute[dict[str, Parameter]]("The free numbers by their keys: values and 95 % intervals.")
+    correlations = Attribute[Array](
+        """Correlations of the numbers (of their logarithms where they are positive), shape (P, P), in the order of
     `parameters`; not a number where one is not determined."""
-    undetermined: list[dict[str, float]]
-    """Combinations of which the data say nothing, or little: by their keys, exponents of positive numbers and
+    )
+    undetermined = Attribute[list[dict[str, float]]](
+        """Combinations of which the data say nothing, or little: by their keys, exponents of positive numbers and
     coefficients of others."""
-    alternatives: list[dict[str, Any]]
-    """Other values that fit as well, if such were found: ``values`` by their keys, and ``chi_squared``."""
-    tried: list[str]
-    """Which other values were tried to find out whether they fit as well."""
-    says: list[str]
-    """What the data say, in words: the undetermined combinations, too."""
-    chi_squared: float
-    """The sum of the squares of residuals in standard deviations."""
-    degrees_of_freedom: int
-    """The number of data less that of the determined combinations."""
-    standard_deviation: float | None
-    """That of the data as the residuals tell it, where none was given."""
-    candidates: list[Candidate]
-    """Experiments that could be made, the one that says most first."""
-    wall_seconds: float
-    """The time of it all."""
+    )
+    alternatives = Attribute[list[dict[str, Any]]](
+        """Other values that fit as well, if such were found: ``values`` by their keys, and ``chi_squared``."""
+    )
+    tried = Attribute[list[str]]("Which other values were tried to find out whether they fit as well.")
+    says = Attribute[list[str]]("What the data say, in words: the undetermined combinations, too.")
+    chi_squared = Attribute[float]("The sum of the squares of residuals in standard deviations.")
+    degrees_of_freedom = Attribute[int]("The number of data less that of the determined combinations.")
+    standard_deviation = Attribute[float | None]("That of the data as the residuals tell it, where none was given.")
+    candidates = Attribute[list[Candidate]]("Experiments that could be made, the one that says most first.")
+    wall_seconds = Attribute[float]("The time of it all.")
 
     def __init__(self, files: Contents) -> None:
         super().__init__(files)
@@ -97,7 +114,7 @@ class Fit(Table):
         self.name = said["scenario"]
         self.outcome = said["outcome"]
         self.success = self.outcome == "converged"
-        self.parameters = {entry["key"]: Parameter(**entry) for entry in said["parameters"]}
+        self.parameters = {entry["key"]: _parameter(entry) for entry in said["parameters"]}
         count = len(self.parameters)
         self.correlations = read_only(np.array(said["correlations"], dtype=np.float64).reshape(count, count))
         for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
@@ -117,16 +134,47 @@ class Fit(Table):
         """Data less model, in standard deviations, shape (D,)."""
         return self.columns["residual"]
 
-    @cached_property
+    @computed
     def scenario(self) -> Scenario:
         """The scenario with the values in place, as ``fitted.toml``."""
         return Scenario(self._files.contents("fitted.toml").decode())
+
+    def to_pandas(self, table: str = "data") -> Any:
+        """One of its tables as a ``pandas.DataFrame``.
+
+        Parameters
+        ----------
+        table
+            ``"data"``, a row a datum, as ``fit.csv``; ``"parameters"``, a row a free number: ``value``, ``low``,
+            ``high``, ``determined``, ``profiled``; or ``"correlations"``, a square.
+        """
+        keys = list(self.parameters)
+        if table == "data":
+            return super().to_pandas()
+        if table == "parameters":
+            rows = [asdict(parameter) for parameter in self.parameters.values()]
+            return pandas().DataFrame(rows).set_index("key")
+        if table == "correlations":
+            return pandas().DataFrame(self.correlations, keys, keys)
+        raise ValueError(f"table = {table!r}: must be data, parameters or correlations")
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset``: its table along ``datum``; the free numbers along ``parameter``, as ``value``, ``low``,
+        ``high`` and ``determined``, and ``correlations`` along ``parameter`` and ``other_parameter``."""
+        free = list(self.parameters.values())
+        variables = column_variables(self.columns, ("datum",))
+        for name in ("value", "low", "high", "determined"):
+            variables[name] = (("parameter",), np.array([getattr(one, name) for one in free]), None)
+        variables["correlations"] = (("parameter", "other_parameter"), self.correlations, None)
+        keys = list(self.parameters)
+        coordinates = {"parameter": keys, "other_parameter": keys}
+        return dataset(variables, coordinates, self._units, self._attrs)
 
     def __repr__(self) -> str:
         known = [
             f"{one.key} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g})"
             for one in self.parameters.values()
-            if one.determined and one.low is not None and one.high is not None
+            if one.determined and math.isfinite(one.low) and math.isfinite(one.high)
         ]
         open_ = sum(not one.determined for one in self.parameters.values())
         words = [self.outcome, *known[:TOLD]]
@@ -137,6 +185,9 @@ class Fit(Table):
         return f"<Fit {self.name}: {', '.join(words)}>"
 
 
+Bounds: TypeAlias = Union[Sequence[float], Array, None]
+"""Of a free number: the lower and the upper one, or none."""
+
 TOLD = 4
 """Numbers that a fit shows."""
 
@@ -144,7 +195,7 @@ TOLD = 4
 def fit(
     scenario: Source,
     data: Measured | Iterable[Measured],
-    free: str | Iterable[str] | Mapping[str, tuple[float, float] | None],
+    free: str | Iterable[str] | Mapping[str, Bounds],
     *,
     set: Mapping[str, Any] | None = None,
     robust: bool = False,
@@ -167,7 +218,7 @@ def fit(
         not a number, is what was not measured.
     free
         Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
-        dict of a pair of them, or none, for each key.
+        dict of a pair ``(low, high)``, or none, for each key.
     robust
         Whether data far off the others count less.
     candidates
@@ -184,6 +235,8 @@ def fit(
     ------
     ScenarioError
         If the scenario is refused.
+    FileNotFoundError
+        If the path of a table, or of the scenario, is not there.
     ValueError
         If the data or the free numbers cannot be used: it says what to change. The first row of columns is line 2.
 
@@ -228,7 +281,7 @@ def fit(
     return found
 
 
-def _free(number: str, free: str | Iterable[str] | Mapping[str, tuple[float, float] | None]) -> str:
+def _free(number: str, free: str | Iterable[str] | Mapping[str, Bounds]) -> str:
     """A free number as the program reads it: its key, and its bounds if it has any."""
     if isinstance(free, Mapping):
         bounds: Any = free[number]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
+from ._attribute import Attribute, computed
+from ._data import ENERGY, QUANTITIES, dataset, node_table, node_variables
 from ._result import Kept, keep
 from ._sensitivity import Sensitivity
 from ._view import Viewed
@@ -33,42 +34,29 @@ class Equilibrium(Viewed):
     True
     """
 
-    name: str
-    """The name of the scenario."""
-    scenario: Scenario | None
-    """The scenario; none of a leaf that another result holds."""
-    method: str
-    """The method."""
-    outcome: str
-    """How the run ended, in one word: ``"converged"`` and so on, as in ``summary.json``."""
-    success: bool
-    """Whether the leaf is at rest within the tolerance."""
-    remark: str | None
-    """What would help, if the run did not succeed."""
-    doubts: list[str]
-    """What can hardly be meant: a vein that is stretched far, say, or a fan in degrees."""
-    rods: int
-    """The number of rods N."""
-    joined: bool
-    """Whether the tips are one point."""
-    segments: list[int]
-    """Segments a rod of each grid, coarse to fine; none if the leaf was shot."""
-    tolerance: float
-    """The accuracy that was wanted, relative to the longest rod."""
-    residual: float | None
-    """The largest unbalanced force or moment, without units."""
-    energy: float | None
-    """The potential energy."""
-    negative_eigenvalues: int | None
-    """The Morse index: 0 for a stable leaf; none if it is not known."""
-    neutral_directions: int
-    """Directions in which the leaf moves without resistance, as round veins clamped in line turn, and veins on hinges: eigenvalues that are exactly zero."""
-    path: str | None
-    """How the leaf came to this equilibrium: ``"stable-throughout"``, ``"snapped"``, ``"branched"`` or ``"released"``."""
-    path_events: list[str]
-    """What happened on the way, a phrase each."""
-    wall_seconds: float
-    """The time of the solution alone."""
+    name = Attribute[str]("The name of the scenario.")
+    scenario: Attribute[Scenario | None] = Attribute("The scenario; none of a leaf that another result holds.")
+    method = Attribute[str]("The method, a word of `relax`.")
+    outcome = Attribute[str]("""How the run ended, in one word: ``"converged"`` and so on, as in ``summary.json``.""")
+    success = Attribute[bool]("Whether the leaf is at rest within the tolerance.")
+    remark = Attribute[str | None]("What would help, if the run did not succeed.")
+    doubts = Attribute[list[str]]("What can hardly be meant: a vein that is stretched far, say, or a fan in degrees.")
+    rods = Attribute[int]("The number of rods N.")
+    joined = Attribute[bool]("Whether the tips are one point.")
+    segments = Attribute[list[int]]("Segments a rod of each grid, coarse to fine; none if the leaf was shot.")
+    tolerance = Attribute[float]("The accuracy that was wanted, relative to the longest rod.")
+    residual = Attribute[float | None]("The largest unbalanced force or moment, without units.")
+    energy = Attribute[float | None]("The potential energy, force times length; none if it is not known.")
+    negative_eigenvalues = Attribute[int | None]("The Morse index: 0 for a stable leaf; none if it is not known.")
+    neutral_directions = Attribute[int](
+        """Directions in which the leaf moves without resistance, as round veins clamped in line turn, and veins on
+        hinges: eigenvalues that are exactly zero."""
+    )
+    path = Attribute[str | None](
+        """How the leaf came to this equilibrium: ``"stable-throughout"``, ``"snapped"``, ``"branched"`` or ``"released"``."""
+    )
+    path_events = Attribute[list[str]]("What happened on the way, a phrase each.")
+    wall_seconds = Attribute[float]("The time of the solution alone, in seconds.")
 
     def __init__(self, core: _leafdyn.Leaf, request: tuple[Scenario, dict[str, Any]] | None = None) -> None:
         self._files = core
@@ -79,7 +67,7 @@ class Equilibrium(Viewed):
     @property
     def _core(self) -> _leafdyn.Leaf:
         if not isinstance(self._files, _leafdyn.Leaf):
-            raise AttributeError("this part of a pickled leaf is not there")
+            raise AttributeError("this part of the leaf was not kept when it was pickled or written: solve it again")
         return self._files
 
     @property
@@ -89,25 +77,25 @@ class Equilibrium(Viewed):
 
     @property
     def tip(self) -> Array | None:
-        """The joint tip, or the only rod's: shape (3,); none if there are several."""
+        """The joint tip, or the only rod's: shape (3,), lengths; none if there are several."""
         return self.tips[0] if len(self.tips) == 1 else None
 
-    @cached_property
+    @computed
     def error_estimate(self) -> float | None:
         """Bound on the error of `positions`, in units of length; none on a single grid."""
         return self._core.error_estimate
 
-    @cached_property
+    @computed
     def tips(self) -> Array:
-        """The joint tip alone, shape (1, 3), or every tip, shape (N, 3)."""
+        """The joint tip alone, shape (1, 3), or every tip, shape (N, 3); lengths."""
         return self._core.tips()
 
-    @cached_property
+    @computed
     def tip_force_sum(self) -> Array:
-        """The sum of the forces that the rods pass to their tips, shape (3,)."""
+        """The sum of the forces that the rods pass to their tips, shape (3,), in units of force."""
         return self._core.tip_force_sum()
 
-    @cached_property
+    @computed
     def _reaction(self) -> tuple[Array, Array] | None:
         return self._core.tip_reaction()
 
@@ -121,52 +109,52 @@ class Equilibrium(Viewed):
         """The moments that the holder of a clamped tip feels, shape (N, 3), or (0, 3) if it is pinned; none if free."""
         return None if self._reaction is None else self._reaction[1]
 
-    @cached_property
+    @computed
     def grip_reactions(self) -> list[tuple[Array, Array | None]]:
         """Of every grip the force that its holder feels, shape (3,), and the moment about its middle if it is clamped."""
         return self._core.grip_reactions()
 
-    @cached_property
+    @computed
     def stations(self) -> Array:
-        """Fractions of the length, base to tip, shape (K + 1,)."""
+        """Fractions of the length, base to tip, shape (K + 1,), from 0 to 1."""
         return self._core.stations()
 
-    @cached_property
+    @computed
     def lengths(self) -> Array:
-        """The lengths of the rods, shape (N,)."""
+        """The lengths of the rods, shape (N,), in units of length."""
         return self._core.lengths()
 
-    @cached_property
+    @computed
     def positions(self) -> Array:
-        """Centerlines, shape (N, K + 1, 3): the best values known, within `error_estimate`."""
+        """Centerlines, shape (N, K + 1, 3), lengths: the best values known, within `error_estimate`."""
         return self._core.nodes("positions")
 
-    @cached_property
+    @computed
     def rotations(self) -> Array:
         """The directors as unit quaternions w, x, y, z, shape (N, K + 1, 4)."""
         return self._core.nodes("rotations")
 
-    @cached_property
+    @computed
     def strains(self) -> Array:
         """Stretch and shears v along the directors, shape (N, K + 1, 3), without a unit."""
         return self._core.nodes("strains")
 
-    @cached_property
+    @computed
     def curvatures(self) -> Array:
         """Twist and bends u along the directors, shape (N, K + 1, 3), per length."""
         return self._core.nodes("curvatures")
 
-    @cached_property
+    @computed
     def forces(self) -> Array:
-        """Axial force and shear forces n along the directors, shape (N, K + 1, 3)."""
+        """Axial force and shear forces n along the directors, shape (N, K + 1, 3), in units of force."""
         return self._core.nodes("forces")
 
-    @cached_property
+    @computed
     def moments(self) -> Array:
-        """Twisting and bending moments m along the directors, shape (N, K + 1, 3)."""
+        """Twisting and bending moments m along the directors, shape (N, K + 1, 3), force times length."""
         return self._core.nodes("moments")
 
-    @cached_property
+    @computed
     def stresses(self) -> Array | None:
         """The largest normal, shear and equivalent (von Mises) stress in the sections, shape (N, K + 1, 3).
 
@@ -174,39 +162,40 @@ class Equilibrium(Viewed):
         """
         return self._core.stresses()
 
-    @cached_property
+    @computed
     def curves(self) -> Array:
-        """Centerlines at all nodes of the finest grid, for drawing: shape (N, M + 1, 3)."""
+        """Centerlines at all nodes of the finest grid, for drawing: shape (N, M + 1, 3); of a leaf that was loaded, at its
+        `stations`."""
         return self._core.curves()
 
-    @cached_property
+    @computed
     def curve_stations(self) -> Array:
         """Fractions of the length at which `curves` are given, shape (M + 1,)."""
         return self._core.curve_stations()
 
-    @cached_property
+    @computed
     def _modes(self) -> tuple[Array, Array] | None:
         return self._core.eigenvalues()
 
     @property
     def eigenvalues(self) -> Array | None:
-        """The lowest eigenvalues omega^2 over the masses, ascending, shape (modes,); none if they are not known."""
+        """The lowest eigenvalues omega^2 over the masses, ascending, shape (modes,), per time squared; none if not known."""
         return None if self._modes is None else self._modes[0]
 
     @property
     def eigenvalue_errors(self) -> Array | None:
-        """Bounds on their errors, not a number on a single grid."""
+        """Bounds on their errors, shape (modes,), not a number on a single grid."""
         return None if self._modes is None else self._modes[1]
 
     @property
     def frequencies(self) -> Array | None:
-        """Angular frequencies omega, radians per time (over 2 pi: cycles per time); not a number of unstable modes."""
+        """Angular frequencies omega, shape (modes,), radians per time (over 2 pi: cycles); not a number of unstable modes."""
         if self.eigenvalues is None:
             return None
         with np.errstate(invalid="ignore"):
             return np.sqrt(self.eigenvalues)
 
-    @cached_property
+    @computed
     def _mode_shapes(self) -> tuple[Array, Array]:
         return self._core.mode_shapes()
 
@@ -220,7 +209,7 @@ class Equilibrium(Viewed):
         """Rotation vectors of these nodes along the lab axes, radians, shape (modes, N, M + 1, 3)."""
         return self._mode_shapes[1]
 
-    @cached_property
+    @computed
     def sensitivities(self) -> dict[str, Sensitivity]:
         """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`.
 
@@ -241,6 +230,72 @@ class Equilibrium(Viewed):
         """Of a leaf from an outline (``[blade]``): the stiffnesses that follow at its widest place, and how much its least
         width and the number of veins matter, as in ``summary.json``; none of other leaves."""
         return self.to_dict().get("blade")
+
+    def _nodes(self) -> dict[str, Array]:
+        """What there is at its stations."""
+        found = {name: getattr(self, name, None) for name in QUANTITIES}
+        return {name: array for name, array in found.items() if array is not None}
+
+    def to_pandas(self) -> Any:
+        """A ``pandas.DataFrame`` with a row for each ``rod``, counted from 1, and ``station``, a fraction of the length:
+        the numbers and columns of ``centerlines.csv``.
+
+        ``attrs["units"]`` has the units that the scenario names, by columns.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> leaf = leafdyn.relax("scenarios/paper/fig04.toml", set={"units.length": "cm", "units.force": "N"})
+        >>> table = leaf.to_pandas()
+        >>> table.loc[(1, 1.0), ["x", "y", "z"]].round(4).tolist()
+        [0.9567, 0.0477, -0.1474]
+        >>> table.attrs["units"]["m1"]
+        'N cm'
+        """
+        along = {"s": self.lengths[:, None] * self.stations}
+        levels = {"rod": range(1, self.rods + 1), "station": self.stations}
+        return node_table(along | self._nodes(), levels, self._units, self._attrs)
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset`` with the dimensions ``rod``, ``station``, and ``component`` (x, y, z), ``director``
+        (of strains, forces and moments) or ``quaternion``; of eigenvalues ``mode``.
+
+        Variables have the units that the scenario names in their attributes.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> found = leafdyn.relax("scenarios/paper/fig04.toml").to_xarray()
+        >>> found.positions.dims, found.forces.dims
+        (('rod', 'station', 'component'), ('rod', 'station', 'director'))
+        >>> float(found.positions.sel(rod=1, station=1.0, component="z").round(4))
+        -0.1474
+        """
+        rods, modes, line = ("rod",), ("mode",), ("rod", "curve_station")
+        shapes = getattr(self, "_mode_shapes", (np.empty(0), np.empty(0)))
+        some = shapes[0].size > 0
+        variables = {
+            **node_variables(self._nodes(), ("rod", "station")),
+            "lengths": (rods, self.lengths, (1, 0, 0)),
+            "energy": ((), self.energy, ENERGY),
+            "error_estimate": ((), self.error_estimate, (1, 0, 0)),
+            "negative_eigenvalues": ((), self.negative_eigenvalues, None),
+            "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
+            "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
+            "frequencies": (modes, self.frequencies, (0, 0, -1)),
+            "mode_displacements": ((*modes, *line, "component"), shapes[0] if some else None, None),
+            "mode_rotations": ((*modes, *line, "component"), shapes[1] if some else None, None),
+        }
+        coordinates: dict[str, Any] = {"rod": range(1, self.rods + 1), "station": self.stations}
+        if some:
+            coordinates["curve_station"] = self.curve_stations
+        if self.eigenvalues is not None:
+            coordinates["mode"] = range(1, len(self.eigenvalues) + 1)
+        return dataset(variables, coordinates, self._units, self._attrs)
+
+    @property
+    def _attrs(self) -> dict[str, Any]:
+        return {"scenario": self.name, "method": self.method, "outcome": self.outcome}
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.

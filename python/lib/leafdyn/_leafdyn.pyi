@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 _Array: TypeAlias = NDArray[np.float64]
 _Heard: TypeAlias = Callable[[float, float | None, str], object] | None
+_Range: TypeAlias = str | tuple[str, list[float], bool]
 
 __all__ = [
     "Files",
@@ -19,6 +20,7 @@ __all__ = [
     "boundary",
     "chart",
     "check",
+    "examples",
     "fit",
     "kind",
     "library_seconds",
@@ -28,7 +30,9 @@ __all__ = [
     "panic_on_purpose",
     "relax",
     "relax_many",
+    "schema",
     "set_threads",
+    "templates",
     "threads",
     "trace",
 ]
@@ -43,6 +47,9 @@ def threads() -> int:
 
 def panic_on_purpose() -> None: ...
 def library_seconds(scenario: Scenario, runs: int) -> float: ...
+def schema() -> str: ...
+def templates() -> list[tuple[str, str]]: ...
+def examples() -> list[tuple[str, str]]: ...
 def kind(file: str) -> str: ...
 def overrides(entries: Mapping[str, Any]) -> list[str]: ...
 def main(arguments: Sequence[str]) -> int: ...
@@ -136,14 +143,14 @@ def equilibria(
     scenario: Scenario, tolerance: float | None, full_model: bool, stations: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, list[tuple[Leaf, int, bool]]]: ...
 def trace(
-    scenario: Scenario, vary: str, asked: Mapping[str, Any], progress: _Heard
+    scenario: Scenario, vary: _Range, asked: Mapping[str, Any], progress: _Heard
 ) -> tuple[Files, bool, str | None, list[list[_Array]]]: ...
 def boundary(
-    scenario: Scenario, along: str, across: str, asked: Mapping[str, Any], progress: _Heard
+    scenario: Scenario, along: _Range, across: _Range, asked: Mapping[str, Any], progress: _Heard
 ) -> tuple[Files, bool, str | None, list[list[_Array]]]: ...
 def map(
     scenario: Scenario,
-    vary: Sequence[str],
+    vary: Sequence[_Range],
     methods: Sequence[str] | None,
     tolerance: float | None,
     cell_seconds: float | None,

@@ -16,6 +16,10 @@ class Columns(Protocol):
     def items(self) -> Iterable[tuple[Any, Any]]: ...
 
 
+class MissingDataError(ValueError, FileNotFoundError):
+    """A table whose file is not there."""
+
+
 Measured: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Columns]
 """What a table of measurements can be given as."""
 
@@ -30,7 +34,10 @@ def measurements(data: Measured | Iterable[Measured], name: str) -> list[tuple[s
 
 def _table(table: Any, name: str) -> tuple[str, str] | str:
     if isinstance(table, (str, os.PathLike)):
-        return os.fspath(table)
+        path = os.fspath(table)
+        if not os.path.lexists(path):
+            raise MissingDataError(f"{path}: cannot be read: there is no such file")
+        return path
     if not hasattr(table, "items"):
         found = type(table).__name__
         raise TypeError(f"{name}: allowed are a path, a dict of columns and a pandas.DataFrame, not {found}")

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _leafdyn
+from ._attribute import Attribute
+from ._data import ENERGY, QUANTITIES, dataset, node_table, node_variables
 from ._leaf import Array
 from ._result import KINDS, chosen, kind
 from ._view import Viewed
@@ -18,20 +20,30 @@ ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
 
 
 class Frame(NamedTuple):
-    """A leaf at an instant, with N rods of M + 1 nodes."""
+    """A leaf at an instant, with N rods of M + 1 nodes.
+
+    Attributes
+    ----------
+    time
+        The time.
+    positions
+        Positions, shape (N, M + 1, 3).
+    rotations
+        The directors as unit quaternions w, x, y, z, shape (N, M + 1, 4).
+    velocities
+        Velocities along the lab axes, shape (N, M + 1, 3).
+    angular_velocities
+        Angular velocities along the lab axes, shape (N, M + 1, 3).
+    energies
+        Energies: kinetic, elastic, of the coupling, potential of the loads; dissipated and put in until then.
+    """
 
     time: float
-    """The time."""
     positions: Array
-    """Positions, shape (N, M + 1, 3)."""
     rotations: Array
-    """The directors as unit quaternions w, x, y, z, shape (N, M + 1, 4)."""
     velocities: Array
-    """Velocities along the lab axes, shape (N, M + 1, 3)."""
     angular_velocities: Array
-    """Angular velocities along the lab axes, shape (N, M + 1, 3)."""
     energies: dict[str, float]
-    """Energies: kinetic, elastic, of the coupling, potential of the loads; dissipated and put in until then."""
 
 
 class Motion(Viewed):
@@ -41,28 +53,24 @@ class Motion(Viewed):
     ``energy.csv`` and what shows it as a film: `save` writes ``json``, ``svg`` and ``png`` only.
     """
 
-    outcome: str
-    """``"completed"``, or why it ended early."""
-    remark: str | None
-    """The same in a sentence."""
-    doubts: list[str]
-    """What makes it doubtful from its beginning, such as a start at an unstable equilibrium."""
-    method: str
-    """The method."""
-    stations: Array
-    """Fractions of the length at which the nodes are, shape (M + 1,)."""
-    times: Array
-    """Times of the outputs, shape (T,)."""
-    positions: Array
-    """Positions, shape (T, N, M + 1, 3)."""
-    rotations: Array
-    """The directors as unit quaternions w, x, y, z, shape (T, N, M + 1, 4)."""
-    velocities: Array
-    """Velocities along the lab axes, shape (T, N, M + 1, 3)."""
-    angular_velocities: Array
-    """Angular velocities along the lab axes, shape (T, N, M + 1, 3)."""
-    energies: dict[str, Array]
-    """Energies by their names, shape (T,) each: as in ``energy.csv``."""
+    name = Attribute[str]("The name of the scenario.")
+    outcome = Attribute[str]("""``"completed"``, or why it ended early.""")
+    remark = Attribute[str | None]("The same in a sentence.")
+    doubts = Attribute[list[str]](
+        """What makes it doubtful from its beginning, such as a start at an unstable equilibrium."""
+    )
+    method = Attribute[str]("""``"explicit"`` or ``"semi-implicit"``.""")
+    stations = Attribute[Array]("Fractions of the length at which the nodes are, shape (M + 1,).")
+    times = Attribute[Array]("Times of the outputs, shape (T,).")
+    positions = Attribute[Array]("Positions, shape (T, N, M + 1, 3), in units of length.")
+    rotations = Attribute[Array]("The directors as unit quaternions w, x, y, z, shape (T, N, M + 1, 4).")
+    velocities = Attribute[Array]("Velocities along the lab axes, shape (T, N, M + 1, 3), length per time.")
+    angular_velocities = Attribute[Array](
+        "Angular velocities along the lab axes, shape (T, N, M + 1, 3), radians per time."
+    )
+    energies = Attribute[dict[str, Array]](
+        "Energies by their names, shape (T,) each, force times length: as in ``energy.csv``."
+    )
 
     def __init__(self, core: _leafdyn.Motion, name: str, joined: bool) -> None:
         self._files = core.files()
@@ -80,6 +88,39 @@ class Motion(Viewed):
     def tips(self) -> Array:
         """The joint tip in time, shape (T, 1, 3), or every tip, shape (T, N, 3)."""
         return self.positions[:, : 1 if self._joined else None, -1]
+
+    def _nodes(self) -> dict[str, Array]:
+        return {name: getattr(self, name) for name in QUANTITIES if name in self.__dict__}
+
+    def to_pandas(self) -> Any:
+        """A ``pandas.DataFrame`` with a row for each ``time``, ``rod``, counted from 1, and ``station``: the numbers and
+        columns of ``motion.csv``. The `energies` are a table of their own: ``pandas.DataFrame(energies, times)``.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> motion = leafdyn.simulate("scenarios/motion/swing.toml", set={"dynamics.duration": 1.0})
+        >>> motion.to_pandas().index.names
+        FrozenList(['time', 'rod', 'station'])
+        """
+        rods = range(1, self.positions.shape[1] + 1)
+        levels = {"time": self.times, "rod": rods, "station": self.stations}
+        return node_table(self._nodes(), levels, self._units, self._attrs)
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset`` with the dimensions ``time``, ``rod``, ``station``, and ``component`` or
+        ``quaternion``; energies have that of ``time``."""
+        variables = {
+            **node_variables(self._nodes(), ("time", "rod", "station")),
+            **{name: (("time",), energy, ENERGY) for name, energy in self.energies.items()},
+        }
+        rods = range(1, self.positions.shape[1] + 1)
+        coordinates = {"time": self.times, "rod": rods, "station": self.stations}
+        return dataset(variables, coordinates, self._units, self._attrs)
+
+    @property
+    def _attrs(self) -> dict[str, Any]:
+        return {"scenario": self.name, "method": self.method, "outcome": self.outcome}
 
     def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
         """As `Result.save`; among the files are ``motion.csv`` (or ``.npy``) and ``energy.csv``."""

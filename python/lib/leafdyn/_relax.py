@@ -11,11 +11,11 @@ from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
 from ._errors import LeafWarning
 from ._leaf import Equilibrium
-from ._progress import Progress, reporter
+from ._progress import Heard, Progress, reporter
 from ._scenario import Scenario, Source, checked
 
 
-def _asked(
+def asked_for(
     method: str = "semi-implicit",
     tolerance: float | None = None,
     segments: SupportsIndex | None = None,
@@ -117,7 +117,7 @@ def relax(
     >>> leaf.tip.round(6)
     array([ 0.956663,  0.047746, -0.147358])
     """
-    asked = _asked(
+    asked = asked_for(
         method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, (), margin, path
     )
     leaf = checked(scenario, set)
@@ -163,7 +163,7 @@ def relax_many(
     """
     if isinstance(scenarios, (str, os.PathLike, Mapping, Scenario)):
         raise TypeError(f"scenarios = {type(scenarios).__name__}: a list is wanted; relax is for one scenario")
-    asked = _asked(
+    asked = asked_for(
         method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, path=path
     )
     leaves = []
@@ -174,11 +174,16 @@ def relax_many(
             refused.args = (f"scenarios[{number}]: {refused}",)
             raise
     with reporter(progress) as heard:
-        cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
-    found = [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
+        found = relaxed(leaves, asked, heard)
     for number, leaf in enumerate(found):
         warn(f"scenarios[{number}], {leaf.name}", leaf.remark, *leaf.doubts)
     return found
+
+
+def relaxed(leaves: list[Scenario], asked: dict[str, Any], heard: Heard | None) -> list[Equilibrium]:
+    """Many leaves at rest, without a word about those that are not."""
+    cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
+    return [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
 
 
 def modes(
@@ -210,7 +215,7 @@ def modes(
     ((2,), True)
     """
     whole(count=count)
-    asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
+    asked = asked_for("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
@@ -261,7 +266,7 @@ def sensitivities(
     True
     """
     words = texts("keys", keys, "stiffness.axial")
-    asked = _asked(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
+    asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
+from ._data import column_variables, dataset, table
 
 KINDS = ("json", "csv", "svg", "png")
 
@@ -108,6 +109,22 @@ class Result:
     def _repr_svg_(self) -> str:
         return self.figure()
 
+    @property
+    def _units(self) -> dict[str, str]:
+        """The names of the units of its scenario."""
+        units: dict[str, str] = self._said.get("input", {}).get("units", {})
+        return units
+
+    @property
+    def _attrs(self) -> dict[str, Any]:
+        """What tables and data sets say of all of it."""
+        return {name: word for name, word in self._said.items() if name in ("scenario", "version")}
+
+    @property
+    def _said(self) -> dict[str, Any]:
+        """Its JSON, if it has one of its own."""
+        return self.to_dict() if self._files.names()[0].endswith(".json") else {}
+
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_files": keep(self._files)}
 
@@ -139,11 +156,21 @@ class Table(Result):
         table = next(name for name in self._files.names() if name.endswith(".csv"))
         return columns(self._files.contents(table))
 
-    def to_pandas(self) -> Any:
-        """Its table as a ``pandas.DataFrame``."""
-        import pandas
+    _row = "row"
 
-        return pandas.DataFrame(self.columns)
+    @property
+    def _value(self) -> str:
+        """The key of which its column ``value`` is."""
+        return "value"
+
+    def to_pandas(self) -> Any:
+        """Its table as a ``pandas.DataFrame``; ``attrs["units"]`` has the units that the scenario names, by columns."""
+        return table(self.columns, self._units, self._attrs, value=self._value)
+
+    def to_xarray(self) -> Any:
+        """Its table as an ``xarray.Dataset``, with vectors along ``component``; with the units that the scenario
+        names in the attributes of the variables."""
+        return dataset(column_variables(self.columns, (self._row,), self._value), {}, self._units, self._attrs)
 
 
 def chosen(write: str | Iterable[str] | None, known: Iterable[str], must: str = "must be of") -> set[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
-from ._errors import ScenarioError
+from ._errors import MissingScenarioError, ScenarioError
 
 
 class Scenario:
@@ -29,8 +29,8 @@ class Scenario:
     ------
     ScenarioError
         If it is refused.
-    OSError
-        Never: a file that cannot be read is a `ScenarioError`, too.
+    FileNotFoundError
+        If a path is not there: it is a `ScenarioError`, too, as is every other file that cannot be read.
 
     Examples
     --------
@@ -59,7 +59,7 @@ class Scenario:
         elif isinstance(source, str) and _is_text(source):
             self._core = _leafdyn.Scenario(source, entries)
         elif isinstance(source, (str, os.PathLike)):
-            self._core = _leafdyn.Scenario.read(os.fspath(source), entries)
+            self._core = _read(os.fspath(source), entries)
         else:
             found = type(source).__name__
             meant = "; give its .scenario" if hasattr(source, "scenario") else ""
@@ -120,11 +120,21 @@ class Scenario:
         return hash((self._core.text, *self._core.overrides))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restore, self._key()
+        return restored, self._key()
 
 
 Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]
 """What a scenario can be given as."""
+
+
+def _read(path: str, entries: list[str]) -> _leafdyn.Scenario:
+    try:
+        return _leafdyn.Scenario.read(path, entries)
+    except ScenarioError as refused:
+        if os.path.lexists(path):
+            raise
+        why = (str(refused), refused.key, refused.file or path, refused.line, refused.remedy)
+        raise MissingScenarioError(*why) from None
 
 
 def _is_text(source: str) -> bool:
@@ -134,7 +144,7 @@ def _is_text(source: str) -> bool:
     return has_sign and not source.endswith((".toml", ".json"))
 
 
-def _restore(text: str, overrides: list[str], file: str) -> Scenario:
+def restored(text: str, overrides: list[str], file: str) -> Scenario:
     scenario = Scenario.__new__(Scenario)
     scenario._core = _leafdyn.Scenario(text, overrides, file)
     return scenario

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._attribute import Attribute
 from ._result import read_only
 
 Array = NDArray[np.float64]
@@ -19,41 +20,37 @@ class Sensitivity:
     `leafdyn.sensitivities`.
     """
 
-    key: str
-    """The key of the number."""
-    value: float
-    """Its value."""
-    tips: Array
-    """Change of the joint tip alone, shape (1, 3), or of every tip, shape (N, 3)."""
-    tip_error: float | None
-    """Bound on its error; none on a single grid, as of the others."""
-    energy: float | None
-    """Change of the energy."""
-    energy_error: float | None
-    """Bound on its error."""
-    lowest_eigenvalue: float | None
-    """Change of the lowest eigenvalue: of the squared angular frequency."""
-    lowest_eigenvalue_error: float | None
-    """Bound on its error."""
-    frequencies: Array
-    """Changes of the frequencies, cycles per time (`Equilibrium.frequencies` are angular), shape (modes,); without a
+    key = Attribute[str]("The key of the number.")
+    value = Attribute[float]("Its value.")
+    tips = Attribute[Array]("Change of the joint tip alone, shape (1, 3), or of every tip, shape (N, 3).")
+    tip_error = Attribute[float | None]("Bound on its error; none on a single grid, as of the others.")
+    energy = Attribute[float | None]("Change of the energy.")
+    energy_error = Attribute[float | None]("Bound on its error.")
+    lowest_eigenvalue = Attribute[float | None]("Change of the lowest eigenvalue: of the squared angular frequency.")
+    lowest_eigenvalue_error = Attribute[float | None]("Bound on its error.")
+    frequencies = Attribute[Array](
+        """Changes of the frequencies, cycles per time (`Equilibrium.frequencies` are angular), shape (modes,); without a
     bound on their errors."""
-    tip_reaction: Array | None
-    """Change of the force that the holder of the tip feels, shape (3,); none if the tip is free."""
-    tip_reaction_moments: Array | None
-    """Change of the moments that the holder of a clamped tip feels, shape (N, 3); none of another."""
-    tip_reaction_error: float | None
-    """Bound on the error of the force."""
-    grip_reactions: list[tuple[Array, Array | None]]
-    """Of every grip the change of the force that its holder feels, shape (3,), and of the moment if it is clamped."""
-    grip_reactions_error: float | None
-    """Bound on the error of these forces."""
-    stations: Array
-    """Fractions of the length at which `positions` are, shape (K + 1,): nodes that all grids have."""
-    positions: Array
-    """Changes of the centerlines, shape (N, K + 1, 3); with more than 100 numbers there may be none, shape (0, 0, 3)."""
-    positions_error: float | None
-    """Bound on their error."""
+    )
+    tip_reaction = Attribute[Array | None](
+        """Change of the force that the holder of the tip feels, shape (3,); none if the tip is free."""
+    )
+    tip_reaction_moments = Attribute[Array | None](
+        """Change of the moments that the holder of a clamped tip feels, shape (N, 3); none of another."""
+    )
+    tip_reaction_error = Attribute[float | None]("Bound on the error of the force.")
+    grip_reactions = Attribute[list[tuple[Array, Array | None]]](
+        """Of every grip the change of the force that its holder feels, shape (3,), and of the moment if it is clamped."""
+    )
+    grip_reactions_error = Attribute[float | None]("Bound on the error of these forces.")
+    stations = Attribute[Array](
+        """Fractions of the length at which `positions` are, shape (K + 1,): nodes that all grids have."""
+    )
+    positions = Attribute[Array](
+        """Changes of the centerlines, shape (N, K + 1, 3); with more than 100 numbers there may be none, shape (0, 0,
+        3)."""
+    )
+    positions_error = Attribute[float | None]("Bound on their error.")
 
     def __init__(self, entry: dict[str, Any], stations: Array, positions: Array, positions_error: float | None) -> None:
         self.__dict__.update({name: entry.get(name) for name in _NUMBERS})

@@ -1,18 +1,18 @@
-"""What is built on leaves at rest, and leaves in motion."""
+"""What is built on leaves at rest: checks, other shapes, maps and charts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, SupportsIndex, overload
+from collections.abc import Iterable, Mapping
+from typing import Any, SupportsIndex
 
 from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
 from ._leaf import Equilibrium
-from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
+from ._range import Vary, ranges
 from ._relax import warn
 from ._scenario import Scenario, Source, checked
-from ._study import Boundary, Chart, Check, Map, Equilibria, Trace
+from ._study import Chart, Check, Equilibria, Map
 
 
 def check(
@@ -105,128 +105,9 @@ def equilibria(
     return Equilibria(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
 
 
-@overload
-def trace(
+def stability_map(
     scenario: Source,
-    vary: str,
-    *,
-    set: Mapping[str, Any] | None = None,
-    switch: bool = False,
-    keep_unstable: bool = False,
-    segments: SupportsIndex | None = None,
-    tolerance: float | None = None,
-    points: SupportsIndex | None = None,
-    progress: Progress = None,
-) -> Trace: ...
-
-
-@overload
-def trace(
-    scenario: Source,
-    vary: tuple[str, str] | list[str],
-    *,
-    set: Mapping[str, Any] | None = None,
-    switch: bool = False,
-    keep_unstable: bool = False,
-    segments: SupportsIndex | None = None,
-    tolerance: float | None = None,
-    points: SupportsIndex | None = None,
-    progress: Progress = None,
-) -> Boundary: ...
-
-
-def trace(
-    scenario: Source,
-    vary: str | tuple[str, str] | list[str],
-    *,
-    set: Mapping[str, Any] | None = None,
-    switch: bool = False,
-    keep_unstable: bool = False,
-    segments: SupportsIndex | None = None,
-    tolerance: float | None = None,
-    points: SupportsIndex | None = None,
-    progress: Progress = None,
-) -> Trace | Boundary:
-    """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way. With
-    two numbers: follow the points at which its stability changes through both, as curves.
-
-    Parameters
-    ----------
-    vary
-        ``"KEY=FROM..TO[:COUNT][log]"``, as in ``"load.gravity[2]=0..-4"``; or a list of two.
-    switch
-        Also follow the branches that cross.
-    points
-        Most points of a branch, or of a curve to either side.
-
-    The others are those of `relax`.
-
-    Returns
-    -------
-    Trace
-        Of one number: the branches.
-    Boundary
-        Of two numbers: the curves.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is refused.
-    ValueError
-        If the number cannot be followed, or the request cannot be met.
-
-    Warns
-    -----
-    LeafWarning
-        If not all is known as far as was asked: why.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> import numpy as np
-    >>> trace = leafdyn.trace("scenarios/classic/cantilever_tip.toml", "load.tip_force[2]=0..-2")
-    >>> trace.complete, bool(trace.branches[0].stable.all())
-    (True, True)
-
-    Euler's column, at which bending stiffness does which force buckle it?
-
-    >>> column = {
-    ...     "name": "column",
-    ...     "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
-    ...     "stiffness": {"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0, "axial": "inf", "shear_2": "inf", "shear_3": "inf"},
-    ... }
-    >>> found = leafdyn.trace(column, ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.5..2:3"])
-    >>> curve = found.curves[0]
-    >>> bool(abs(curve.values[:, 0] / curve.values[:, 1] / (-np.pi**2 / 4) - 1).max() < 1e-5)
-    True
-    """
-    whole(segments=segments, points=points)
-    numbers(tolerance=tolerance)
-    switches(switch=switch, keep_unstable=keep_unstable)
-    keys = texts("vary", vary, "load.gravity[2]=-1..-2")
-    if not isinstance(vary, str) and len(keys) != 2:
-        raise ValueError(f"vary has {len(keys)} numbers: give one as a text, or a list of two")
-    leaf = checked(scenario, set)
-    asked = {
-        "switch": switch,
-        "keep_unstable": keep_unstable,
-        "segments": segments,
-        "tolerance": tolerance,
-        "points": points,
-    }
-    found: Trace | Boundary
-    with reporter(progress) as heard:
-        if isinstance(vary, str):
-            found = Trace(*_leafdyn.trace(leaf._core, vary, asked, heard))
-        else:
-            found = Boundary(*_leafdyn.boundary(leaf._core, keys[0], keys[1], asked, heard))
-    warn(found.name, found.remark)
-    return found
-
-
-def map(
-    scenario: Source,
-    vary: str | Iterable[str],
+    vary: Vary,
     *,
     set: Mapping[str, Any] | None = None,
     methods: str | Iterable[str] | None = None,
@@ -240,7 +121,8 @@ def map(
     Parameters
     ----------
     vary
-        One or two of ``"KEY=FROM..TO[:COUNT][log]"``.
+        One or two numbers: texts ``"KEY=FROM..TO[:COUNT][log]"``, or ``{"KEY": range}``, whose ranges are
+        ``(low, high)``, ``(low, high, "log")``, ``(low, high, count)`` or an array of values.
     methods
         One or more; left out: all.
     cell_seconds
@@ -266,15 +148,16 @@ def map(
     Examples
     --------
     >>> import leafdyn
-    >>> found = leafdyn.map(
-    ...     "scenarios/paper/fig04.toml", "load.gravity[2]=-1..-4:3", set={"leaf.rods": 3}, methods=["semi-implicit"]
+    >>> weights = {"load.gravity[2]": (-1, -4, 3)}
+    >>> found = leafdyn.stability_map(
+    ...     "scenarios/paper/fig04.toml", weights, set={"leaf.rods": 3}, methods=["semi-implicit"]
     ... )
     >>> list(found.columns["outcome"])
     [np.str_('right'), np.str_('right'), np.str_('right')]
     """
     numbers(tolerance=tolerance, cell_seconds=cell_seconds)
     text("show", show, "outcomes")
-    axes = texts("vary", vary, "load.gravity[2]=-1..-2")
+    axes = ranges(vary)
     words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
@@ -339,124 +222,3 @@ def chart(
     for remark in found.remarks:
         warn(leaf.name, remark)
     return found
-
-
-def simulate(
-    scenario: Source,
-    *,
-    set: Mapping[str, Any] | None = None,
-    method: str | None = None,
-    segments: SupportsIndex | None = None,
-    step: float | None = None,
-    tolerance: float | None = None,
-    progress: Progress = None,
-) -> Motion:
-    """Follow a leaf as it moves, and keep all outputs.
-
-    Parameters
-    ----------
-    method
-        ``"explicit"`` or ``"semi-implicit"``; left out: the one that costs less;
-        ``to_dict()["choice"]`` says why.
-    segments
-        Segments a rod; left out: 16, or as many as the rest shape needs.
-    step
-        The longest time step; left out: as the method needs.
-    tolerance
-        Of the semi-implicit method: the local error of a step, relative to the longest rod.
-
-    The others are those of `relax`.
-
-    Returns
-    -------
-    Motion
-        Arrays whose first axis is time, in the units of the scenario: ``positions`` of shape (T, N, M + 1, 3).
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is refused.
-    ValueError
-        If the request cannot be met.
-
-    Warns
-    -----
-    LeafWarning
-        Why it ended early; that it starts at an unstable equilibrium.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> motion = leafdyn.simulate("scenarios/motion/swing.toml", set={"dynamics.duration": 1.0})
-    >>> motion.outcome, motion.positions.shape[0] == len(motion.times)
-    ('completed', True)
-    """
-    leaf, core = _motion(scenario, set, method, segments, step, tolerance)
-    with reporter(progress) as heard:
-        core.follow(heard)
-    found = Motion(core, leaf.name, leaf.joined)
-    warn(found.name, found.remark, *found.doubts)
-    return found
-
-
-def _motion(
-    scenario: Source,
-    set: Mapping[str, Any] | None,
-    method: str | None,
-    segments: SupportsIndex | None,
-    step: float | None,
-    tolerance: float | None,
-) -> tuple[Scenario, _leafdyn.Motion]:
-    """A leaf that is about to move."""
-    whole(segments=segments)
-    numbers(step=step, tolerance=tolerance)
-    if method is not None:
-        text("method", method, "explicit")
-    leaf = checked(scenario, set)
-    return leaf, _leafdyn.Motion(leaf._core, method, segments, step, tolerance)
-
-
-def frames(
-    scenario: Source,
-    *,
-    set: Mapping[str, Any] | None = None,
-    method: str | None = None,
-    segments: SupportsIndex | None = None,
-    step: float | None = None,
-    tolerance: float | None = None,
-) -> Iterator[Frame]:
-    """Follow a leaf as it moves, an output at a time, so that memory does not grow. Parameters are those of `simulate`.
-
-    Returns
-    -------
-    iterator of Frame
-        The outputs, that of time 0 first: ``positions`` of shape (N, M + 1, 3), in the units of the scenario.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is refused.
-    ValueError
-        If the request cannot be met.
-
-    Warns
-    -----
-    LeafWarning
-        Before the first output: that it starts at an unstable equilibrium. Behind the last: why it ended early.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> for frame in leafdyn.frames("scenarios/motion/swing.toml"):
-    ...     if frame.time > 0.2:
-    ...         break
-    >>> frame.positions.shape == frame.velocities.shape
-    True
-    """
-    leaf, core = _motion(scenario, set, method, segments, step, tolerance)
-    warn(leaf.name, *core.doubts)
-    outputs: dict[str, Any] | None = core.frame()
-    while outputs is not None:
-        yield frame(outputs)
-        outputs = core.next()
-    warn(leaf.name, core.outcome[1])

@@ -9,6 +9,7 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
+from ._attribute import Attribute
 from ._result import Result
 
 
@@ -18,12 +19,9 @@ class Page:
     In a notebook it is shown by itself. Elsewhere `path` is its file.
     """
 
-    html: str
-    """The whole page."""
-    path: Path | None
-    """Its file, if there is one."""
-    height: int
-    """How high it is in a notebook, in pixels."""
+    html = Attribute[str]("The whole page.")
+    path = Attribute[Path | None]("Its file, if there is one.")
+    height = Attribute[int]("How high it is in a notebook, in pixels.")
 
     def __init__(self, html: str, height: int) -> None:
         self.html, self.height = html, height

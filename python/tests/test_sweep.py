@@ -1,0 +1,104 @@
+"""A sweep finds what single leaves find, in the order of its grid."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from leaves import column, fan
+
+import leafdyn
+
+pandas = pytest.importorskip("pandas")
+
+WANTED = [
+    *("tip_x", "tip_y", "tip_z", "energy"),
+    *("stable", "negative_eigenvalues", "error_estimate", "outcome"),
+]
+GRID: dict[str, Any] = {"leaf.rods": [2, 3], "load.gravity[2]": np.array([-1.0, -2.0, -4.0])}
+
+
+def test_a_grid_row_by_row() -> None:
+    table = leafdyn.sweep(fan(2), GRID, set={"units.length": "cm", "units.force": "N"})
+    assert table.columns.tolist() == [*GRID, *WANTED]
+    assert table["leaf.rods"].tolist() == [2, 2, 2, 3, 3, 3]
+    for _, row in table.iterrows():
+        leaf = leafdyn.relax(fan(2), set={key: row[key] for key in GRID})
+        assert leaf.tip is not None
+        assert [row["tip_x"], row["tip_y"], row["tip_z"]] == leaf.tip.tolist()
+        for name in ("energy", "stable", "negative_eigenvalues", "error_estimate", "outcome"):
+            assert row[name] == getattr(leaf, name)
+    assert table.attrs["scenario"] == "fan"
+    lengths = dict.fromkeys(("tip_x", "tip_y", "tip_z", "error_estimate"), "cm")
+    assert table.attrs["units"] == {"load.gravity[2]": "N cm^-1", **lengths, "energy": "N cm"}
+
+
+def test_every_column() -> None:
+    names = "reaction_x lowest_eigenvalue frequency_2 path success neutral_directions wall_seconds remark".split()
+    held = {"tip.held": "pinned", "tip.position": [0.9, 0.3, 0.1]}
+    table = leafdyn.sweep(fan(3), {"load.gravity[2]": (-1, -2, 2)}, names, set=held)
+    leaf = leafdyn.relax(fan(3), modes=2, set={**held, "load.gravity[2]": -2})
+    assert leaf.eigenvalues is not None and leaf.frequencies is not None and leaf.tip_reaction is not None
+    last = table.iloc[-1]
+    assert last["reaction_x"] == leaf.tip_reaction[0]
+    assert last["lowest_eigenvalue"] == leaf.eigenvalues[0]
+    assert last["frequency_2"] == leaf.frequencies[1] / (2 * np.pi)
+    assert last["success"] and last["wall_seconds"] > 0
+    free = leafdyn.sweep(fan(2), {"load.gravity[2]": [-1.0]}, "reaction_x")
+    assert free["reaction_x"].isna().all()
+
+
+def test_functions_words_and_lists() -> None:
+    highest = {"top": lambda leaf: leaf.positions[..., 2].max()}
+    fans = {"leaf.fan": ["paper", "symmetric", [0.1, 0.3]]}
+    table = leafdyn.sweep(fan(2), fans, highest)
+    assert table["leaf.fan"].tolist() == fans["leaf.fan"]
+    assert table["top"][2] == leafdyn.relax(fan(2), set={"leaf.fan": [0.1, 0.3]}).positions[..., 2].max()
+
+
+def test_keys_that_go_together_and_ranges() -> None:
+    both = leafdyn.sweep(fan(2), {"stiffness.bending_2+stiffness.bending_3": (0.1, 10, 3, "log")}, "tip_z")
+    assert np.allclose(both.iloc[:, 0], [0.1, 1, 10])
+    alone = leafdyn.relax(fan(2), set={"stiffness.bending_2": 10.0, "stiffness.bending_3": 10.0})
+    assert alone.tip is not None and both["tip_z"].iloc[-1] == pytest.approx(alone.tip[2])
+    assert len(leafdyn.sweep(fan(2), {"scale:stiffness.bending_2": (1, 2)}, "tip_z")) == 11
+
+
+def test_leaves_that_do_not_come_to_rest_are_counted() -> None:
+    with pytest.warns(leafdyn.LeafWarning, match="fan: 2 of 3 leaves are not at rest.*see the column outcome") as said:
+        table = leafdyn.sweep(fan(2), {"load.gravity[2]": [-1.0, -1000.0, -2000.0]}, segments=4)
+    assert len(said) == 1
+    assert (table["outcome"] == "converged").tolist() == [True, False, False]
+
+
+def test_more_leaves_than_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    from leafdyn import _sweep
+
+    weights = np.linspace(-1, -2, 7)
+    wanted = leafdyn.sweep(fan(2), {"load.gravity[2]": weights})
+    monkeypatch.setattr(_sweep, "AT_ONCE", 3)
+    heard: list[tuple[float, float | None]] = []
+    found = leafdyn.sweep(
+        fan(2), {"load.gravity[2]": weights}, progress=lambda done, total, _: heard.append((done, total))
+    )
+    assert found.equals(wanted)
+    assert all(total == 7 for _, total in heard)
+    # The last word of all three parts.
+    assert {3, 6, 7} <= {done for done, _ in heard}
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(leafdyn.ScenarioError, match=r"^at leaf.rods = 2, stiffness.torsion = -1: .*greater than 0"):
+        leafdyn.sweep(fan(2), {"leaf.rods": [2], "stiffness.torsion": [1, -1]})
+    with pytest.raises(ValueError, match="columns: 'tip' is not known"):
+        leafdyn.sweep(fan(2), GRID, ["tip"])
+    with pytest.raises(TypeError, match="leaf.rods: 3: must be a list"):
+        leafdyn.sweep(fan(2), {"leaf.rods": 3})
+
+
+def test_the_workers_of_a_client(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("dask.distributed")
+    wanted = leafdyn.sweep(fan(2), GRID)
+    with distributed.Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
+        found = leafdyn.sweep(fan(2), GRID, client=client)
+    assert found.equals(wanted)
