@@ -1,6 +1,7 @@
 //! Stiffnesses from measurements.
 
 mod coverage;
+mod dialects;
 mod ends;
 mod grips;
 mod hanging;

@@ -1,0 +1,328 @@
+//! Tables of numbers, as instruments, spreadsheets and people write them.
+
+mod decimals;
+mod decoded;
+mod lines;
+mod units;
+
+pub(super) use decoded::refuse;
+
+use super::FitError;
+use super::columns::{NAME, Reading, is_known};
+use decimals::{Decimals, Mark, is_number};
+use decoded::decode;
+use lines::{Line, Lines};
+
+/// A parsed table.
+pub(super) struct Table<'t> {
+    pub file: &'t str,
+    /// Line of the header, counted from 1.
+    pub header_line: usize,
+    /// Names of the columns here.
+    pub header: Vec<String>,
+    /// Names of all columns in the file.
+    pub names: Vec<String>,
+    /// Number of lines that are comments, and of those among them below the header.
+    pub comments: [usize; 2],
+    /// What the file was taken for, where that is not the usual CSV.
+    pub taken: Vec<String>,
+    /// What was left out.
+    pub left_out: Vec<String>,
+    sources: Vec<Source>,
+    rows: Vec<Line>,
+    decimals: Decimals,
+}
+
+/// Where a column stands, and what makes its numbers those of the scenario.
+struct Source {
+    at: usize,
+    factor: f64,
+    offset: f64,
+}
+
+impl Source {
+    fn plain(at: usize) -> Self {
+        Source {
+            at,
+            factor: 1.0,
+            offset: 0.0,
+        }
+    }
+}
+
+fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+    (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
+}
+
+impl<'t> Table<'t> {
+    pub fn of(bytes: &[u8], file: &'t str, reading: &Reading) -> Result<Self, FitError> {
+        let decoded = decode(bytes, file)?;
+        let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
+        let known = |name: &str| is_known(name) || mapped(name).is_some();
+        let named = |name: &str| match mapped(name) {
+            Some(map) => map.quantity == NAME,
+            None => name == NAME,
+        };
+        let Some(lines) = Lines::of(&decoded.text, &known, &named) else {
+            let why = "is empty: give a header, and a row for each datum";
+            return Err(refuse(file, 1, why));
+        };
+        let (above, below) = lines.lines.split_at(lines.header);
+        let (header, below) = (&below[0], &below[1..]);
+        let one_line = |name: &str| name.split_whitespace().collect::<Vec<_>>().join(" ");
+        let names: Vec<String> = header.cells().map(one_line).collect();
+        let mut table = Table {
+            file,
+            header_line: header.number,
+            header: Vec::new(),
+            names,
+            comments: lines.comments,
+            taken: Vec::new(),
+            left_out: Vec::new(),
+            sources: Vec::new(),
+            rows: Vec::new(),
+            decimals: Decimals::of(std::iter::empty(), file)?,
+        };
+        table.check_header(header)?;
+        let above = above.iter().filter(|line| !line.is_blank()).count();
+        table.rows = below
+            .iter()
+            .filter(|line| !line.is_blank())
+            .cloned()
+            .collect();
+        let blank = below.len() - table.rows.len();
+        let units = table.take_units();
+        table.check_widths()?;
+        let unused = table.choose_columns(reading)?;
+        table.check_rows()?;
+        let numbers = table.sources.iter().zip(&table.header);
+        let numbers = numbers
+            .filter(|(_, name)| *name != NAME)
+            .map(|(source, _)| source.at);
+        let numbers: Vec<usize> = numbers.collect();
+        let cells = (table.rows.iter())
+            .flat_map(|row| numbers.iter().map(|at| (row.number, row.cell(*at))));
+        table.decimals = Decimals::of(cells, file)?;
+        let all = table.rows.len();
+        let every = reading.every.get();
+        table.rows = std::mem::take(&mut table.rows)
+            .into_iter()
+            .step_by(every)
+            .collect();
+        let decimals = match table.decimals.mark {
+            Mark::Point => [None, Some("thousands divided by commas")],
+            Mark::Comma => [Some("decimal commas"), Some("thousands divided by points")],
+        };
+        let separator = format!("cells divided by {}", lines.separator);
+        let divided = lines.separator != "commas" && table.names.len() > 1;
+        let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
+        let thinned = format!("rows 1, {second}, {third}, ... of {all}");
+        table.taken = [
+            divided.then_some(separator),
+            decimals[0].map(String::from),
+            decimals[1]
+                .filter(|_| table.decimals.grouped)
+                .map(String::from),
+            decoded
+                .encoding
+                .map(|encoding| format!("text in {encoding}")),
+            (every > 1).then_some(thinned),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        table.left_out = [
+            counted(
+                table.comments[0],
+                "line that is a comment",
+                "lines that are comments",
+            ),
+            counted(above, "line before the header", "lines before the header"),
+            units.map(|units| format!("a row of units ({units}; nothing is converted)")),
+            counted(blank, "blank row", "blank rows"),
+        ]
+        .into_iter()
+        .flatten()
+        .chain(unused)
+        .collect();
+        Ok(table)
+    }
+
+    fn check_header(&self, header: &Line) -> Result<(), FitError> {
+        if header.cells().any(is_number) {
+            let why = "has no header: the first line names the columns, such as \
+                       load.tip_force[0],tip_x,sd_tip_x, or rod,sigma,x,y,z";
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        if let [name] = self.names.as_slice()
+            && name
+                .split_whitespace()
+                .filter(|word| is_known(word))
+                .count()
+                > 1
+        {
+            let why = "columns are divided by blanks: divide them by commas, semicolons or tabs";
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        Ok(())
+    }
+
+    /// Removes the row of units below the header, and returns it.
+    fn take_units(&mut self) -> Option<String> {
+        let first = self
+            .rows
+            .first()
+            .filter(|row| units::are_units(row.cells()))?;
+        let units: Vec<&str> = first.cells().filter(|cell| !cell.is_empty()).collect();
+        let units = units.join(", ");
+        self.rows.remove(0);
+        Some(units)
+    }
+
+    /// Rows may have more cells than the header, or fewer, where these are empty and have no names.
+    fn check_widths(&self) -> Result<(), FitError> {
+        let wanted = self.names.len();
+        let last = self.names.iter().rposition(|name| !name.is_empty());
+        let least = last.map_or(0, |last| last + 1);
+        for row in &self.rows {
+            let found = row.len();
+            if found < least || row.cells().skip(wanted).any(|cell| !cell.is_empty()) {
+                let why = format!(
+                    "has {found} cells, and the header {wanted}: cells that are divided by commas \
+                     have numbers with a decimal point; with decimal commas divide them by \
+                     semicolons or tabs"
+                );
+                return Err(refuse(self.file, row.number, why));
+            }
+        }
+        Ok(())
+    }
+
+    /// Chooses the columns that are used, and returns words for others.
+    fn choose_columns(&mut self, reading: &Reading) -> Result<Vec<String>, FitError> {
+        let (mut unnamed, mut unused) = (None, Vec::new());
+        let maps_of = |name: &str| {
+            let maps = reading.columns.iter();
+            maps.filter(|map| map.name == name).collect::<Vec<_>>()
+        };
+        // With names given for columns of a file, others that mean nothing here are not meant.
+        let some_given = self.names.iter().any(|name| !maps_of(name).is_empty());
+        for (at, name) in self.names.iter().enumerate() {
+            let maps = maps_of(name);
+            if name.is_empty() {
+                let is_used = self.rows.iter().any(|row| !row.cell(at).is_empty());
+                if is_used && at > 0 {
+                    let why = format!(
+                        "column {} has no name, and cells below: name it, or leave it out",
+                        at + 1
+                    );
+                    return Err(refuse(self.file, self.header_line, why));
+                }
+                unnamed = unnamed.or(is_used.then(|| "the first column, without a name".into()));
+            } else if maps.is_empty() && some_given && !is_known(name) {
+                unused.push(name.as_str());
+            } else if maps.is_empty() {
+                self.header.push(name.clone());
+                self.sources.push(Source::plain(at));
+            }
+            for map in maps {
+                self.header.push(map.quantity.clone());
+                self.sources.push(Source {
+                    at,
+                    factor: map.factor,
+                    offset: map.offset,
+                });
+            }
+        }
+        for (k, name) in self.header.iter().enumerate() {
+            if let Some(first) = self.header[..k].iter().position(|other| other == name) {
+                let [first, second] = [first, k].map(|k| self.sources[k].at);
+                let [one, other] = [first, second].map(|at| &self.names[at]);
+                let why = match one == other {
+                    true => format!(
+                        "the column {one} stands there twice (columns {} and {}): rename one, or \
+                         leave it out",
+                        first + 1,
+                        second + 1
+                    ),
+                    false => {
+                        format!("the columns {one} and {other} both are {name}: leave one out")
+                    }
+                };
+                return Err(refuse(self.file, self.header_line, why));
+            }
+        }
+        let unused = (!unused.is_empty()).then(|| format!("the columns {}", unused.join(", ")));
+        Ok(unnamed.into_iter().chain(unused).collect())
+    }
+
+    fn check_rows(&self) -> Result<(), FitError> {
+        if self.rows.is_empty() {
+            let why = match self.comments[0] {
+                0 => "has no row below the header".into(),
+                comments => format!(
+                    "has no row below the header ({comments} lines that begin with # are comments)"
+                ),
+            };
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        let broken = |row: &&Line| row.cells().any(|cell| cell.contains('\n'));
+        if let Some(row) = self.rows.iter().find(broken) {
+            let why = "a quotation mark is not closed in this line: close it, and write a name \
+                       on one line";
+            return Err(refuse(self.file, row.number, why));
+        }
+        Ok(())
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Line of a row, counted from 1.
+    pub fn line(&self, row: usize) -> usize {
+        self.rows[row].number
+    }
+
+    /// Where a column is.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|known| known == name)
+    }
+
+    pub fn cell(&self, row: usize, column: usize) -> &str {
+        self.rows[row].cell(self.sources[column].at)
+    }
+
+    /// The number in a cell; `None` if it is empty.
+    pub fn number(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let cell = self.cell(row, column);
+        if cell.is_empty() {
+            return Ok(None);
+        }
+        let source = &self.sources[column];
+        let value = self.decimals.number(cell);
+        let value = value.map(|value| match (source.factor, source.offset) {
+            (1.0, 0.0) => value,
+            (factor, offset) => value * factor + offset,
+        });
+        if let Some(value) = value.filter(|value| value.is_finite()) {
+            return Ok(Some(value));
+        }
+        let name = &self.header[column];
+        let why = format!(
+            "{name} = {cell}: must be a finite number, or empty where nothing was measured"
+        );
+        Err(refuse(self.file, self.line(row), why))
+    }
+
+    pub fn positive(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let number = self.number(row, column)?;
+        if let Some(value) = number.filter(|value| *value <= 0.0) {
+            let name = &self.header[column];
+            let why = format!("{name} = {value}: a standard deviation is greater than 0");
+            return Err(refuse(self.file, self.line(row), why));
+        }
+        Ok(number)
+    }
+}
