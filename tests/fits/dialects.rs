@@ -4,12 +4,11 @@
 use leafdyn::study::{Data, FitRequest, MeasuredColumn, Reading, fit};
 use leafdyn_testing::fit::{LEAF, request};
 use leafdyn_testing::*;
-use proptest::prelude::*;
 
 /// What the tables below say of a tip that is pulled: force and place.
 const PULLS: [[f64; 2]; 3] = [[-0.25, -0.0632], [-0.5, -0.1254], [-1.0, -0.2414]];
 
-fn utf16(text: &str, unit: fn(u16) -> [u8; 2]) -> Vec<u8> {
+pub fn utf16(text: &str, unit: fn(u16) -> [u8; 2]) -> Vec<u8> {
     let units = std::iter::once(0xfeff).chain(text.encode_utf16());
     units.flat_map(unit).collect()
 }
@@ -45,12 +44,12 @@ fn read_with(
     read.map(|()| data).map_err(|refused| refused.to_string())
 }
 
-fn read(table: impl AsRef<[u8]>) -> Result<Data, String> {
+pub fn read(table: impl AsRef<[u8]>) -> Result<Data, String> {
     read_with(table, 5, &[], 1)
 }
 
 /// Settings and results of every experiment, one after the other.
-fn numbers(data: &Data) -> Vec<Vec<f64>> {
+pub fn numbers(data: &Data) -> Vec<Vec<f64>> {
     let experiments = data.experiments.iter();
     let rows = experiments.map(|experiment| {
         let settings = experiment.settings.iter().map(|(_, value)| *value);
@@ -197,7 +196,8 @@ fn commas_are_not_guessed() {
 
 /// Tables in lines between `|`, `=>` and a part of the refusal.
 const REFUSED: &str = "
-    Vein,,Margin,|X,Y,X,Y|0.9,-0.1,0.9,-0.2 => data.csv:2: unknown column X: columns are keys
+    Vein,,Margin,|X,Y,X,Y|0.9,-0.1,0.9,-0.2 => data.csv:2: unknown column Vein X: columns are keys
+    X,Y,X,Y|0.9,-0.1,0.9,-0.2 => data.csv:1: the column X stands there twice (columns 1 and 3)
     ,Area,X,Y|1,0,898.08,450.56 => data.csv:1: unknown column Area
     load.tip_force[2],tip_z|-0,25,-0,06 => data.csv:2: has 4 cells, and the header 2
     made up|load.tip_force[2];tip_w|1;2 => data.csv:2: unknown column tip_w
@@ -242,7 +242,7 @@ fn columns_are_renamed_and_converted() {
     assert_eq!(numbers(&data), wanted);
     let said = said(&data);
     assert!(
-        said.ends_with("(s, N, mm; nothing is converted), the columns Time"),
+        said.ends_with("(s, N, mm; nothing is converted), the column Time"),
         "{said}"
     );
 
@@ -255,6 +255,17 @@ fn columns_are_renamed_and_converted() {
         .collect();
     let at = |x: f64, y: f64| [Some(x * 1e-3), None, Some(y * -1e-3 + 0.5)];
     assert_eq!(points, [(0, at(898.08, 450.56)), (0, at(892.3199, 500.32))]);
+
+    // Names that stand there twice have those of their groups before them, and groups their own length.
+    let groups = "Vein,,Margin,\nX,Y,X,Y\n0.9976,-0.0632,0.9,-0.1\n0.9904,-0.1254,,\n,,0.7,-0.3\n";
+    let data = read_with(groups, 1, &["Vein X=x", "Vein Y=z"], 1).unwrap();
+    let points: Vec<_> = data.traced.iter().map(|point| point.at).collect();
+    let at = |x, z| [Some(x), None, Some(z)];
+    assert_eq!(points, [at(0.9976, -0.0632), at(0.9904, -0.1254)]);
+    assert_eq!(
+        self::said(&data),
+        " | 1 blank row, the columns Margin X, Margin Y"
+    );
 
     let refused = read_with("A,X,X\n1,2,3\n", 1, &["X=x", "A=z"], 1).unwrap_err();
     assert!(refused.contains("data.csv:1: the column X stands there twice (columns 2 and 3)"));
@@ -301,7 +312,7 @@ fn rows_are_thinned() {
     let data = read_with(&table, 5, &[], 4).unwrap();
     let forces: Vec<f64> = numbers(&data).iter().map(|row| row[0]).collect();
     assert_eq!(forces, [0.0, 4.0, 8.0]);
-    assert_eq!(said(&data), "rows 1, 5, 9, ... of 10 | ");
+    assert_eq!(said(&data), "rows 1, 5, 9 and so on of 10 | ");
     let lines = data
         .experiments
         .iter()
@@ -315,129 +326,4 @@ fn candidates_may_have_other_names() {
     let table = "Force;tip_z\n0,5;\n";
     let found = FitRequest::read_candidates(table, "next.csv", &[column]).unwrap();
     assert_eq!(found[0].settings[0].1, 0.5);
-}
-
-/// The lines of a table between which others may stand.
-#[derive(Clone, Debug)]
-struct Dialect {
-    separator: &'static str,
-    comma: bool,
-    minus: bool,
-    end: &'static str,
-    quoted: bool,
-    before: usize,
-    units: bool,
-    blank: bool,
-    behind: bool,
-    encoding: usize,
-}
-
-fn dialect() -> impl Strategy<Value = Dialect> {
-    let separator = prop::sample::select(vec![",", ";", "\t"]);
-    let end = prop::sample::select(vec!["\n", "\r\n"]);
-    let flags = prop::array::uniform6(any::<bool>());
-    (separator, end, flags, 0..3_usize, 0..4_usize).prop_map(
-        |(separator, end, [comma, minus, quoted, units, blank, behind], before, encoding)| {
-            Dialect {
-                separator,
-                comma: comma && separator != ",",
-                minus,
-                end,
-                quoted,
-                before,
-                units,
-                blank,
-                behind,
-                encoding,
-            }
-        },
-    )
-}
-
-impl Dialect {
-    fn write(&self, rows: &[[f64; 2]]) -> Vec<u8> {
-        let number = |x: f64| {
-            let text = format!("{x:?}");
-            let text = if self.comma {
-                text.replace('.', ",")
-            } else {
-                text
-            };
-            if self.minus {
-                text.replace('-', "\u{2212}")
-            } else {
-                text
-            }
-        };
-        let quoted = |cell: String| {
-            if self.quoted {
-                format!("\"{cell}\"")
-            } else {
-                cell
-            }
-        };
-        let behind = if self.behind { self.separator } else { "" };
-        let line = |cells: [String; 2]| cells.map(quoted).join(self.separator) + behind;
-        let mut lines = vec![format!("Specimen{}leaf", self.separator); self.before];
-        lines.push(line(["load.tip_force[2]", "tip_z"].map(String::from)));
-        if self.units {
-            lines.push(line(["[N]", ""].map(String::from)));
-        }
-        for row in rows {
-            lines.push(line(row.map(number)));
-            if self.blank {
-                lines.push(self.separator.into());
-                lines.push(String::new());
-            }
-        }
-        let text: String = lines
-            .iter()
-            .map(|line| format!("{line}{}", self.end))
-            .collect();
-        match self.encoding {
-            0 => text.into(),
-            1 => format!("\u{feff}{text}").into(),
-            2 => utf16(&text, u16::to_le_bytes),
-            _ => utf16(&text, u16::to_be_bytes),
-        }
-    }
-}
-
-proptest! {
-    /// A table is read as the numbers that were written, to the last bit, whatever the dialect.
-    /// A number whose mark cannot be told is refused, not read as another.
-    #[test]
-    fn what_is_written_is_read(
-        rows in prop::collection::vec([-1e6..1e6, -1.0..1.0], 1..6),
-        dialect in dialect(),
-    ) {
-        match read(dialect.write(&rows)) {
-            Ok(data) => {
-                let wanted: Vec<Vec<f64>> = rows.iter().map(|row| row.to_vec()).collect();
-                prop_assert_eq!(numbers(&data), wanted);
-            }
-            Err(refused) => prop_assert!(
-                refused.contains("may be") || refused.contains("thousands divided"), "{}", refused
-            ),
-        }
-    }
-
-    /// The same of numbers with three decimals at most, as balances write them: those that could
-    /// be thousands.
-    #[test]
-    fn thousandths_are_never_thousands(
-        thousandths in prop::collection::vec([-2_000_000..2_000_000_i32, -9999..9999_i32], 1..5),
-        dialect in dialect(),
-    ) {
-        let rows: Vec<[f64; 2]> = thousandths.iter().map(|row| row.map(|x| f64::from(x) / 1000.0)).collect();
-        match read(dialect.write(&rows)) {
-            Ok(data) => {
-                let wanted: Vec<Vec<f64>> = rows.iter().map(|row| row.to_vec()).collect();
-                prop_assert_eq!(numbers(&data), wanted);
-            }
-            Err(refused) => prop_assert!(
-                refused.contains("may be") || refused.contains("thousands divided"), "{}", refused
-            ),
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 mod coverage;
 mod dialects;
+mod dialects_written;
 mod ends;
 mod grips;
 mod hanging;

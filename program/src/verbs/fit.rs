@@ -32,7 +32,7 @@ pub struct Fit {
     column: Vec<MeasuredColumn>,
 
     /// Read the first row of each file of data, and then every K-th
-    #[arg(long, value_name = "K", default_value = "1", hide_default_value = true)]
+    #[arg(long, value_name = "K", default_value = "1", hide_default_value = true, value_parser = step_of)]
     every: NonZeroUsize,
 
     /// A number that is free, by its key as in --vary, and its bounds; of a list or a profile every entry; may repeat
@@ -51,6 +51,11 @@ pub struct Fit {
     /// Experiments that could be made, as CSV like the data: which would say most?
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
     candidates: Option<PathBuf>,
+}
+
+/// Parses the distance of rows.
+fn step_of(text: &str) -> Result<NonZeroUsize, &'static str> {
+    text.parse().map_err(|_| "must be a whole number from 1")
 }
 
 impl Fit {

@@ -233,7 +233,10 @@ pub fn candidates(
 
 /// How a column with another name is used.
 fn renamed(name: &str) -> String {
-    format!("name it so in the file, or say what it is by the option column, as in '{name}=tip_x'")
+    format!(
+        "name it so in the file, or say what it is by the option column, as in '{name}=tip_x': columns \
+         that mean nothing are then left out"
+    )
 }
 
 /// The meaning of a column of experiments.
@@ -260,8 +263,8 @@ fn column(table: &Table, name: &str) -> Result<Column, FitError> {
             true => format!("column {refused}"),
             false => format!(
                 "unknown column {name}: columns are keys of the scenario, such as \
-                 load.tip_force[0], results ({}), their standard deviations (sd_tip_x), and \
-                 experiment, a name; {}",
+                 load.tip_force[0], results ({}), their standard deviations (sd_tip_x), \
+                 experiment, a name, or rod, x, y, z of points on veins; {}",
                 Quantity::ALL,
                 renamed(name)
             ),

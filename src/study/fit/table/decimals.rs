@@ -46,13 +46,17 @@ fn read(cell: &str, mark: Mark) -> Option<f64> {
         if !leads || !groups.all(|group| group.len() == 3) {
             return None;
         }
-        let whole = whole.replace(group, "");
         let fraction = plain.split_once(mark.character());
-        let fraction = fraction.map_or(String::new(), |(_, fraction)| format!(".{fraction}"));
-        if whole.contains(['e', 'E']) || fraction.contains([group, 'e', 'E']) {
+        let fraction = fraction.map_or("", |(_, fraction)| fraction);
+        let digits = |text: &str| text.chars().all(|digit| digit.is_ascii_digit());
+        if !digits(fraction) {
             return None;
         }
-        plain = whole + &fraction;
+        let whole = whole.replace(group, "");
+        if !digits(whole.trim_start_matches(['+', '-'])) {
+            return None;
+        }
+        plain = format!("{whole}.{fraction}");
     } else if mark == Mark::Comma {
         plain = plain.replace(',', ".");
     }

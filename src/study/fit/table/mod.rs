@@ -54,6 +54,28 @@ fn counted(count: usize, one: &str, many: &str) -> Option<String> {
     (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
 }
 
+/// Whether a name stands there twice.
+fn has_repeated(header: &Line) -> bool {
+    let names: Vec<&str> = header.cells().filter(|name| !name.is_empty()).collect();
+    (1..names.len()).any(|k| names[..k].contains(&names[k]))
+}
+
+/// The names of columns, each behind that of its group if there are groups, as in `Vein X`. A
+/// group's name stands above its first column.
+fn names_of(header: &Line, groups: Option<&Line>) -> Vec<String> {
+    let mut group = "";
+    let names = header.cells().enumerate().map(|(at, name)| {
+        let above = groups.map_or("", |groups| groups.cell(at));
+        group = if above.is_empty() { group } else { above };
+        let words = if name.is_empty() { "" } else { group }.split_whitespace();
+        words
+            .chain(name.split_whitespace())
+            .collect::<Vec<_>>()
+            .join(" ")
+    });
+    names.collect()
+}
+
 impl<'t> Table<'t> {
     pub fn of(bytes: &[u8], file: &'t str, reading: &Reading) -> Result<Self, FitError> {
         let decoded = decode(bytes, file)?;
@@ -69,8 +91,10 @@ impl<'t> Table<'t> {
         };
         let (above, below) = lines.lines.split_at(lines.header);
         let (header, below) = (&below[0], &below[1..]);
-        let one_line = |name: &str| name.split_whitespace().collect::<Vec<_>>().join(" ");
-        let names: Vec<String> = header.cells().map(one_line).collect();
+        let groups = above
+            .last()
+            .filter(|line| !line.is_blank() && has_repeated(header));
+        let names = names_of(header, groups);
         let mut table = Table {
             file,
             header_line: header.number,
@@ -85,15 +109,20 @@ impl<'t> Table<'t> {
         };
         table.check_header(header)?;
         let above = above.iter().filter(|line| !line.is_blank()).count();
+        let above = above - usize::from(groups.is_some());
         table.rows = below
             .iter()
             .filter(|line| !line.is_blank())
             .cloned()
             .collect();
-        let blank = below.len() - table.rows.len();
         let units = table.take_units();
         table.check_widths()?;
         let unused = table.choose_columns(reading)?;
+        let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
+        table
+            .rows
+            .retain(|row| ats.iter().any(|at| !row.cell(*at).is_empty()));
+        let blank = below.len() - table.rows.len() - usize::from(units.is_some());
         table.check_rows()?;
         let numbers = table.sources.iter().zip(&table.header);
         let numbers = numbers
@@ -116,7 +145,7 @@ impl<'t> Table<'t> {
         let separator = format!("cells divided by {}", lines.separator);
         let divided = lines.separator != "commas" && table.names.len() > 1;
         let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
-        let thinned = format!("rows 1, {second}, {third}, ... of {all}");
+        let thinned = format!("rows 1, {second}, {third} and so on of {all}");
         table.taken = [
             divided.then_some(separator),
             decimals[0].map(String::from),
@@ -252,7 +281,12 @@ impl<'t> Table<'t> {
                 return Err(refuse(self.file, self.header_line, why));
             }
         }
-        let unused = (!unused.is_empty()).then(|| format!("the columns {}", unused.join(", ")));
+        let columns = if unused.len() == 1 {
+            "column"
+        } else {
+            "columns"
+        };
+        let unused = (!unused.is_empty()).then(|| format!("the {columns} {}", unused.join(", ")));
         Ok(unnamed.into_iter().chain(unused).collect())
     }
 
