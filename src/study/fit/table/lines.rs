@@ -101,14 +101,13 @@ fn header(lines: &[Line], known: &dyn Fn(&str) -> bool) -> Option<(usize, usize)
     counts.rev().max_by_key(|(_, count)| *count)
 }
 
-/// The last line of words before the first with a number.
+/// The last line of words before the first with a number; without numbers, the first line.
 fn unknown_header(lines: &[Line]) -> usize {
-    let words = lines.iter().take_while(|line| !line.cells().any(is_number));
-    let last = words
-        .enumerate()
-        .filter(|(_, line)| !line.is_blank())
-        .last();
-    last.map_or(0, |(at, _)| at)
+    let words = |line: &Line| !line.is_blank() && !line.cells().any(is_number);
+    let first = lines.iter().position(words);
+    let numbers = lines.iter().position(|line| line.cells().any(is_number));
+    let last = numbers.and_then(|end| lines[..end].iter().rposition(words));
+    last.or(first.filter(|_| numbers.is_none())).unwrap_or(0)
 }
 
 impl Lines {

@@ -91,6 +91,17 @@ impl<'t> Table<'t> {
         };
         let (above, below) = lines.lines.split_at(lines.header);
         let (header, below) = (&below[0], &below[1..]);
+        let names_columns = |line: &&Line| {
+            let mut names = line.cells().filter(|name| !name.is_empty());
+            !line.is_blank() && names.all(known)
+        };
+        if let Some(other) = above.iter().find(names_columns) {
+            let why = format!(
+                "names columns, and so does line {}: write each table to a file of its own",
+                header.number
+            );
+            return Err(refuse(file, other.number, why));
+        }
         let groups = above
             .last()
             .filter(|line| !line.is_blank() && has_repeated(header));
@@ -124,45 +135,23 @@ impl<'t> Table<'t> {
             .retain(|row| ats.iter().any(|at| !row.cell(*at).is_empty()));
         let blank = below.len() - table.rows.len() - usize::from(units.is_some());
         table.check_rows()?;
-        let numbers = table.sources.iter().zip(&table.header);
-        let numbers = numbers
-            .filter(|(_, name)| *name != NAME)
-            .map(|(source, _)| source.at);
-        let numbers: Vec<usize> = numbers.collect();
-        let cells = (table.rows.iter())
-            .flat_map(|row| numbers.iter().map(|at| (row.number, row.cell(*at))));
-        table.decimals = Decimals::of(cells, file)?;
+        table.decimals = table.read_decimals()?;
         let all = table.rows.len();
         let every = reading.every.get();
         table.rows = std::mem::take(&mut table.rows)
             .into_iter()
             .step_by(every)
             .collect();
-        let decimals = match table.decimals.mark {
-            Mark::Point => [None, Some("thousands divided by commas")],
-            Mark::Comma => [Some("decimal commas"), Some("thousands divided by points")],
-        };
-        let separator = format!("cells divided by {}", lines.separator);
-        let divided = lines.separator != "commas" && table.names.len() > 1;
-        let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
-        let thinned = format!("rows 1, {second}, {third} and so on of {all}");
-        table.taken = [
-            divided.then_some(separator),
-            decimals[0].map(String::from),
-            decimals[1]
-                .filter(|_| table.decimals.grouped)
-                .map(String::from),
-            decoded
-                .encoding
-                .map(|encoding| format!("text in {encoding}")),
-            (every > 1).then_some(thinned),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
+        table.taken = table.notation(lines.separator, decoded.encoding);
+        if every > 1 {
+            let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
+            let thinned = format!("rows 1, {second}, {third} and so on of {all}");
+            table.taken.push(thinned);
+        }
+        let comments = table.comments[0];
         table.left_out = [
             counted(
-                table.comments[0],
+                comments,
                 "line that is a comment",
                 "lines that are comments",
             ),
@@ -175,6 +164,32 @@ impl<'t> Table<'t> {
         .chain(unused)
         .collect();
         Ok(table)
+    }
+
+    /// How the numbers of all columns that are used are written.
+    fn read_decimals(&self) -> Result<Decimals, FitError> {
+        let columns = self.sources.iter().zip(&self.header);
+        let numbers = columns.filter(|(_, name)| *name != NAME);
+        let numbers: Vec<usize> = numbers.map(|(source, _)| source.at).collect();
+        let rows = self.rows.iter();
+        let cells = rows.flat_map(|row| numbers.iter().map(|at| (row.number, row.cell(*at))));
+        Decimals::of(cells, self.file)
+    }
+
+    /// What the file was taken for, where that is not the usual CSV.
+    fn notation(&self, separator: &str, encoding: Option<&str>) -> Vec<String> {
+        let divided = separator != "commas" && self.names.len() > 1;
+        let group = match self.decimals.mark {
+            Mark::Point => "thousands divided by commas",
+            Mark::Comma => "thousands divided by points",
+        };
+        let said = [
+            divided.then(|| format!("cells divided by {separator}")),
+            (self.decimals.mark == Mark::Comma).then(|| "decimal commas".into()),
+            self.decimals.grouped.then(|| group.into()),
+            encoding.map(|encoding| format!("text in {encoding}")),
+        ];
+        said.into_iter().flatten().collect()
     }
 
     fn check_header(&self, header: &Line) -> Result<(), FitError> {
