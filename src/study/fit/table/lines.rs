@@ -101,13 +101,14 @@ fn header(lines: &[Line], known: &dyn Fn(&str) -> bool) -> Option<(usize, usize)
     counts.rev().max_by_key(|(_, count)| *count)
 }
 
-/// The last line of words before the first with a number; without numbers, the first line.
+/// Of the lines of words above a number the one with most of them; without such lines, the first.
 fn unknown_header(lines: &[Line]) -> usize {
-    let words = |line: &Line| !line.is_blank() && !line.cells().any(is_number);
-    let first = lines.iter().position(words);
-    let numbers = lines.iter().position(|line| line.cells().any(is_number));
-    let last = numbers.and_then(|end| lines[..end].iter().rposition(words));
-    last.or(first.filter(|_| numbers.is_none())).unwrap_or(0)
+    let last = lines.iter().rposition(|line| line.cells().any(is_number));
+    let above = lines[..last.unwrap_or(0)].iter().enumerate();
+    let words = above.filter(|(_, line)| line.is_header());
+    let count = |line: &Line| line.cells().filter(|cell| !cell.is_empty()).count();
+    let most = words.rev().max_by_key(|(_, line)| count(line));
+    most.map_or(0, |(at, _)| at)
 }
 
 impl Lines {
