@@ -200,6 +200,7 @@ const REFUSED: &str = "
     X,Y,X,Y|0.9,-0.1,0.9,-0.2 => data.csv:1: the column X stands there twice (columns 1 and 3)
     ,Area,X,Y|1,0,898.08,450.56 => data.csv:1: unknown column Area
     load.tip_force[2],tip_z|-0,25,-0,06 => data.csv:2: has 4 cells, and the header 2
+    Probe;3|Zeit;Kraft|s;N|1;2 => data.csv:2: unknown column Zeit
     made up|load.tip_force[2];tip_w|1;2 => data.csv:2: unknown column tip_w
     tip_z|1|load.tip_force[2],tip_z|1,2 => data.csv:1: names columns, and so does line 3
     -0.1,-0.2|slipped,again => data.csv:1: has no header

@@ -127,7 +127,7 @@ impl<'t> Table<'t> {
             .cloned()
             .collect();
         let units = table.take_units();
-        table.check_widths()?;
+        table.check_cells()?;
         let unused = table.choose_columns(reading)?;
         let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
         table
@@ -223,8 +223,15 @@ impl<'t> Table<'t> {
         Some(units)
     }
 
-    /// Rows may have more cells than the header, or fewer, where these are empty and have no names.
-    fn check_widths(&self) -> Result<(), FitError> {
+    /// Rows are on one line. They may have more cells than the header, or fewer, where these are
+    /// empty and have no names.
+    fn check_cells(&self) -> Result<(), FitError> {
+        let broken = |row: &&Line| row.cells().any(|cell| cell.contains('\n'));
+        if let Some(row) = self.rows.iter().find(broken) {
+            let why = "a quotation mark is not closed in this line: close it, and write a name \
+                       on one line";
+            return Err(refuse(self.file, row.number, why));
+        }
         let wanted = self.names.len();
         let last = self.names.iter().rposition(|name| !name.is_empty());
         let least = last.map_or(0, |last| last + 1);
@@ -314,12 +321,6 @@ impl<'t> Table<'t> {
                 ),
             };
             return Err(refuse(self.file, self.header_line, why));
-        }
-        let broken = |row: &&Line| row.cells().any(|cell| cell.contains('\n'));
-        if let Some(row) = self.rows.iter().find(broken) {
-            let why = "a quotation mark is not closed in this line: close it, and write a name \
-                       on one line";
-            return Err(refuse(self.file, row.number, why));
         }
         Ok(())
     }
