@@ -1,9 +1,12 @@
 //! Fits numbers of a scenario to measurements.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use leafdyn::scenario;
-use leafdyn::study::{self, Data, Experiment, FitError, FitRequest, FitStep, Free};
+use leafdyn::study::{
+    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading,
+};
 use pyo3::prelude::*;
 
 use crate::errors::{value_error, vary_error};
@@ -21,13 +24,13 @@ pub enum Measurements {
 }
 
 impl Measurements {
-    /// Its name and its text.
-    fn read(self) -> PyResult<(String, String)> {
+    /// Its name and its bytes.
+    fn read(self) -> PyResult<(String, Vec<u8>)> {
         match self {
-            Measurements::Text(name, text) => Ok((name, text)),
+            Measurements::Text(name, text) => Ok((name, text.into())),
             Measurements::File(path) => {
-                let text = scenario::text(&path).map_err(value_error)?;
-                Ok((path.display().to_string(), text))
+                let bytes = scenario::bytes(&path).map_err(value_error)?;
+                Ok((path.display().to_string(), bytes))
             }
         }
     }
@@ -51,23 +54,34 @@ pub fn fit(
     free: Vec<String>,
     robust: bool,
     candidates: Option<Measurements>,
+    columns: Vec<String>,
+    every: NonZeroUsize,
     tolerance: Option<f64>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Files> {
     let rods = scenario.checked.rods.len();
-    let mut measured = Data::default();
+    let columns: Result<Vec<MeasuredColumn>, FitError> =
+        columns.iter().map(|column| column.parse()).collect();
+    let columns = columns.map_err(|error| fit_error(py, error))?;
+    let mut measured = Data {
+        reading: Reading {
+            columns: columns.clone(),
+            every,
+        },
+        ..Data::default()
+    };
     for table in data {
-        let (name, text) = table.read()?;
+        let (name, bytes) = table.read()?;
         measured
-            .read(&text, &name, rods)
+            .read(bytes, &name, rods)
             .map_err(|error| fit_error(py, error))?;
     }
     let free: Result<Vec<Free>, FitError> = free.iter().map(|number| number.parse()).collect();
     let candidates: Option<Vec<Experiment>> = match candidates {
         None => None,
         Some(table) => {
-            let (name, text) = table.read()?;
-            let candidates = FitRequest::read_candidates(&text, &name);
+            let (name, bytes) = table.read()?;
+            let candidates = FitRequest::read_candidates(bytes, &name, &columns);
             Some(candidates.map_err(|error| fit_error(py, error))?)
         }
     };

@@ -123,7 +123,7 @@ def test_what_the_data_do_not_say() -> None:
         ({"tip_x": [1.0, 2.0], "tip_y": [1.0, 2.0, 3.0]}, AXIAL, "tip_x has 2 rows, and others have 3"),
         ({"tip_x": [[1.0, 2.0]]}, AXIAL, "data: tip_x: a column is a list of numbers"),
         ({"tip_x": [True]}, AXIAL, "data: tip_x = True: must be a number"),
-        ({"tip_x": [1.0], "experiment": "a,b"}, AXIAL, "no commas"),
+        ({"tip_x": [1.0], "experiment": "a\nb"}, AXIAL, "no line breaks"),
         ({"tip_x": [0.95]}, [], "no number is free"),
         ({"tip_x": [0.95]}, "stiffness.nonsense", "stiffness.nonsense"),
         ({"tip_x": [0.95]}, {AXIAL: (10, 20)}, "which is not between the bounds"),
@@ -157,8 +157,8 @@ def test_progress_is_told() -> None:
 
 def test_tables_that_are_no_csv_say_so(tmp_path: Path) -> None:
     for text, said in [
-        ("load.tip_force[0];tip_x\n4;0.97\n", "divided by commas"),
-        ("load.tip_force[0]\ttip_x\n4\t0.97\n", "divided by commas"),
+        ("load.tip_force[0] tip_x\n4 0.97\n", "divided by blanks"),
+        ("load.tip_force[0];tip_x\n4;1,234\n", "may be 1.234 or 1234"),
         ("load.tip_force[0],tip_x\r4,0.97\r", "line ends"),
         ("load.tip_force[0]\n4\n", "columns of results are tip_x"),
     ]:
@@ -166,3 +166,19 @@ def test_tables_that_are_no_csv_say_so(tmp_path: Path) -> None:
         file.write_bytes(text.encode())
         with pytest.raises(ValueError, match=said):
             leafdyn.fit(PULL, file, AXIAL, set=REST)
+
+
+def test_columns_of_a_machine(tmp_path: Path) -> None:
+    plain = {"load.tip_force[0]": [4, 8, 12], "tip_x": [0.9707, 0.9898, 1.0090], "sd_tip_x": 0.0005}
+    wanted = leafdyn.fit(PULL, plain, AXIAL, set=REST).parameters[AXIAL].value
+    file = tmp_path / "machine.csv"
+    file.write_bytes("Zeit;Kraft;Weg\ns;N;mm\n0;4;-30\n1;5;7\n2;8;-10\n3;9;7\n4;12;10,0\n".encode("utf-16"))
+    columns = {"Kraft": "load.tip_force[0]", "Weg": "tip_x:1e-3+1"}
+    found = leafdyn.fit(PULL, file, AXIAL, set=REST, columns=columns, every=2)
+    assert found.parameters[AXIAL].value == pytest.approx(wanted, rel=1e-6)
+    with pytest.raises(ValueError, match="no file of data has a column Force: data has load.tip_force"):
+        leafdyn.fit(PULL, plain, AXIAL, columns={"Force": "tip_y"})
+    with pytest.raises(ValueError, match="every = 0: must be a whole number"):
+        leafdyn.fit(PULL, plain, AXIAL, every=0)
+    with pytest.raises(TypeError, match="columns: must be a dict of texts"):
+        leafdyn.fit(PULL, plain, AXIAL, columns=["Force"])  # type: ignore[arg-type]

@@ -139,7 +139,7 @@ impl Entries {
             let text = text.trim();
             let value = parse(text).map(|value| value_of(&value));
             let value = match part.is_whole() {
-                true => value.map_err(|error| refuse(not_toml(&error)))?,
+                true => value.map_err(|error| refuse(not_toml(&error, text)))?,
                 false => {
                     let new = value.map_err(|_| format!("{} is no value", shorten(text)));
                     // What is too large for a number is shown as it was given.

@@ -12,7 +12,7 @@ use super::excerpt::shorten;
 use super::form::{Form, LeftOut, Range};
 use super::key::Key;
 use super::part::Part;
-use super::values::number;
+use super::values::{number, number_meant};
 use super::{Profile, Schedule};
 
 /// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
@@ -217,6 +217,11 @@ impl<'e> Item<'e> {
         })
     }
 
+    /// How a text is written as the number that it looks like.
+    fn number_meant(&self) -> Option<String> {
+        self.value.as_str().and_then(number_meant)
+    }
+
     /// A number in the range of its key.
     pub(super) fn number(&self) -> Result<f64> {
         self.number_in(self.key().form().range())
@@ -224,7 +229,10 @@ impl<'e> Item<'e> {
 
     pub(super) fn number_in(&self, range: Range) -> Result<f64> {
         let value = number(self.value);
-        let value = value.ok_or_else(|| self.refuse("must be a number"))?;
+        let value = value.ok_or_else(|| match self.number_meant() {
+            Some(meant) => self.refuse(format_args!("must be a number: {meant}")),
+            None => self.refuse("must be a number"),
+        })?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
         let problem = match value {
             _ if value.is_nan() && !self.shown().contains("nan") => {
@@ -246,7 +254,7 @@ impl<'e> Item<'e> {
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
     pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
-        if number(self.value).is_some() {
+        if number(self.value).is_some() || self.number_meant().is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {

@@ -55,7 +55,7 @@ pub use moduli::{Moduli, Stress};
 pub use part::Part;
 pub use profile::Profile;
 pub(crate) use profile::ascending;
-pub use read::{MOST_BYTES, text, utf8};
+pub use read::{MOST_BYTES, bytes, text, utf8};
 pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Radii, Section};

@@ -63,6 +63,14 @@ impl Scenario {
 /// # Errors
 /// If it cannot be read, or is not text.
 pub fn text(path: &Path) -> Result<String, ScenarioError> {
+    utf8(bytes(path)?, &path.display().to_string())
+}
+
+/// Reads a file, of at most one byte more than [`MOST_BYTES`].
+///
+/// # Errors
+/// If it cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     // Opening a folder succeeds on some systems, and reading it fails.
@@ -70,14 +78,14 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
         .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|reason| match reason.kind() {
             ErrorKind::IsADirectory => {
-                ScenarioError::in_file(&file, None, "is a folder: give the TOML file itself".into())
+                ScenarioError::in_file(&file, None, "is a folder: give the file itself".into())
             }
             _ => {
                 let problem = format!("cannot be read: {reason}: check its path and permissions");
                 ScenarioError::in_file(&file, None, problem)
             }
         })?;
-    utf8(bytes, &file)
+    Ok(bytes)
 }
 
 /// Decodes the text of a scenario's `file` from its first bytes.

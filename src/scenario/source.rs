@@ -9,10 +9,10 @@ use toml::{Spanned, Table, Value};
 
 use super::error::{Place, Result, ScenarioError};
 use super::excerpt::{line_of, shorten, snippet};
-use super::form::Range as Allowed;
 use super::key::{Key, split};
 use super::part::Part;
 use super::spelling::brackets;
+use super::values::number_meant_in;
 
 /// Where the entries of a scenario are from.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +49,7 @@ impl Source {
                 Ok(table) => table_of(table.get_ref()),
                 Err(error) => {
                     let span = error.span().unwrap_or(0..0);
-                    let problem = not_toml(&error) + &snippet(text, span.clone());
+                    let problem = not_toml(&error, text) + &snippet(text, span.clone());
                     return Err(source.refuse(Some(span), problem));
                 }
             },
@@ -131,8 +131,15 @@ impl Source {
     }
 }
 
-pub(super) fn not_toml(error: &Error) -> String {
-    format!("not valid TOML: {}", error.message())
+/// Why `text` is no TOML.
+pub(super) fn not_toml(error: &Error, text: &str) -> String {
+    let line = error
+        .span()
+        .map(|span| line_of(text.as_bytes(), span.start));
+    let line = line.and_then(|line| text.lines().nth(line - 1));
+    let meant = line.and_then(number_meant_in);
+    let meant = meant.map_or(String::new(), |meant| format!(": {meant}"));
+    format!("not valid TOML: {}{meant}", error.message())
 }
 
 /// The place of a part of a value, or of as much of it as there is.
@@ -208,14 +215,7 @@ fn from_json(text: &str, file: &str) -> Result<Table> {
         None => serde_json::from_str(text),
     };
     let form = form.map_err(|error| at(error, "is no scenario"))?;
-    let mut form =
-        Table::try_from(form).map_err(|error| refuse(None, format!("is no scenario: {error}")))?;
-    for key in Key::all().filter(|key| key.form().range() == Allowed::PositiveOrInfinite) {
-        let (table, name) = key.parts();
-        let value = form.get_mut(table).and_then(|table| table.get_mut(name));
-        value.into_iter().for_each(restore_infinity);
-    }
-    Ok(form)
+    Table::try_from(form).map_err(|error| refuse(None, format!("is no scenario: {error}")))
 }
 
 /// The path of an entry that is null, within `path`.
@@ -227,14 +227,5 @@ fn null_in(value: &Json, path: &str) -> Option<String> {
         Json::Object(table) => table.iter().find_map(inside),
         Json::Array(list) => list.iter().enumerate().find_map(at),
         _ => None,
-    }
-}
-
-/// Turns `"inf"`, for which JSON has no number, into the number.
-fn restore_infinity(value: &mut Value) {
-    match value {
-        Value::String(text) if text == "inf" => *value = Value::Float(f64::INFINITY),
-        Value::Array(list) => list.iter_mut().for_each(restore_infinity),
-        _ => (),
     }
 }

@@ -1,6 +1,8 @@
 //! Stiffnesses from measurements.
 
 mod coverage;
+mod dialects;
+mod dialects_written;
 mod ends;
 mod grips;
 mod hanging;

@@ -20,7 +20,7 @@ fn the_best_next_measurement_is_named() {
     let table = "experiment,load.tip_force[0],load.tip_force[1],load.tip_force[2],tip_x,tip_y,tip_z\n\
                  again,1.0,0.4,0.0,,,\naside,0.5,-0.9,0.0,,,\nup,0.0,0.0,0.7,,,\n";
     let wanted = FitRequest {
-        candidates: FitRequest::read_candidates(table, "next.csv").unwrap(),
+        candidates: FitRequest::read_candidates(table, "next.csv", &[]).unwrap(),
         ..made(&forces)
     };
     let found = fitted(&wanted);

@@ -9,7 +9,6 @@ const DATA: &str = "
     => data.csv:1: is empty
     -0.1,-0.2 => data.csv:1: has no header
     tip_z => no row below the header
-    load.tip_force[2];tip_z|-0,1;-0,2 => data.csv:1: columns are divided by commas
     load.tip_force[2]|-0.1 => there are no data: columns of results are tip_x
     tip_z,tip_z|1,2 => stands there twice
     load.tip_force[2],tip_w|1,2 => unknown column tip_w
@@ -64,18 +63,6 @@ fn tried(lines: &str, free: &str) -> Result<(), FitError> {
     let mut request = request(base(LEAF, ""), &[], &[]);
     (request.data, request.free) = (data, free);
     fit(&request, &mut |_| {}).map(|_| ())
-}
-
-#[test]
-fn tables_divided_in_other_ways_are_explained() {
-    let tabs = "load.tip_force[2]\ttip_z\n-0.1\t-0.2\n";
-    for (text, said) in [
-        (tabs, "columns are divided by commas"),
-        ("tip_z\r-0.1\r", "line ends of CR alone"),
-    ] {
-        let refused = Data::default().read(text, "data.csv", 5).unwrap_err();
-        assert!(refused.to_string().contains(said), "{refused}");
-    }
 }
 
 /// A name may begin with #: where the header has as many columns, the line is a row. Whole lines

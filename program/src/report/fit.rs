@@ -60,17 +60,21 @@ impl Reported for Fit {
     }
 }
 
+/// One line on what a file was read as.
 fn read(file: &DataFile) -> String {
     let name = Path::new(&file.file).file_name();
     let name = name.map_or(file.file.as_str().into(), |name| name.to_string_lossy());
     let rows = counted(file.rows, "row", "rows");
-    match file.comments {
-        0 => format!("{name}: {rows}"),
-        count => {
-            let comments = counted(count, "line that is a comment", "lines that are comments");
-            format!("{name}: {rows}; {comments} left out")
-        }
-    }
+    let left_out = match file.left_out.as_slice() {
+        [] => None,
+        left_out => Some(format!("left out: {}", left_out.join(", "))),
+    };
+    let said = file.taken.iter().cloned().chain(left_out);
+    let said: Vec<String> = [format!("{name}: {rows}")]
+        .into_iter()
+        .chain(said)
+        .collect();
+    said.join("; ")
 }
 
 fn number(parameter: &FitParameter) -> String {

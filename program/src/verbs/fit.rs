@@ -1,5 +1,6 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use super::job::{Delivered, Job};
@@ -8,8 +9,10 @@ use super::request::{Request, VerbTraits};
 use super::{Refusal, Status};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
-use leafdyn::scenario::text;
-use leafdyn::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
+use leafdyn::scenario::bytes;
+use leafdyn::study::{
+    self, Data, Fit as Fitted, FitRequest, FitStep, Free, MeasuredColumn, Reading,
+};
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
 ///
@@ -23,6 +26,14 @@ pub struct Fit {
     /// Measured data as CSV, with a header: experiments (keys of the scenario, results, their sd_), or points on veins (rod, sigma, x, y, z, sd, experiment); may repeat
     #[arg(long, value_name = "FILE.csv", required = true, value_hint = ValueHint::FilePath)]
     data: Vec<PathBuf>,
+
+    /// What a column of the data is: its name in the file, and a key, a result or another column of the data, with a factor and an offset, as in 'Extension=tip.position[0]:1e-3+0.12'; other columns of that file are left out; may repeat
+    #[arg(long, value_name = "NAME=QUANTITY[:FACTOR][+OFFSET]")]
+    column: Vec<MeasuredColumn>,
+
+    /// Read the first row of each file of data, and then every K-th
+    #[arg(long, value_name = "K", default_value = "1", hide_default_value = true, value_parser = step_of)]
+    every: NonZeroUsize,
 
     /// A number that is free, by its key as in --vary, and its bounds; of a list or a profile every entry; may repeat
     #[arg(
@@ -42,6 +53,11 @@ pub struct Fit {
     candidates: Option<PathBuf>,
 }
 
+/// Parses the distance of rows.
+fn step_of(text: &str) -> Result<NonZeroUsize, &'static str> {
+    text.parse().map_err(|_| "must be a whole number from 1")
+}
+
 impl Fit {
     pub fn run(self) -> Result<Status, Refusal> {
         let reads: Vec<_> = self.data.iter().chain(&self.candidates).cloned().collect();
@@ -55,13 +71,23 @@ impl Fit {
 
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let base = job.base.clone();
-        let mut data = Data::default();
+        let mut data = Data {
+            reading: Reading {
+                columns: self.column.clone(),
+                every: self.every,
+            },
+            ..Data::default()
+        };
         let rods = base.scenario().rods.len();
         for file in &self.data {
-            data.read(&text(file)?, &file.display().to_string(), rods)?;
+            data.read(bytes(file)?, &file.display().to_string(), rods)?;
         }
         let candidates = match &self.candidates {
-            Some(file) => FitRequest::read_candidates(&text(file)?, &file.display().to_string())?,
+            Some(file) => FitRequest::read_candidates(
+                bytes(file)?,
+                &file.display().to_string(),
+                &self.column,
+            )?,
             None => Vec::new(),
         };
         let request = FitRequest {

@@ -4,6 +4,7 @@ mod documented_commands;
 mod figure_trace;
 mod first_minute;
 mod fit_figure;
+mod fit_files;
 mod help;
 mod refusals;
 mod relax_cli;

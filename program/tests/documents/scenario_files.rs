@@ -125,7 +125,7 @@ fn files_that_cannot_be_read() {
     };
     let absent = folder.path().join("absent.toml");
     assert!(message(&absent).starts_with(": cannot be read: "));
-    let expected = ": is a folder: give the TOML file itself";
+    let expected = ": is a folder: give the file itself";
     assert_eq!(message(folder.path()), expected);
     let latin = folder.path().join("latin.toml");
     fs::write(&latin, b"name = \"a\"\n# Bl\xe4tter\n").unwrap();

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from numbers import Integral
 from typing import Any, TypeAlias, Union
 
 import numpy as np
@@ -200,6 +201,8 @@ def fit(
     set: Mapping[str, Any] | None = None,
     robust: bool = False,
     candidates: Measured | None = None,
+    columns: Mapping[str, str] | None = None,
+    every: int = 1,
     tolerance: float | None = None,
     progress: Progress = None,
 ) -> Fit:
@@ -223,6 +226,12 @@ def fit(
         Whether data far off the others count less.
     candidates
         Experiments that could be made, as a table like the data: which would say most?
+    columns
+        What columns of the data are, by the names that these have there: a key, a result or another column of the
+        data, with a factor and an offset, as in ``{"Extension": "tip.position[0]:1e-3+0.12"}``. Other columns of
+        such a table are left out.
+    every
+        The first row of each table of data is read, and then every so many.
 
     The others are those of `relax`.
 
@@ -267,18 +276,29 @@ def fit(
     """
     switches(robust=robust)
     numbers(tolerance=tolerance)
+    maps = _columns(columns)
+    if isinstance(every, bool) or not isinstance(every, Integral) or not 1 <= every < 2**63:
+        raise ValueError(f"every = {every!r}: must be a whole number from 1")
     keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
     leaf = checked(scenario, set)
     tables = measurements(data, "data")
     others = None if candidates is None else measurements(candidates, "candidates")[0]
     with reporter(progress) as heard:
-        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, tolerance, heard))
+        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), tolerance, heard))
     for remark in found.remarks:
         warn(found.name, remark)
     if found.undetermined:
         open_ = (" and ".join(combination) for combination in found.undetermined)
         warn(found.name, f"the data do not determine {'; '.join(open_)}: see says, free fewer numbers or measure more")
     return found
+
+
+def _columns(columns: Mapping[str, str] | None) -> list[str]:
+    """Names of columns as the program reads them."""
+    given: Any = {} if columns is None else columns
+    if not isinstance(given, Mapping) or not all(isinstance(text, str) for pair in given.items() for text in pair):
+        raise TypeError("columns: must be a dict of texts, as in {'Force': 'load.tip_force[0]'}")
+    return [f"{name}={quantity}" for name, quantity in given.items()]
 
 
 def _free(number: str, free: str | Iterable[str] | Mapping[str, Bounds]) -> str:

@@ -170,6 +170,8 @@ def fit(
     free: Sequence[str],
     robust: bool,
     candidates: tuple[str, str] | str | PathLike[str] | None,
+    columns: Sequence[str],
+    every: int,
     tolerance: float | None,
     progress: _Heard,
 ) -> Files: ...

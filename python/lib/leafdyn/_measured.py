@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
@@ -52,8 +54,9 @@ def _text(table: Columns, name: str) -> str:
         if len(column) not in (1, rows):
             raise ValueError(f"{name}: {key} has {len(column)} rows, and others have {rows}: give all columns as many")
     filled = [column * rows if len(column) == 1 else column for column in columns.values()]
-    lines = [list(columns), *map(list, zip(*filled))]
-    return "".join(",".join(line) + "\n" for line in lines)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([list(columns), *zip(*filled)])
+    return text.getvalue()
 
 
 def _named(table: Columns) -> list[tuple[Any, Any]]:
@@ -82,8 +85,8 @@ def _cell(value: Any, place: str) -> str:
     if isinstance(value, str):
         if _is_number(value.replace(",", ".")) and "," in value:
             raise ValueError(f"{place} = {value!r}: write numbers with a decimal point")
-        if set(value) & set(',"\n\r'):
-            raise ValueError(f"{place} = {value!r}: a name has no commas, quotes and line breaks")
+        if set(value) & set("\n\r"):
+            raise ValueError(f"{place} = {value!r}: a name has no line breaks")
         return value
     if value is None or type(value).__name__ in ("NAType", "NaTType"):
         return ""

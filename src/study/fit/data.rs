@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::FitError;
+use super::columns::{MeasuredColumn, NAME, Reading, TRACED};
 use super::quantity::Quantity;
-use super::table::{NAME, Table, refuse};
+use super::table::{Table, refuse};
 use crate::study::Keys;
 
 /// Origin of a number: a file and a line.
@@ -74,11 +75,19 @@ pub struct DataFile {
     pub comments: usize,
     /// How many of these are among the rows, below the header.
     pub comments_among_rows: usize,
+    /// What it was taken for, where that is not the usual CSV, in words.
+    pub taken: Vec<String>,
+    /// What was left out, in words.
+    pub left_out: Vec<String>,
+    /// Names of its columns.
+    pub names: Vec<String>,
 }
 
 /// All data.
 #[derive(Clone, Debug, Default)]
 pub struct Data {
+    /// How files are read.
+    pub reading: Reading,
     /// The files.
     pub files: Vec<DataFile>,
     /// Experiments.
@@ -88,16 +97,31 @@ pub struct Data {
 }
 
 impl Data {
-    /// Adds a file of measured data; `veins` is the number of rods.
-    pub fn read(&mut self, text: &str, file: &str, veins: usize) -> Result<(), FitError> {
-        let table = Table::of(text, file)?;
+    /// Adds a file of measured data, a text or its bytes; `veins` is the number of rods.
+    ///
+    /// # Errors
+    /// What cannot be read, or not in one way only.
+    pub fn read(
+        &mut self,
+        table: impl AsRef<[u8]>,
+        file: &str,
+        veins: usize,
+    ) -> Result<(), FitError> {
+        let table = Table::of(table.as_ref(), file, &self.reading)?;
         self.files.push(DataFile {
             file: file.into(),
-            rows: table.rows.len(),
-            comments: table.comments,
-            comments_among_rows: table.comments_among_rows,
+            rows: table.rows(),
+            comments: table.comments[0],
+            comments_among_rows: table.comments[1],
+            taken: table.taken.clone(),
+            left_out: table.left_out.clone(),
+            names: table.names.clone(),
         });
-        match table.header.contains(&"rod") {
+        // A table of points has at least two of these, or one and sigma.
+        match ["rod", "x", "y", "z"]
+            .iter()
+            .any(|name| table.column(name).is_some())
+        {
             true => self.read_traced(&table, veins),
             false => {
                 let experiments = experiments(&table, false, self.experiments.len())?;
@@ -107,26 +131,56 @@ impl Data {
         }
     }
 
+    /// Checks that every column that was given a quantity is in one of the files.
+    pub(super) fn check_columns(&self) -> Result<(), FitError> {
+        let is_in = |file: &DataFile, name: &String| file.names.contains(name);
+        for column in &self.reading.columns {
+            if !self.files.iter().any(|file| is_in(file, &column.name)) {
+                let files = self.files.iter();
+                let files =
+                    files.map(|file| format!("{} has {}", file.file, file.names.join(", ")));
+                return Err(FitError::Data(format!(
+                    "no file of data has a column {}: {}",
+                    column.name,
+                    files.collect::<Vec<_>>().join("; ")
+                )));
+            }
+        }
+        Ok(())
+    }
+
     fn read_traced(&mut self, table: &Table, veins: usize) -> Result<(), FitError> {
-        let known = ["rod", "x", "y", "z", "sigma", "sd", NAME];
-        let strange = table.header.iter().find(|name| !known.contains(name));
+        let strange = table
+            .header
+            .iter()
+            .find(|name| !TRACED.contains(&name.as_str()));
         if let Some(name) = strange {
             let why = format!(
-                "unknown column {name}: points on veins have {}",
-                known.join(", ")
+                "unknown column {name}: points on veins have {}; {}",
+                TRACED.join(", "),
+                renamed(name)
             );
-            return Err(refuse(table.file, 1, why));
+            return Err(refuse(table.file, table.header_line, why));
         }
-        let column = |name: &str| table.header.iter().position(|known| *known == name);
-        for row in 0..table.rows.len() {
-            let line = table.rows[row].0;
+        let column = |name: &str| table.column(name);
+        if column("rod").is_none() && veins > 1 {
+            let why = format!("points on veins need a column rod, from 1 to {veins} (leaf.rods)");
+            return Err(refuse(table.file, table.header_line, why));
+        }
+        for row in 0..table.rows() {
+            let line = table.line(row);
             let number = |name: &str| match column(name) {
                 Some(column) => table.number(row, column),
                 None => Ok(None),
             };
-            let rod = number("rod")?.filter(|rod| rod.fract() == 0.0);
+            // Of one vein, every point is on that.
+            let rod = match column("rod") {
+                Some(column) => table.number(row, column)?,
+                None => Some(1.0),
+            };
+            let rod = rod.filter(|rod| rod.fract() == 0.0);
             let Some(rod) = rod.filter(|rod| (1.0..=veins as f64).contains(rod)) else {
-                let cell = column("rod").map_or("", |column| table.rows[row].1[column]);
+                let cell = column("rod").map_or("", |column| table.cell(row, column));
                 let found = if cell.is_empty() { "nothing" } else { cell };
                 let why =
                     format!("rod = {found}: must be a whole number from 1 to {veins} (leaf.rods)");
@@ -144,7 +198,7 @@ impl Data {
                 let why = "at least two of x, y, z are needed, or one and sigma";
                 return Err(refuse(table.file, line, why));
             }
-            let experiment = column(NAME).map(|column| table.rows[row].1[column]);
+            let experiment = column(NAME).map(|column| table.cell(row, column));
             self.traced.push(Traced {
                 experiment: experiment.filter(|name| !name.is_empty()).map(String::from),
                 rod: rod as usize - 1,
@@ -165,8 +219,24 @@ impl Data {
 }
 
 /// Candidate experiments: like those made, but without measured values.
-pub fn candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
-    experiments(&Table::of(text, file)?, true, 0)
+pub fn candidates(
+    table: &[u8],
+    file: &str,
+    columns: &[MeasuredColumn],
+) -> Result<Vec<Experiment>, FitError> {
+    let reading = Reading {
+        columns: columns.to_vec(),
+        ..Reading::default()
+    };
+    experiments(&Table::of(table, file, &reading)?, true, 0)
+}
+
+/// How a column with another name is used.
+fn renamed(name: &str) -> String {
+    format!(
+        "name it so in the file, or say what it is by the option column, as in '{name}=tip_x': columns \
+         that mean nothing are then left out"
+    )
 }
 
 /// The meaning of a column of experiments.
@@ -193,12 +263,13 @@ fn column(table: &Table, name: &str) -> Result<Column, FitError> {
             true => format!("column {refused}"),
             false => format!(
                 "unknown column {name}: columns are keys of the scenario, such as \
-                 load.tip_force[0], results ({}), their standard deviations (sd_tip_x), and \
-                 experiment, a name",
-                Quantity::ALL
+                 load.tip_force[0], results ({}), their standard deviations (sd_tip_x), \
+                 experiment, a name, or rod, x, y, z of points on veins; {}",
+                Quantity::ALL,
+                renamed(name)
             ),
         };
-        refuse(table.file, 1, why)
+        refuse(table.file, table.header_line, why)
     })
 }
 
@@ -220,33 +291,36 @@ fn experiments(
             && !results.contains(quantity)
         {
             let why = format!("sd_{quantity} without {quantity}: add that column");
-            return Err(refuse(table.file, 1, why));
+            return Err(refuse(table.file, table.header_line, why));
         }
     }
     if results.is_empty() && candidates {
         let why = format!("no column is a result ({})", Quantity::ALL);
-        return Err(refuse(table.file, 1, why));
+        return Err(refuse(table.file, table.header_line, why));
     }
     let mut found = Vec::new();
-    for (row, (line, cells)) in table.rows.iter().enumerate() {
+    for row in 0..table.rows() {
+        let line = table.line(row);
         let mut experiment = Experiment {
             name: (before + row + 1).to_string(),
             settings: Vec::new(),
             measured: Vec::new(),
             origin: Some(Origin {
                 file: table.file.into(),
-                line: *line,
+                line,
             }),
         };
         let mut deviations = BTreeMap::new();
         for (k, column) in columns.iter().enumerate() {
             match column {
-                Column::Name if !cells[k].is_empty() => experiment.name = cells[k].into(),
+                Column::Name if !table.cell(row, k).is_empty() => {
+                    experiment.name = table.cell(row, k).into();
+                }
                 Column::Name => {}
                 Column::Setting(keys) => {
                     let Some(value) = table.number(row, k)? else {
                         let why = format!("{keys} is empty: every experiment needs its value");
-                        return Err(refuse(table.file, *line, why));
+                        return Err(refuse(table.file, line, why));
                     };
                     experiment.settings.push((keys.clone(), value));
                 }

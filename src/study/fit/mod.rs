@@ -8,6 +8,7 @@
 mod candidates;
 mod case;
 mod coarse;
+mod columns;
 mod contradiction;
 mod data;
 mod derivatives;
@@ -32,6 +33,7 @@ mod table;
 mod vein;
 mod words;
 
+pub use columns::{MeasuredColumn, Reading};
 pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
 pub use free::Free;
 pub use quantity::Quantity as MeasuredQuantity;
@@ -92,9 +94,17 @@ pub struct FitRequest {
 }
 
 impl FitRequest {
-    /// Reads candidate experiments from a table like that of experiments.
-    pub fn read_candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
-        data::candidates(text, file)
+    /// Reads candidate experiments from a table like that of experiments, whose columns may
+    /// have other names.
+    ///
+    /// # Errors
+    /// As of [`Data::read`].
+    pub fn read_candidates(
+        table: impl AsRef<[u8]>,
+        file: &str,
+        columns: &[MeasuredColumn],
+    ) -> Result<Vec<Experiment>, FitError> {
+        data::candidates(table.as_ref(), file, columns)
     }
 }
 
@@ -109,6 +119,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         check_tolerance(tolerance).map_err(RelaxError::from)?;
     }
     without_wind(base.scenario(), "a fit")?;
+    request.data.check_columns()?;
     let coordinates = coordinates(request)?;
     let options = Options {
         tolerance: request.tolerance,
