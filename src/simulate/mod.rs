@@ -390,12 +390,9 @@ fn explicit(
             );
             Err(RefusedOption::new("step", found, why).into())
         }
-        _ => Ok((
-            explicit,
-            StableStep {
-                step: stable,
-                ..bound
-            },
-        )),
+        _ => {
+            let step = stable;
+            Ok((explicit, StableStep { step, ..bound }))
+        }
     }
 }

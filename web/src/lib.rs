@@ -6,10 +6,11 @@
 //! result()        there
 //! ```
 //!
-//! [`session`] has the questions and their answers.
+//! [`question`] has the questions, [`answer`] the answers, and [`session`] how one follows from the other.
 
 pub mod answer;
 pub mod motion;
+pub mod question;
 pub mod session;
 
 use session::Session;

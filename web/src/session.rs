@@ -2,16 +2,16 @@
 
 use crate::answer::{Answer, Known, Slider, Told, branch};
 use crate::motion::Motion;
+use crate::question::{Pull, Question, Values};
 use leafdyn::relax::{
     Equilibrium, Followed, Follower, Limit, Options, RelaxError, SemiImplicit, relax,
 };
-use leafdyn::scenario::{PointLoad, Scenario};
+use leafdyn::scenario::Scenario;
 use leafdyn::study::{
     Base, Keys, SensitivityError, TraceRequest, Vary, VaryError, equilibria, sensitivities_of,
     trace,
 };
 use leafdyn_program::files::{self, Document};
-use serde::Deserialize;
 use std::time::Duration;
 
 /// What a leaf on a screen needs.
@@ -20,116 +20,9 @@ const TOLERANCE: f64 = 1e-4;
 /// Seconds after which a leaf that does not come to rest is given up.
 const PATIENCE: u64 = 8;
 
-/// How far a point is pulled at most, in lengths.
-const FARTHEST: f64 = 2.0;
-
 /// Points of a branch that are drawn, and seconds for all that is asked in the background.
 const MOST_POINTS: usize = 400;
 const SECONDS: u64 = 20;
-
-/// Values of numbers of the scenario by their paths.
-type Values = Vec<(String, f64)>;
-
-/// What a page asks.
-#[derive(Deserialize)]
-#[serde(tag = "ask", rename_all = "lowercase")]
-enum Question {
-    /// A scenario, with the values of some of its numbers.
-    Open {
-        text: String,
-        name: String,
-        #[serde(default)]
-        values: Values,
-    },
-    /// The leaf with other values, followed there.
-    Set {
-        values: Values,
-        /// How many modes are wanted.
-        #[serde(default)]
-        modes: usize,
-        /// Where it is pulled.
-        #[serde(default)]
-        pull: Option<Pull>,
-    },
-    /// The leaf, which was left where its stable equilibria end, at rest elsewhere.
-    Settle,
-    /// The leaf let go from where it is, or from the arcs it is released from; `damped` if the
-    /// motion is not its own but that to its next equilibrium.
-    Go {
-        #[serde(default)]
-        damped: bool,
-        #[serde(default)]
-        released: bool,
-    },
-    /// An instant of that motion, so many outputs later.
-    Frame {
-        #[serde(default = "one")]
-        count: usize,
-    },
-    /// The end of the motion: the leaf at rest.
-    Land,
-    /// The branch of equilibria between two values of a number.
-    Trace {
-        key: String,
-        from: f64,
-        to: f64,
-        #[serde(default)]
-        log: bool,
-    },
-    /// All equilibria that are found.
-    Equilibria,
-    /// Derivatives of the tip.
-    Sensitivity { keys: Vec<String> },
-    /// The leaf without loads.
-    Unloaded,
-    /// One of the files that the program writes, or the scenario.
-    Write { file: String },
-    /// The version of the solver.
-    Version,
-}
-
-fn one() -> usize {
-    1
-}
-
-/// A point of a vein, by its number from 1 and the fraction of its length, pulled by a spring whose
-/// other end is displaced.
-#[derive(Clone, Copy, Deserialize)]
-struct Pull {
-    vein: usize,
-    at: f64,
-    displacement: [f64; 3],
-}
-
-/// Stiffness of that spring: times the bending stiffness of the veins over the length cubed.
-const SPRING: f64 = 6.0;
-
-impl Pull {
-    /// The scenario with its force.
-    fn on(self, mut scenario: Scenario) -> Scenario {
-        let (scale, rods) = (scenario.scale(), scenario.rods.len());
-        let stiffness = SPRING * rods as f64 * scale.force() / scale.length;
-        let farthest = FARTHEST * scale.length;
-        let force = (self.displacement).map(|x| stiffness * x.clamp(-farthest, farthest));
-        let vein = self.vein.clamp(1, rods) - 1;
-        let tip = self.at >= 1.0 && scenario.joined && rods > 1;
-        if force.iter().any(|x| !x.is_finite()) || !(self.at > 0.0 && self.at <= 1.0) {
-            return scenario;
-        }
-        if tip {
-            scenario.tip_force = [0, 1, 2].map(|k| scenario.tip_force[k] + force[k]);
-            return scenario;
-        }
-        scenario.points.push(PointLoad {
-            vein,
-            at: self.at,
-            force,
-            moment: [0.0; 3],
-            mass: 0.0,
-        });
-        scenario
-    }
-}
 
 /// Why there is no answer.
 #[derive(Debug, thiserror::Error)]
@@ -310,7 +203,9 @@ impl Open {
         };
         let scenario = pulled(bare.clone());
         let alike = scenario.rods.len() == self.scenario.rods.len()
-            && scenario.joined == self.scenario.joined;
+            && scenario.joined == self.scenario.joined
+            // These have no energy, and no branch of stable equilibria.
+            && !scenario.has_moments();
         let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
             let (leaf, follower) = Follower::begin(&scenario, &options(&scenario, modes))?;
             (self.leaf, self.follower) = (leaf, follower);

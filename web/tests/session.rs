@@ -76,6 +76,23 @@ fn a_column_goes_along_snaps_and_comes_back_late() {
     assert!(back["tips"][0][2].as_f64().unwrap() < -0.3);
 }
 
+/// Under a dead moment, which has no potential, it is found anew for every value.
+#[test]
+fn a_leaf_under_a_moment_is_not_said_to_be_left() {
+    let mut session = Session::default();
+    open(&mut session, "classic/cantilever_tip.toml");
+    for moment in [0.5, 1.0, 0.0] {
+        let values = json!([["load.tip_moment[1]", moment]]);
+        let set = ask(&mut session, json!({ "ask": "set", "values": values }));
+        assert!(
+            set["answer"] == "found" || moment == 0.0,
+            "{}",
+            set["answer"]
+        );
+        assert_eq!(set["stable"].is_null(), moment != 0.0);
+    }
+}
+
 /// Whatever is asked in whatever order, there is an answer, and the leaf goes on.
 #[test]
 fn a_refused_question_leaves_the_leaf_as_it_is() {
