@@ -1,6 +1,6 @@
 //! The clock that measures the time of runs, and ends those that have a deadline.
 //!
-//! On `wasm32-unknown-unknown`, which has none, it is the one that the host has [`set`]; without it,
+//! On `wasm32-unknown-unknown`, which has none, it is the one that the host has set by `set`; without it,
 //! no time passes.
 
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]

@@ -6,7 +6,7 @@
 //! result()        there
 //! ```
 //!
-//! [`question`] has the questions, [`answer`] the answers, and [`session`] how one follows from the other.
+//! [`question`] has the questions, [`mod@answer`] the answers, and [`session`] how one follows from the other.
 
 pub mod answer;
 pub mod motion;

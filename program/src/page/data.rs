@@ -80,7 +80,7 @@ pub struct Leaf {
     pub nodes: usize,
     /// Positions, vein by vein.
     pub points: Points,
-    /// [`STATE`] numbers per node.
+    /// Sixteen numbers per node: rotation w, x, y, z, then v, u, n, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,
     /// The equivalent stress at each node, if sections are given.
