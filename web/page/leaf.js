@@ -109,7 +109,7 @@ function plainly(plain) {
 
 /// Shows a leaf at rest.
 function show(known) {
-  const [turned] = [view.gravity.some((x, k) => x !== known.view.gravity[k])];
+  const turned = view.gravity.some((x, k) => x !== known.view.gravity[k]);
   Object.assign(view, known.view);
   decoded.clear();
   view.modes.forEach((mode) => (mode.decoded = undefined));

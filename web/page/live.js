@@ -196,7 +196,7 @@ async function travel(damped, released) {
   const begun = performance.now();
   const named = now.known.view.units[0] !== null;
   now.playing = true;
-  let [step, last] = [0, begun];
+  let last = begun;
   let due = 0;
   while (answer.answer === "moving" && !answer.ended && now.playing && !(damped && now.wanted && performance.now() - begun > 300)) {
     stage.moving(answer.leaf);
@@ -209,7 +209,6 @@ async function travel(damped, released) {
     const count = Math.min(Math.floor(due / answer.step), 40);
     if (count < 1) continue;
     due -= count * answer.step;
-    step += count;
     answer = await front.ask({ ask: "frame", count });
   }
   now.playing = false;

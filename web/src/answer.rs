@@ -77,11 +77,9 @@ pub struct Known {
     pub tolerance: f64,
     pub stable: Option<bool>,
     pub index: Option<usize>,
-    pub neutral: usize,
     /// Squares of the angular frequencies.
     pub eigenvalues: Vec<f64>,
     pub reaction: Option<[f64; 3]>,
-    pub seconds: f64,
 }
 
 impl Known {
@@ -100,10 +98,8 @@ impl Known {
             tolerance: leaf.accuracy.tolerance,
             stable: leaf.stable(),
             index: leaf.stability.negative_eigenvalues,
-            neutral: leaf.stability.neutral_directions,
             eigenvalues: modes.map(|mode| mode.eigenvalue).collect(),
             reaction: (leaf.reaction.as_ref()).map(|reaction| reaction.force.to_array()),
-            seconds: leaf.wall_seconds,
         }
     }
 }

@@ -32,8 +32,6 @@ pub struct Instant {
     pub leaf: page::Leaf,
     pub time: f64,
     pub tip: [f64; 3],
-    pub kinetic: f64,
-    pub energy: f64,
     /// Time between two outputs, and the natural unit of time.
     pub step: f64,
     pub unit: f64,
@@ -83,16 +81,15 @@ impl Motion {
 
     /// The instant so many outputs later, or that at which it ends.
     pub fn next(&mut self, count: usize) -> Result<Instant, Stopped> {
-        let mut now = self.first();
+        let mut frame = self.simulation.frame();
         for _ in 0..count {
-            if now.ended {
+            if self.ends_with(&frame) {
                 break;
             }
-            let frame = self.simulation.next_frame()?;
+            frame = self.simulation.next_frame()?;
             self.fastest = self.fastest.max(frame.energy.kinetic);
-            now = self.instant(&frame);
         }
-        Ok(now)
+        Ok(self.instant(&frame))
     }
 
     /// At rest, from where it is now.
@@ -104,20 +101,22 @@ impl Motion {
         self.simulation.land(follower, scenario)
     }
 
+    /// Whether the leaf is as good as at rest, or the time is over.
+    fn ends_with(&self, frame: &Frame) -> bool {
+        let moved = self.damped && self.fastest > 0.0;
+        moved && frame.energy.kinetic < AT_REST * self.fastest || self.simulation.done()
+    }
+
     fn instant(&self, frame: &Frame) -> Instant {
-        let kinetic = frame.energy.kinetic;
-        let slow = self.damped && self.fastest > 0.0 && kinetic < AT_REST * self.fastest;
         let curves = frame.curves();
         let tip = frame.tips(self.joined)[0];
         Instant {
             leaf: page::moving(self.simulation.stations(), &curves, &self.page),
             time: frame.time,
             tip: tip.to_array(),
-            kinetic,
-            energy: frame.energy.balance(),
             step: self.unit / OUTPUTS,
             unit: self.unit,
-            ended: slow || self.simulation.done(),
+            ended: self.ends_with(frame),
         }
     }
 }
