@@ -107,11 +107,6 @@ impl Follower {
         &self.at.levels
     }
 
-    /// The scenario of the equilibrium in which it is.
-    pub fn scenario(&self) -> &Scenario {
-        &self.scenario
-    }
-
     /// Follows the scenarios that `along` has from 0, the present one, to 1.
     ///
     /// # Errors
