@@ -96,6 +96,7 @@ pub fn entry_error(py: Python, key: &str, in_set: bool, problem: String) -> PyEr
         place,
         key: Key::from_path(key),
         problem,
+        others: Vec::new(),
     };
     scenario_error(py, &error)
 }

@@ -13,6 +13,7 @@ use super::veins::{Made, joined, veins};
 use super::wind::wind;
 use super::{Dynamics, Profile, Rod, Scenario, Start, Units};
 use super::{grip, limits, loads, tip};
+use std::path::Path;
 
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
@@ -29,10 +30,24 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> Result<Scenario> {
-        let name = name(self.item(Key::Name)?)?;
+        let scenario = self.read().map_err(|error| self.with_others(error))?;
+        limits::check(self, &scenario)?;
+        Ok(scenario)
+    }
+
+    /// The scenario, entry by entry.
+    pub(super) fn read(&self) -> Result<Scenario> {
+        let name = match self.given(Key::Name) {
+            Some(item) => name(item)?,
+            None => self.name_of_file(),
+        };
         let units = Units {
             length: self.given(Key::UnitLength).map(unit).transpose()?,
             force: self.given(Key::UnitForce).map(unit).transpose()?,
+            time: self
+                .given(Key::UnitTime)
+                .map(|item| unit_of_time(self, item))
+                .transpose()?,
         };
         let rods = self.item(Key::Rods)?.whole(MOST_RODS)?;
         let made = Made::from(self, rods)?;
@@ -59,7 +74,7 @@ impl Entries {
         let tolerance = tolerance(self.item(Key::Tolerance)?)?;
         let loads = [gravity, tip_force, tip_moment];
         let dynamics = dynamics(self, &rods, &made, loads)?;
-        let scenario = Scenario {
+        Ok(Scenario {
             name,
             units,
             rods,
@@ -82,24 +97,35 @@ impl Entries {
             wind,
             tolerance,
             dynamics,
-        };
-        limits::check(self, &scenario)?;
-        Ok(scenario)
+        })
+    }
+
+    /// The name of a leaf that has none: that of its file.
+    fn name_of_file(&self) -> String {
+        let stem = Path::new(&self.source.file).file_stem();
+        let stem = stem.and_then(|stem| stem.to_str());
+        stem.filter(|stem| is_name(stem)).unwrap_or("leaf").into()
     }
 }
 
 fn name(item: Item) -> Result<String> {
     let name = item.text()?;
-    let allowed = |c: char| c.is_alphanumeric() || "_-.+".contains(c);
-    let starts_well = name.starts_with(|c: char| c.is_alphanumeric() || c == '_');
     item.ensure(
-        starts_well && name.len() <= LONGEST_NAME && name.chars().all(allowed),
+        is_name(name),
         format_args!(
-            "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits and the signs \
-             _ - . + with a letter, digit or _ first"
+            "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits, spaces and the \
+             signs _ - . + with a letter, digit or _ first and no space last"
         ),
     )?;
     Ok(name.to_string())
+}
+
+/// Whether a folder can have this name on every system.
+fn is_name(name: &str) -> bool {
+    let allowed = |c: char| c.is_alphanumeric() || "_-.+ ".contains(c);
+    let starts_well = name.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let ends_well = !name.ends_with(' ');
+    starts_well && ends_well && name.len() <= LONGEST_NAME && name.chars().all(allowed)
 }
 
 fn unit(item: Item) -> Result<String> {
@@ -110,6 +136,17 @@ fn unit(item: Item) -> Result<String> {
         format_args!("must be 1 to {LONGEST_UNIT} characters that can be printed"),
     )?;
     Ok(unit.trim().to_string())
+}
+
+/// The unit of time, which is that of the others only if the mass is given.
+fn unit_of_time(entries: &Entries, item: Item) -> Result<String> {
+    let densities = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
+    item.ensure(
+        densities.iter().any(|key| entries.is_given(*key)),
+        "without a density times are in units of T = sqrt(rho L^4/A), whatever the other units: \
+         give dynamics.density or a mass_density, or leave this out",
+    )?;
+    unit(item)
 }
 
 fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {

@@ -70,12 +70,26 @@ impl Entries {
             rows: [0; Key::REPEATED.len()],
             source: source.into(),
         };
-        entries.add("", 0, table)?;
-        Ok(entries)
+        let mut unknown = Vec::new();
+        entries.add(("", 0), table, &mut unknown);
+        let mut unknown = unknown.into_iter();
+        match unknown.next() {
+            None => Ok(entries),
+            Some(first) => {
+                let others = unknown.chain(entries.mistakes()).collect();
+                Err(ScenarioError { others, ..first })
+            }
+        }
     }
 
-    /// Adds the entries of a table, whose name is empty at the top, or of one of several.
-    fn add(&mut self, name: &'static str, row: usize, table: Table) -> Result<()> {
+    /// Adds the entries of a table, whose name is empty at the top, or of one of several, and the
+    /// errors about those that have no place in it.
+    fn add(
+        &mut self,
+        (name, row): (&'static str, usize),
+        table: Table,
+        errors: &mut Vec<ScenarioError>,
+    ) {
         for (key, value) in table {
             if let Some(known) = Key::from_parts(name, &key) {
                 self.put(Part::of_row(known, row), value, None);
@@ -84,34 +98,32 @@ impl Entries {
             let path = [name, &key].join(".");
             let path = path.trim_start_matches('.');
             match Key::table(path) {
-                Some(inner) => self.add_inner(inner, value)?,
+                Some(inner) => self.add_inner(inner, value, errors),
                 None => {
                     let meant = nearest(path).map(|key| format!(" (did you mean {key}?)"));
                     let (path, meant) = (shorten(path), meant.unwrap_or_default());
                     let allowed = Key::allowed_in(name).join(", ");
                     let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
-                    return Err(self.source.refuse_key((name, &key), row, problem));
+                    errors.push(self.source.refuse_key((name, &key), row, problem));
                 }
             }
         }
-        Ok(())
     }
 
     /// Adds a table, or all those of a name.
-    fn add_inner(&mut self, name: &'static str, value: Value) -> Result<()> {
+    fn add_inner(&mut self, name: &'static str, value: Value, errors: &mut Vec<ScenarioError>) {
         let repeated = Key::REPEATED.iter().position(|table| *table == name);
         match (repeated, value) {
-            (None, Value::Table(table)) => self.add(name, 0, table),
+            (None, Value::Table(table)) => self.add((name, 0), table, errors),
             (Some(which), Value::Array(list)) if list.iter().all(Value::is_table) => {
                 self.rows[which] = list.len();
                 for (row, value) in list.into_iter().enumerate() {
                     if let Value::Table(table) = value {
-                        self.add(name, row, table)?;
+                        self.add((name, row), table, errors);
                     }
                 }
-                Ok(())
             }
-            (_, value) => Err(self.source.refuse_value(name, &value)),
+            (_, value) => errors.push(self.source.refuse_value(name, &value)),
         }
     }
 
@@ -129,6 +141,7 @@ impl Entries {
                 },
                 key: None,
                 problem,
+                others: Vec::new(),
             };
             let Some((path, text)) = given.split_once('=') else {
                 let problem = "must be KEY=VALUE, as in load.gravity=[0,0,-0.5]";
@@ -249,6 +262,18 @@ impl Entries {
             rows.resize(part.row + 1, None);
         }
         rows[part.row] = Some(Arc::new(Entry { value, given }));
+    }
+
+    /// Replaces a key in each of its tables by this value, as TOML, or by none.
+    pub(super) fn replace(&mut self, key: Key, value: Option<&str>) {
+        self.entries[key as usize].clear();
+        let value = value.and_then(|text| parse(text).ok());
+        if let Some(value) = value.map(|value| value_of(&value)) {
+            let parts: Vec<Part> = self.parts(key).collect();
+            for part in parts {
+                self.put(part, value.clone(), None);
+            }
+        }
     }
 
     pub(crate) fn value_at(&self, part: Part) -> Option<&Value> {

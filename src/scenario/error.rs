@@ -10,7 +10,7 @@ pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
 /// Why a scenario was refused. Its text is the whole message: the place, the key, the
 /// value found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", printable(&format!("{place}: {problem}")))]
+#[error("{}", self.told("set"))]
 pub struct ScenarioError {
     /// Where.
     pub place: Place,
@@ -18,6 +18,9 @@ pub struct ScenarioError {
     pub key: Option<Key>,
     /// The rest of the message.
     pub problem: String,
+    /// Errors about other entries that do not follow from this one, in the order of the format, as far
+    /// as they can be told.
+    pub others: Vec<ScenarioError>,
 }
 
 impl ScenarioError {
@@ -28,7 +31,19 @@ impl ScenarioError {
             place: Place::File { file, line },
             key: None,
             problem,
+            others: Vec::new(),
         }
+    }
+
+    /// The whole message, where overrides are given by this option.
+    pub fn told(&self, option: &str) -> String {
+        let all = [self].into_iter().chain(&self.others);
+        let all = all.map(|error| match &error.place {
+            Place::Set { given } => format!("{option} {given}: {}", error.problem),
+            place => format!("{place}: {}", error.problem),
+        });
+        let all: Vec<String> = all.collect();
+        printable(&all.join("\n")).into_owned()
     }
 }
 

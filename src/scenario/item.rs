@@ -188,6 +188,7 @@ impl<'e> Item<'e> {
             place,
             key: Some(self.key()),
             problem: format!("{path}{part} = {found}: {problem}"),
+            others: Vec::new(),
         }
     }
 

@@ -115,6 +115,7 @@ impl Scenario {
             Key::Name => json!(self.name),
             Key::UnitLength => json!(self.units.length.as_deref()?),
             Key::UnitForce => json!(self.units.force.as_deref()?),
+            Key::UnitTime => json!(self.units.time.as_deref()?),
             Key::Rods => json!(self.rods.len()),
             Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
             Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),

@@ -6,13 +6,14 @@
 use super::form::Form::{self, *};
 use super::form::LeftOut::{self, *};
 use super::form::Range::*;
+use super::units::Dimension;
 
 struct Row {
     key: Key,
     path: &'static str,
     description: &'static str,
     form: Form,
-    dimension: [i32; 3],
+    dimension: Dimension,
     left_out: LeftOut,
 }
 
@@ -38,12 +39,14 @@ macro_rules! keys {
 }
 
 keys! {
-    /// the leaf's name.
-    Name "name": Text, [0, 0, 0], Required("\"my-leaf\"");
+    /// the leaf's name; left out: that of its file.
+    Name "name": Text, [0, 0, 0], Derived;
     /// name of the unit of length.
     UnitLength "units.length": Text, [0, 0, 0], Derived;
     /// name of the unit of force.
     UnitForce "units.force": Text, [0, 0, 0], Derived;
+    /// name of the unit of time.
+    UnitTime "units.time": Text, [0, 0, 0], Derived;
     /// number of rods.
     Rods "leaf.rods": Whole, [0, 0, 0], Required("5");
     /// lengths L of the rods.
@@ -244,7 +247,7 @@ impl Key {
     }
 
     /// Exponents of length, force and time in its unit.
-    pub(crate) fn dimension(self) -> [i32; 3] {
+    pub fn dimension(self) -> Dimension {
         self.row().dimension
     }
 

@@ -22,6 +22,7 @@ mod limits;
 mod load_limits;
 mod loads;
 mod material;
+mod mistakes;
 mod moduli;
 mod outline;
 mod part;
@@ -36,6 +37,7 @@ mod spelling;
 mod tip;
 mod tissue;
 mod turning;
+pub mod units;
 mod values;
 mod vectors;
 mod veins;
@@ -65,6 +67,7 @@ pub use tissue::Tissue;
 /// Values as they can be written.
 pub use toml::{Table, Value};
 pub use turning::{Begin, Turning};
+pub use units::Units;
 pub use wind::Wind;
 
 use std::sync::Arc;
@@ -137,23 +140,6 @@ impl Scenario {
     /// T: the natural unit of time, sqrt(rho L^4/A).
     fn time(&self) -> f64 {
         dynamics::time(self.scale(), &self.dynamics.density)
-    }
-}
-
-/// Names of the units a scenario is written in.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Units {
-    /// The unit of lengths.
-    pub length: Option<String>,
-    /// The unit of forces.
-    pub force: Option<String>,
-}
-
-impl Units {
-    /// The unit of energies and moments, if those of forces and lengths are named.
-    pub fn energy(&self) -> Option<String> {
-        let (force, length) = (self.force.as_ref()?, self.length.as_ref()?);
-        Some(format!("{force} {length}"))
     }
 }
 

@@ -176,6 +176,9 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     let weight = weight.fold(0.0, f64::max);
     let given = scenario.dynamics.density != Dynamics::default_for(&scenario.rods).density;
     let unit = scenario.units.length.as_deref();
+    if scenario.units.time.is_some() && !scenario.units.is_in_seconds() {
+        return None;
+    }
     let known = ACCELERATIONS.iter().find(|(name, _)| Some(*name) == unit);
     let [least, most] = match known {
         Some((_, acceleration)) if given => [*acceleration; 2],

@@ -104,6 +104,7 @@ impl Source {
             place: self.place(span.map(|span| span.start)),
             key: None,
             problem,
+            others: Vec::new(),
         }
     }
 

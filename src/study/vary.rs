@@ -37,6 +37,7 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer};
 
 use crate::branch::value_between;
+use crate::scenario::units::{Dimension, PURE, TIME};
 use crate::scenario::{Form, Key, Part, Scenario, ScenarioError};
 
 /// Default number of values.
@@ -184,6 +185,22 @@ impl Keys {
             Target::Knob(_) => 0.0,
         };
         self.0.iter().map(unit).fold(0.0, f64::max)
+    }
+
+    /// The exponents of length, force and time in the unit of their value; without a unit if they
+    /// differ, and for factors.
+    pub fn dimension(&self) -> Dimension {
+        let mut all = self.0.iter().map(|target| match target {
+            Target::Entry(part) if part.scale => PURE,
+            Target::Entry(part) => part.key.dimension(),
+            Target::Knob(Knob::Step) => TIME,
+            Target::Knob(Knob::Segments) => PURE,
+        });
+        let first = all.next().unwrap_or(PURE);
+        match all.all(|other| other == first) {
+            true => first,
+            false => PURE,
+        }
     }
 
     /// Whether all must be positive, or non-negative.

@@ -109,7 +109,7 @@ pub fn page<R: Viewed>(result: &R, scenario: &Scenario) -> String {
 /// The data of that page alone.
 pub fn view<R: Viewed>(result: &R, scenario: &Scenario) -> View {
     let mut view = bare(scenario);
-    view.summary = result.summary();
+    view.summary = result.summary(&scenario.units);
     result.fill(&mut view, &scenario.units);
     view
 }

@@ -63,7 +63,7 @@ impl Viewed for Equilibria {
     const STILL: Figure<Self> = figure::equilibria;
 
     /// Equilibria equilibria side by side.
-    fn fill(&self, view: &mut View, _: &Units) {
+    fn fill(&self, view: &mut View, units: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();
         view.verdict = counted(count, "equilibrium", "equilibria");
@@ -77,7 +77,7 @@ impl Viewed for Equilibria {
             let energy = short(leaf.energy.unwrap_or(f64::NAN));
             let label = format!("{}. {kind}, energy {energy}", k + 1);
             view.leaves.push(Leaf {
-                summary: leaf.summary(),
+                summary: leaf.summary(units),
                 ..Leaf::full(label, leaf, view)
             });
         }

@@ -10,6 +10,7 @@ use crate::report::Reported;
 use crate::report::numbers::{power_of_ten, seconds, veins_of};
 use crate::report::table::{Lines, labelled, text_cell};
 use crate::report::words::contender;
+use leafdyn::scenario::Units;
 use leafdyn::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
 /// Names of the columns that both files have.
@@ -22,7 +23,7 @@ impl Reported for Chart {
         format!("{}: {veins}, speed against accuracy", self.scenario)
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, _: &Units) -> Lines {
         let mut lines = labelled("errors", reference(self.reference.as_ref()));
         lines.push(("measured", measured(self)));
         lines.extend(labelled("front", front(self)));
@@ -265,12 +266,12 @@ mod tests {
         for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        let text = chart.report(Vec::new(), false);
+        let text = chart.report(&Units::default(), Vec::new(), false);
         assert!(text.contains("that is NOT CONFIRMED"), "{text}");
         let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
         assert!(text.contains(failed), "{text}");
         chart.reference = None;
-        let text = chart.report(Vec::new(), false);
+        let text = chart.report(&Units::default(), Vec::new(), false);
         let unknown = "  errors   not known: no equilibrium was found";
         assert!(text.contains(unknown), "{text}");
     }

@@ -5,10 +5,13 @@ use glam::DVec3;
 use super::relax::found;
 use crate::report::Reported;
 use crate::report::numbers::{
-    as_accurate, bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, veins,
+    as_accurate, bound, bound_of_positions, decimals, eigenvalues, grids, in_unit, point,
+    power_of_ten, seconds, veins,
 };
 use crate::report::table::{Lines, labelled};
 use crate::report::words::{equilibrium_of_index, headline, shooting};
+use leafdyn::scenario::Units;
+use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH};
 use leafdyn::study::ShootingSolution as Solution;
 use leafdyn::study::{Check, Place, Quantity, Verdict};
 
@@ -18,11 +21,11 @@ impl Reported for Check {
         format!("{name}: {veins}, relaxed and by shooting")
     }
 
-    fn lines(&self) -> Lines {
-        let mut lines = vec![("verdict", judgement(self))];
-        lines.extend(results(self));
-        lines.extend(labelled("differ", differences(self)));
-        lines.extend(labelled("error", errors(self)));
+    fn lines(&self, units: &Units) -> Lines {
+        let mut lines = vec![("verdict", judgement(self, units))];
+        lines.extend(results(self, units));
+        lines.extend(labelled("differ", differences(self, units)));
+        lines.extend(labelled("error", errors(self, units)));
         lines.extend(self.solution().into_iter().flat_map(shooting_details));
         // Otherwise the verdict explains why the leaf is not at rest.
         if let (Some(remark), true) = (&self.relaxed.remark, self.shot.is_some()) {
@@ -33,8 +36,9 @@ impl Reported for Check {
     }
 }
 
-fn judgement(check: &Check) -> String {
+fn judgement(check: &Check, units: &Units) -> String {
     let [position, rotation] = [check.allowed(), check.allowed_rotation()].map(power_of_ten);
+    let position = in_unit(position, units, LENGTH);
     let allowed = format!("positions within {position}, rotations within {rotation} rad");
     let headline = headline(&check.verdict);
     match &check.verdict {
@@ -48,7 +52,7 @@ fn judgement(check: &Check) -> String {
 }
 
 /// The result and the time of each method.
-fn results(check: &Check) -> Lines {
+fn results(check: &Check, units: &Units) -> Lines {
     let relaxed = &check.relaxed;
     let found = format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds));
     let mut lines = vec![("relaxed", found)];
@@ -61,14 +65,17 @@ fn results(check: &Check) -> Lines {
         format!("{found} in {}", seconds(shot.wall_seconds))
     });
     lines.push(("shooting", shot.unwrap_or_else(|| "not tried".into())));
-    let place = |tip: &DVec3| point(tip.to_array(), decimals(relaxed));
+    let place = |tip: &DVec3| {
+        let tip = point(tip.to_array(), decimals(relaxed));
+        in_unit(tip, units, LENGTH)
+    };
     if let [tip] = relaxed.tips.as_slice() {
         lines.push(("tip", format!("{} relaxed", place(tip))));
         if let Some([tip]) = check.shot.as_ref().map(|shot| shot.tips.as_slice()) {
             lines.push(("", format!("{} by shooting", place(tip))));
         }
     }
-    let digits = |energy: f64| as_accurate(relaxed, energy, energy);
+    let digits = |energy: f64| in_unit(as_accurate(relaxed, energy, energy), units, ENERGY);
     let mut energy = digits(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
     if let Some(solution) = check.solution() {
         energy += &format!(", {} by shooting", digits(solution.energy));
@@ -78,24 +85,20 @@ fn results(check: &Check) -> Lines {
 }
 
 /// The largest differences, and where they are.
-fn differences(check: &Check) -> Vec<String> {
+fn differences(check: &Check, units: &Units) -> Vec<String> {
     let Some(difference) = &check.difference else {
         return Vec::new();
     };
     let line = |quantity: Quantity| {
         let (word, largest) = (quantity.word(), quantity.of(difference));
-        let unit = match quantity {
-            Quantity::Rotation => " rad",
-            _ => "",
-        };
         match check.farthest(quantity) {
             Some(Place { rod, sigma }) if largest > 0.0 => {
                 let place = match check.relaxed.shape.rods.len() {
                     1 => format!("at {sigma:.3} of the length"),
                     _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
                 };
-                let largest = power_of_ten(largest);
-                format!("{word}s by {largest}{unit} at most, {place}")
+                let largest = with_unit(power_of_ten(largest), quantity, units);
+                format!("{word}s by {largest} at most, {place}")
             }
             _ => format!("{word}s not at all"),
         }
@@ -103,22 +106,34 @@ fn differences(check: &Check) -> Vec<String> {
     Quantity::ALL.into_iter().map(line).collect()
 }
 
+/// A number with the unit of its quantity.
+fn with_unit(number: String, quantity: Quantity, units: &Units) -> String {
+    match quantity {
+        Quantity::Position => in_unit(number, units, LENGTH),
+        Quantity::Rotation => number + " rad",
+        Quantity::Force => in_unit(number, units, FORCE),
+        Quantity::Moment => in_unit(number, units, ENERGY),
+    }
+}
+
 /// The error estimates of both methods.
-fn errors(check: &Check) -> Vec<String> {
+fn errors(check: &Check, units: &Units) -> Vec<String> {
     let relaxed = &check.relaxed;
     let mut lines = vec![match relaxed.accuracy.error_estimate {
         Some(error) => {
-            let (error, grids) = (bound(error), grids(relaxed));
+            let (error, grids) = (bound_of_positions(error, units), grids(relaxed));
             format!("relaxed: positions within {error}, from {grids}")
         }
         None => "relaxed: not known".into(),
     }];
     if let Some(Solution { error, .. }) = check.solution() {
-        let unit = if error.rotation == 0.0 { "" } else { " rad" };
         let [position, rotation, force, moment] =
-            [error.position, error.rotation, error.force, error.moment].map(bound);
+            Quantity::ALL.map(|quantity| match quantity.of(error) {
+                0.0 => bound(0.0),
+                error => with_unit(bound(error), quantity, units),
+            });
         lines.push(format!(
-            "shooting: positions within {position}, rotations {rotation}{unit}, forces {force}, moments {moment}"
+            "shooting: positions within {position}, rotations {rotation}, forces {force}, moments {moment}"
         ));
     }
     lines.extend(check.within_estimates.map(|within| {
@@ -146,7 +161,7 @@ mod tests {
 
     #[test]
     fn another_equilibrium_is_called_unstable() {
-        let report = sample::check(1, 8, 0.1).report(Vec::new(), false);
+        let report = sample::check(1, 8, 0.1).report(&Units::default(), Vec::new(), false);
         for part in [
             "fan: 1 vein, relaxed and by shooting\n",
             "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad, the same index\n",

@@ -1,9 +1,13 @@
 //! All equilibria of a leaf, as text.
 
 use crate::report::Reported;
-use crate::report::numbers::{as_accurate, counted, decimals, point, power_of_ten, seconds, veins};
+use crate::report::numbers::{
+    as_accurate, bound_of_positions, counted, decimals, in_unit, point, seconds, veins,
+};
 use crate::report::table::{Lines, labelled};
 use crate::report::words::stable_or_index;
+use leafdyn::scenario::Units;
+use leafdyn::scenario::units::{ENERGY, LENGTH};
 use leafdyn::study::{Equilibria, Found};
 
 impl Reported for Equilibria {
@@ -14,11 +18,11 @@ impl Reported for Equilibria {
     }
 
     /// The equilibria, lowest energy first.
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let found = self.found.iter().enumerate();
         let mut lines = labelled(
             "found",
-            found.map(|(number, found)| equilibrium_line(number, found)),
+            found.map(|(number, found)| equilibrium_line(number, found, units)),
         );
         let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
         let stable = self.found.iter().filter(stable).count();
@@ -45,16 +49,19 @@ impl Reported for Equilibria {
     }
 }
 
-fn equilibrium_line(number: usize, found: &Found) -> String {
+fn equilibrium_line(number: usize, found: &Found, units: &Units) -> String {
     let leaf = &found.equilibrium;
     let index = leaf.stability.negative_eigenvalues;
     let stability = index.map_or("of unknown stability".into(), stable_or_index);
     let tip = match &leaf.tips[..] {
-        [tip] => format!(", tip {}", point(tip.to_array(), decimals(leaf))),
+        [tip] => {
+            let tip = point(tip.to_array(), decimals(leaf));
+            format!(", tip {}", in_unit(tip, units, LENGTH))
+        }
         _ => String::new(),
     };
     let within = match leaf.accuracy.error_estimate {
-        Some(error) => format!(", within {}", power_of_ten(error)),
+        Some(error) => format!(", within {}", bound_of_positions(error, units)),
         None => String::new(),
     };
     let plain = if found.plain {
@@ -64,6 +71,6 @@ fn equilibrium_line(number: usize, found: &Found) -> String {
     };
     let starts = counted(found.starts, "start", "starts");
     let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
-    let energy = as_accurate(leaf, energy, energy);
+    let energy = in_unit(as_accurate(leaf, energy, energy), units, ENERGY);
     format!("{number:>2}. energy {energy}: {stability}{tip}{within} ({starts}{plain})")
 }

@@ -4,8 +4,9 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::report::Reported;
-use crate::report::numbers::{brief, counted, rounded_to, seconds};
+use crate::report::numbers::{brief, counted, in_unit_of_key, rounded_to, seconds};
 use crate::report::table::{Lines, labelled, text_cell};
+use leafdyn::scenario::Units;
 use leafdyn::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
 
 /// Most candidates that are listed.
@@ -18,7 +19,7 @@ impl Reported for Fit {
         format!("{name}: fit of {numbers} to {count} data")
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let found = match self.outcome {
             FitOutcome::Converged => "a minimum; the data determine every free number",
             FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
@@ -26,7 +27,10 @@ impl Reported for Fit {
             FitOutcome::NotConverged => "no minimum",
         };
         let mut lines: Lines = vec![("found", found.into())];
-        lines.extend(labelled("numbers", self.parameters.iter().map(number)));
+        lines.extend(labelled(
+            "numbers",
+            self.parameters.iter().map(|it| number(it, units)),
+        ));
         lines.extend(labelled("data say", self.says.clone()));
         lines.extend(labelled("data", self.files.iter().map(read)));
         let (count, freedom) = (self.residuals.len(), self.degrees_of_freedom);
@@ -77,19 +81,26 @@ fn read(file: &DataFile) -> String {
     said.join("; ")
 }
 
-fn number(parameter: &FitParameter) -> String {
+fn number(parameter: &FitParameter, units: &Units) -> String {
     // The interval has two digits.
     let error = match (parameter.low, parameter.high) {
         (Some(low), Some(high)) => 0.05 * (high - low),
         _ => 0.0,
     };
     let digits = |value: f64| brief(rounded_to(value, error));
-    let end = |end: Option<f64>| end.map_or("?".into(), digits);
-    let (low, high) = (end(parameter.low), end(parameter.high));
-    let (key, value) = (&parameter.key, digits(parameter.value));
+    let key = &parameter.key;
+    let bounds = match (parameter.low.map(digits), parameter.high.map(digits)) {
+        (Some(low), Some(high)) => format!("95 %: {low} to {high}"),
+        (Some(low), None) => format!("95 %: at least {low}"),
+        (None, Some(high)) => format!("95 %: at most {high}"),
+        (None, None) => "no bounds".into(),
+    };
     match parameter.determined {
-        true => format!("{key} = {value} (95 %: {low} to {high})"),
-        false => format!("{key} not determined (95 %: {low} to {high})"),
+        true => {
+            let value = in_unit_of_key(digits(parameter.value), units, key);
+            format!("{key} = {value} ({bounds})")
+        }
+        false => format!("{key} is not determined ({bounds})"),
     }
 }
 

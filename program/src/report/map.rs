@@ -10,9 +10,10 @@ use csv::StringRecord;
 
 use super::FileError;
 use crate::report::Reported;
-use crate::report::numbers::{brief, seconds};
+use crate::report::numbers::{brief, in_unit, in_unit_of_key, seconds};
 use crate::report::table::{Lines, append_csv, labelled, text_cell, text_of_cell};
 use crate::report::words::map_shows;
+use leafdyn::scenario::Units;
 use leafdyn::study::{Map, MapOutcome, MapRequest, MapRow};
 
 /// The columns after those of the varied keys.
@@ -39,12 +40,14 @@ impl Reported for MapWork<'_> {
         format!("{name}: {}", map_shows(self.map.show))
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let request = &self.map.request;
         let mut lines = Lines::new();
         for axis in &request.axes {
             let ends = [axis.values.first(), axis.values.last()];
-            let [from, to] = ends.map(|end| end.map_or(String::new(), |&v| axis.keys.text(v)));
+            let text = |&value: &f64| axis.keys.text(value);
+            let [from, to] = ends.map(|end| end.map_or(String::new(), text));
+            let to = in_unit(to, units, axis.keys.dimension());
             let spacing = if axis.log { ", logarithmic" } else { "" };
             let count = axis.values.len();
             let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
@@ -58,19 +61,20 @@ impl Reported for MapWork<'_> {
         let rows = format!("{known} were there, {computed} computed in {time}");
         lines.push(("rows", rows));
         lines.extend(labelled("found", counts(self.map)));
-        lines.extend(labelled("jumps", jumps(self.map)));
+        lines.extend(labelled("jumps", jumps(self.map, units)));
         lines
     }
 }
 
 /// The first few pairs of cells between which the leaf jumps to another equilibrium.
-fn jumps(map: &Map) -> Vec<String> {
+fn jumps(map: &Map, units: &Units) -> Vec<String> {
     let all = map.jumps.as_deref().unwrap_or_default();
     let mut lines: Vec<String> = (all.iter().take(JUMPS))
         .map(|jump| {
             let (from, to) = (jump.from.join(", "), jump.to.join(", "));
             let key = &jump.key;
             let between = jump.between.map(brief).join(" and ");
+            let between = in_unit_of_key(between, units, key);
             format!("from cell {from} to {to} to another equilibrium: {key} between {between}")
         })
         .collect();

@@ -24,7 +24,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::report::table::{Lines, labelled};
-use leafdyn::scenario::{Scenario, printable};
+use leafdyn::scenario::{Scenario, Units, printable};
 
 pub use centerlines::{centerlines, modes_table, sensitivity_table};
 pub use chart::{chart_table, scaling_table};
@@ -36,7 +36,8 @@ pub use trace::{boundary_table, error_location, is_special, sides, slope_unit, t
 pub trait Reported {
     fn heading(&self) -> String;
 
-    fn lines(&self) -> Lines;
+    /// What it is, in the units of the scenario.
+    fn lines(&self, units: &Units) -> Lines;
 
     /// What it took, for those who ask.
     fn work(&self) -> Option<String> {
@@ -49,15 +50,20 @@ pub trait Reported {
     }
 
     /// All lines but that list.
-    fn summary(&self) -> Lines {
-        [self.lines(), labelled("work", self.work()), self.remarks()].concat()
+    fn summary(&self, units: &Units) -> Lines {
+        [
+            self.lines(units),
+            labelled("work", self.work()),
+            self.remarks(),
+        ]
+        .concat()
     }
 
     /// The text for the console; the work only if it is `verbose`.
-    fn report(&self, files: Vec<String>, verbose: bool) -> String {
+    fn report(&self, units: &Units, files: Vec<String>, verbose: bool) -> String {
         let work = labelled("work", self.work().filter(|_| verbose));
         let parts = [
-            self.lines(),
+            self.lines(units),
             work,
             labelled("written", files),
             self.remarks(),

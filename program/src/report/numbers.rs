@@ -2,6 +2,9 @@
 
 pub use leafdyn::numbers::{power_of_ten, superscript};
 use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Units;
+use leafdyn::scenario::units::{Dimension, LENGTH, PURE};
+use leafdyn::study::Keys;
 
 /// Digits shown after the first for a result without an error estimate.
 const DIGITS: i32 = 9;
@@ -55,6 +58,28 @@ pub fn bound(bound: f64) -> String {
     match bound {
         0.0 => "rounding".into(),
         bound => power_of_ten(bound),
+    }
+}
+
+/// A number with the unit of its dimension, if that has a name.
+pub fn in_unit(number: String, units: &Units, dimension: Dimension) -> String {
+    match units.of(dimension) {
+        Some(unit) => format!("{number} {unit}"),
+        None => number,
+    }
+}
+
+/// A value of the scenario, or of numbers that vary together, with the unit of its key.
+pub fn in_unit_of_key(number: String, units: &Units, key: &str) -> String {
+    let keys: Result<Keys, _> = key.parse();
+    in_unit(number, units, keys.map_or(PURE, |keys| keys.dimension()))
+}
+
+/// An upper bound on an error of positions.
+pub fn bound_of_positions(error: f64, units: &Units) -> String {
+    match error {
+        0.0 => bound(error),
+        error => in_unit(bound(error), units, LENGTH),
     }
 }
 
@@ -128,10 +153,11 @@ pub fn as_accurate(equilibrium: &Equilibrium, value: f64, size: f64) -> String {
 
 /// A position with `decimals` decimals.
 pub fn point(point: [f64; 3], decimals: usize) -> String {
-    let unit = 0.5 * 10f64.powi(-(decimals as i32));
-    // Avoids -0.000.
-    let positive_zero = |value: f64| if value.abs() < unit { 0.0 } else { value };
-    let [x, y, z] = point.map(|value| format!("{:.decimals$}", positive_zero(value)));
+    let least = 0.5 * 10f64.powi(-(decimals as i32));
+    let [x, y, z] = point.map(|value| match value.abs() < least {
+        true => "0".into(),
+        false => format!("{value:.decimals$}"),
+    });
     format!("({x}, {y}, {z})")
 }
 
@@ -280,7 +306,7 @@ mod tests {
 
     #[test]
     fn points_have_no_negative_zero() {
-        assert_eq!(point([1.0, -4e-4, -0.25], 3), "(1.000, 0.000, -0.250)");
+        assert_eq!(point([1.0, -4e-4, -0.25], 3), "(1.000, 0, -0.250)");
     }
 
     #[test]

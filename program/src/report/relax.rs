@@ -4,15 +4,17 @@ use crate::report::Reported;
 use crate::report::blade::blade_lines;
 use crate::report::margin::{margin_lines, tip};
 use crate::report::numbers::{
-    ROUNDING, as_accurate, bound, brief, decimals, eigenvalues, grids, known, point, rounded_to,
-    seconds, veins,
+    ROUNDING, as_accurate, bound, bound_of_positions, brief, decimals, eigenvalues, grids, in_unit,
+    in_unit_of_key, known, point, rounded_to, seconds, veins,
 };
 use crate::report::table::{Lines, labelled};
 use crate::report::words::{shooting, verdict};
 use glam::DVec3;
 use leafdyn::largest::largest;
-use leafdyn::relax::{Equilibrium, Event, Mode, Outcome, Path, Sensitivity};
-use leafdyn::scenario::Stress;
+use leafdyn::relax::{Equilibrium, Event, Mode, Model, Outcome, Path, Sensitivity};
+use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH, RATE, STRESS};
+use leafdyn::scenario::{Stress, Units};
+use std::f64::consts::TAU;
 
 /// Most modes that are listed.
 const MOST_MODES: usize = 6;
@@ -23,14 +25,15 @@ impl Reported for Equilibrium {
         format!("{name}: {veins}, method {}", self.method)
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let length = self.shape.longest();
         let mut lines = vec![("found", found(self))];
         lines.extend(self.path.as_ref().map(|path| ("path", way(path))));
         if let Some(saddle) = &self.stability.saddle {
             // It was seen on one grid.
-            let (index, energy) = (saddle.negative_eigenvalues, brief(saddle.energy));
-            let tip = tip(saddle.tip, length);
+            let index = saddle.negative_eigenvalues;
+            let energy = in_unit(brief(saddle.energy), units, ENERGY);
+            let tip = tip(saddle.tip, length, units);
             let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
             lines.push(("left", left));
         }
@@ -38,34 +41,37 @@ impl Reported for Equilibrium {
         // its tip is meaningless.
         if let Some(energy) = self.energy.filter(|energy| energy.is_finite()) {
             if let [tip] = self.tips.as_slice() {
-                lines.push(("tip", point(tip.to_array(), decimals(self))));
+                let tip = point(tip.to_array(), decimals(self));
+                lines.push(("tip", in_unit(tip, units, LENGTH)));
             }
-            lines.push(("energy", as_accurate(self, energy, energy)));
+            let energy = as_accurate(self, energy, energy);
+            lines.push(("energy", in_unit(energy, units, ENERGY)));
         }
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
             let force = felt(self, reaction.force, moments(&reaction.moments));
-            lines.push(("reaction", format!("({force}) on the holder of the tip")));
+            let force = in_unit(format!("({force})"), units, FORCE);
+            lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
             let force = felt(self, grip.force, grip.moment.map_or(0.0, DVec3::length));
-            lines.push((
-                "grip",
-                format!("({force}) on the holder of grip {}", number + 1),
-            ));
+            let force = in_unit(format!("({force})"), units, FORCE);
+            let grip = format!("{force} on the holder of grip {}", number + 1);
+            lines.push(("grip", grip));
         }
-        lines.extend(stress(self).map(|stress| ("stress", stress)));
-        lines.extend(waves(self).map(|waves| ("waves", waves)));
-        lines.push(("error", error(self)));
-        lines.extend(modes(self).map(|modes| ("modes", modes)));
-        lines.extend(labelled("changes", changes(self)));
-        let blade = self.blade.as_ref().map(blade_lines);
+        lines.extend(stress(self, units).map(|stress| ("stress", stress)));
+        lines.extend(waves(self, units).map(|waves| ("waves", waves)));
+        lines.push(("error", error(self, units)));
+        lines.extend(modes(self, units).map(|modes| ("modes", modes)));
+        lines.extend(labelled("changes", changes(self, units)));
+        let blade = self.blade.as_ref().map(|it| blade_lines(it, units));
         lines.extend(labelled("blade", blade.unwrap_or_default()));
-        let margin = self.margin.as_ref().map(|it| margin_lines(it, length));
+        let margin = self.margin.as_ref();
+        let margin = margin.map(|it| margin_lines(it, length, units));
         lines.extend(labelled("margin", margin.unwrap_or_default()));
         if !self.accuracy.segments.is_empty() {
-            lines.push(("model", self.model.description.clone()));
+            lines.push(("model", model(&self.model, units)));
         }
         lines
     }
@@ -143,15 +149,31 @@ fn felt(equilibrium: &Equilibrium, force: DVec3, moment: f64) -> String {
     force.to_array().map(|it| known(it, error)).join(", ")
 }
 
-fn error(equilibrium: &Equilibrium) -> String {
+/// What was solved for, and what of the rods' strains matters.
+fn model(model: &Model, units: &Units) -> String {
+    let moves = |effect: Option<f64>, what: &str| {
+        let effect = in_unit(bound(effect.filter(|effect| *effect > 0.0)?), units, LENGTH);
+        Some(format!("{what} moves it by {effect}"))
+    };
+    let effects = [
+        moves(model.shear_effect, "shear"),
+        moves(model.stretch_effect, "stretch"),
+    ];
+    let effects = effects.into_iter().flatten();
+    let phrases = [model.description.clone()].into_iter().chain(effects);
+    phrases.collect::<Vec<_>>().join("; ")
+}
+
+fn error(equilibrium: &Equilibrium, units: &Units) -> String {
     let source = match equilibrium.accuracy.intervals {
         Some(count) => format!("by {}", shooting(count)),
         None => format!("from {}", grids(equilibrium)),
     };
-    let wanted = bound(equilibrium.accuracy.tolerance * equilibrium.shape.longest());
+    let wanted = equilibrium.accuracy.tolerance * equilibrium.shape.longest();
+    let wanted = bound_of_positions(wanted, units);
     match equilibrium.accuracy.error_estimate {
         Some(error) => {
-            let error = bound(error);
+            let error = bound_of_positions(error, units);
             format!("positions within {error} (wanted {wanted}), {source}")
         }
         None => match equilibrium.accuracy.segments.as_slice() {
@@ -162,7 +184,7 @@ fn error(equilibrium: &Equilibrium) -> String {
 }
 
 /// The largest stress in the sections of a leaf at rest.
-fn stress(equilibrium: &Equilibrium) -> Option<String> {
+fn stress(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let of = (equilibrium.stress.as_ref()).filter(|_| equilibrium.outcome.is_at_rest())?;
     let Stress {
         normal,
@@ -177,7 +199,7 @@ fn stress(equilibrium: &Equilibrium) -> Option<String> {
     let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
     let error = OF_FORCES * error * equivalent;
     let [normal, shear, equivalent] =
-        [normal, shear, equivalent].map(|it| brief(rounded_to(it, error)));
+        [normal, shear, equivalent].map(|it| in_unit(brief(rounded_to(it, error)), units, STRESS));
     Some(format!(
         "at most {equivalent} in vein {} {place}: normal {normal}, shear {shear}",
         of.vein
@@ -189,7 +211,7 @@ fn stress(equilibrium: &Equilibrium) -> Option<String> {
 const MEASURED: f64 = 5e-4;
 
 /// The waves along the margins, if any vein has waves.
-fn waves(equilibrium: &Equilibrium) -> Option<String> {
+fn waves(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let undulation = &equilibrium.undulation;
     let margin = undulation.margin()?;
     if undulation.veins.iter().all(|vein| vein.waves() == 0.0) {
@@ -205,7 +227,10 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
     Some(match margin.wavelength {
         Some(long) => {
             let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0);
-            let digits = |it: f64| brief(rounded_to(it, error.max(MEASURED * it)));
+            let digits = |it: f64| {
+                let rounded = rounded_to(it, error.max(MEASURED * it));
+                in_unit(brief(rounded), units, LENGTH)
+            };
             let [high, long] = [high, long].map(digits);
             format!("{waves} along the margins, {high} high and {long} long; {theory}")
         }
@@ -213,26 +238,28 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
     })
 }
 
-/// The lowest eigenvalues, as growth rates and frequencies.
-fn modes(equilibrium: &Equilibrium) -> Option<String> {
+/// The lowest eigenvalues, as growth rates per time and frequencies in cycles per time.
+fn modes(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let Some(modes) = &equilibrium.stability.modes else {
         let asked = equilibrium.stability.mode_shapes;
         return asked.then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some();
-    let list = |modes: &mut dyn Iterator<Item = &Mode>| {
-        let listed: Vec<String> = modes.take(MOST_MODES).map(rate).collect();
-        listed.join(", ")
+    let list = |modes: &mut dyn Iterator<Item = &Mode>, cycle: f64| {
+        let listed = modes.take(MOST_MODES).map(|mode| rate(mode, cycle));
+        listed.collect::<Vec<_>>().join(", ")
     };
-    let growth = list(&mut modes.iter().filter(unstable));
-    let frequencies = list(&mut modes.iter().filter(|mode| !unstable(mode)));
+    let growth = list(&mut modes.iter().filter(unstable), 1.0);
+    let frequencies = list(&mut modes.iter().filter(|mode| !unstable(mode)), TAU);
+    let per_time = units.of(RATE).unwrap_or("per time".into());
+    let cycles = units.frequency().unwrap_or("cycles per time".into());
     let phrases = [
-        ("growth rates", growth),
-        ("lowest frequencies", frequencies),
+        ("growth rates", growth, per_time),
+        ("lowest frequencies", frequencies, cycles),
     ];
-    let phrases = phrases.iter().filter(|(_, list)| !list.is_empty());
+    let phrases = phrases.iter().filter(|(_, list, _)| !list.is_empty());
     let phrases: Vec<String> = phrases
-        .map(|(what, list)| format!("{what} {list}"))
+        .map(|(what, list, unit)| format!("{what} {list} {unit}"))
         .collect();
     let one_grid = modes.iter().any(|mode| mode.error.is_none());
     let note = if one_grid { " (on one grid)" } else { "" };
@@ -246,29 +273,33 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
     (!phrases.is_empty()).then(|| phrases.join("; ") + note + neutral)
 }
 
-/// The growth rate or the frequency of a mode.
-fn rate(mode: &Mode) -> String {
+/// The growth rate of a mode, or its frequency with cycles of so many radians.
+fn rate(mode: &Mode, cycle: f64) -> String {
     let rate = mode.eigenvalue.abs().sqrt();
     match mode.error {
         _ if mode.is_neutral() => "0".into(),
-        Some(error) => brief(rounded_to(rate, 0.5 * error / rate)),
-        None => brief(rate),
+        Some(error) => brief(rounded_to(rate / cycle, 0.5 * error / (rate * cycle))),
+        None => brief(rate / cycle),
     }
 }
 
-/// How the tip moves when each number changes by 1 %, or by its unit if it is zero.
-fn changes(equilibrium: &Equilibrium) -> Vec<String> {
+/// How the tip moves when each number grows by 1 %, or in proportion to it if it is zero.
+fn changes(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
     let change = |found: &Sensitivity| {
-        let (by, what) = match found.value == 0.0 {
-            true => (1.0, "one unit".into()),
-            false => (0.01 * found.value, format!("1 % of {}", brief(found.value))),
-        };
-        let tips = found.tips.iter().map(|tip| (*tip * by).to_array());
+        let (key, zero) = (&found.key, found.value == 0.0);
+        let by = if zero { 1.0 } else { 0.01 * found.value };
+        let tip = found.tips.first().map(|tip| (*tip * by).to_array());
         let error = found.tip_error.unwrap_or(0.0) * by.abs();
         let digits = |it: f64| brief(rounded_to(it, error));
-        let tips = tips.map(|tip| format!("({})", tip.map(digits).join(", ")));
-        let tips: Vec<String> = tips.take(1).collect();
-        format!("{}: by {what} the tip moves {}", found.key, tips.join(""))
+        let tip = tip.map(|tip| format!("({})", tip.map(digits).join(", ")));
+        let tip = in_unit(tip.unwrap_or_default(), units, LENGTH);
+        match zero {
+            true => {
+                let unit = in_unit_of_key("1".into(), units, key);
+                format!("{key} is 0: each {unit} of it moves the tip by {tip} at first")
+            }
+            false => format!("+1 % of {key} moves the tip by {tip}"),
+        }
     };
     let found = equilibrium.sensitivities.as_deref().unwrap_or_default();
     found.iter().map(change).collect()

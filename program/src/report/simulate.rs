@@ -1,9 +1,13 @@
 //! The text report of a simulation.
 
 use crate::report::Reported;
-use crate::report::numbers::{brief, known, point, power_of_ten, rounded_to, seconds, veins_of};
+use crate::report::numbers::{
+    brief, in_unit, known, point, power_of_ten, rounded_to, seconds, veins_of,
+};
 use crate::report::table::{Lines, labelled};
 use leafdyn::largest::{larger, largest};
+use leafdyn::scenario::Units;
+use leafdyn::scenario::units::{ENERGY, LENGTH, TIME};
 use leafdyn::simulate::{Reason, Record};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
@@ -18,19 +22,20 @@ impl Reported for Record {
         format!("{}: {veins}, method {}", self.scenario, self.scheme)
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let mut lines = vec![
-            ("moved", moved(self)),
+            ("moved", moved(self, units)),
             ("grid", format!("{} segments a vein", self.segments)),
-            ("step", step(self)),
+            ("step", step(self, units)),
         ];
         if self.choice.reason != Reason::Requested {
             lines.push(("choice", self.choice.to_string()));
         }
-        lines.extend(energy(self));
+        lines.extend(energy(self, units));
         if let [tip] = self.tips.as_slice() {
             let decimals = (DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
-            lines.push(("tip", point(tip.to_array(), decimals as usize)));
+            let tip = point(tip.to_array(), decimals as usize);
+            lines.push(("tip", in_unit(tip, units, LENGTH)));
         }
         lines.push(("speed", speed(self)));
         lines
@@ -42,20 +47,22 @@ impl Reported for Record {
     }
 }
 
-fn moved(record: &Record) -> String {
+fn moved(record: &Record, units: &Units) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
-    let (time, outputs) = (brief(record.time), record.moments.len());
-    let reached = format!("t = {time} in {steps} steps, {outputs} outputs");
-    let (outcome, duration) = (record.outcome(), brief(record.duration));
+    let time = |time: f64| in_unit(brief(time), units, TIME);
+    let (reached, outputs) = (time(record.time), record.moments.len());
+    let reached = format!("t = {reached} in {steps} steps, {outputs} outputs");
+    let (outcome, duration) = (record.outcome(), time(record.duration));
     match record.stopped {
         None => format!("to {reached}"),
         Some(_) => format!("{outcome}: only to {reached}, of t = {duration}"),
     }
 }
 
-fn step(record: &Record) -> String {
+fn step(record: &Record, units: &Units) -> String {
+    let time = |step: f64| in_unit(format!("{step:.3e}"), units, TIME);
     let longest = match record.time_step {
-        Some(step) => format!("at most {step:.3e}"),
+        Some(step) => format!("at most {}", time(step)),
         None => {
             let error = power_of_ten(record.tolerance);
             format!("so that its local error is within {error}")
@@ -63,15 +70,15 @@ fn step(record: &Record) -> String {
     };
     match record.stable_step {
         Some(bound) => {
-            let (step, limit) = (bound.step, bound.limit);
-            format!("{longest}, stable up to {step:.3e} ({limit})")
+            let (step, limit) = (time(bound.step), bound.limit);
+            format!("{longest}, stable up to {step} ({limit})")
         }
         None => longest,
     }
 }
 
 /// The energies at the end, and their balance, which should not have changed.
-fn energy(record: &Record) -> Lines {
+fn energy(record: &Record, units: &Units) -> Lines {
     let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
         return Vec::new();
     };
@@ -89,10 +96,11 @@ fn energy(record: &Record) -> Lines {
     let (start, end) = (first.energy.balance(), e.balance());
     let change = end - start;
     let [start, end] = [start, end].map(|value| known(value, larger(noise, change.abs())));
-    let change = digits(change);
+    let change = in_unit(digits(change), units, ENERGY);
     let balance = format!("{start} at the start, {end} at the end: changed by {change}");
     let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
-    vec![("energy", parts.join(", ")), ("balance", balance)]
+    let parts = in_unit(parts.join(", "), units, ENERGY);
+    vec![("energy", parts), ("balance", balance)]
 }
 
 fn speed(record: &Record) -> String {
@@ -123,7 +131,7 @@ mod tests {
         record.moments[last].energy = zero;
         record.moments[last].energy.elastic = 4.076036413;
         record.moments[last].energy.kinetic = 8.4e-30;
-        let report = record.report(Vec::new(), false);
+        let report = record.report(&Units::default(), Vec::new(), false);
         for part in [
             "  energy   kinetic 0, elastic 4.076, ",
             "  balance  4.07 at the start, 4.08 at the end: changed by 0.0071554\n",
@@ -131,7 +139,7 @@ mod tests {
             assert!(report.contains(part), "{part} in {report}");
         }
         record.moments[last].energy.elastic = 4.068881005 * (1.0 + 4e-16);
-        let report = record.report(Vec::new(), false);
+        let report = record.report(&Units::default(), Vec::new(), false);
         assert!(report.contains(": changed by 0\n"), "{report}");
     }
 
@@ -146,7 +154,7 @@ mod tests {
             percent: 70.0,
         });
         record.duration = 40.0;
-        let report = record.report(Vec::new(), false);
+        let report = record.report(&Units::default(), Vec::new(), false);
         for part in [
             "swing: 1 vein, method explicit\n",
             "  moved    diverged: only to t = 10 in ",

@@ -7,13 +7,14 @@ use serde::Serialize;
 use super::numbers;
 use crate::report::Reported;
 use crate::report::numbers::{
-    ROUNDING, bound, brief, decimals_within, known, power_of_ten, rounded_to, seconds, short,
-    veins_of,
+    ROUNDING, bound_of_positions, brief, decimals_within, in_unit, known, power_of_ten, rounded_to,
+    seconds, short, veins_of,
 };
 use crate::report::table::{Lines, csv_without_header, header, labelled};
 use crate::report::words::{branch_end, stable_or_index};
 use glam::DVec3;
 use leafdyn::scenario::Units;
+use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH};
 use leafdyn::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,
     Stuck, Trace, TraceBranch, TracePoint,
@@ -39,8 +40,9 @@ impl Reported for Trace {
         format!("{}: {veins}, followed", self.scenario)
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let [from, to] = self.range.map(|value| self.keys.text(value));
+        let to = in_unit(to, units, self.keys.dimension());
         let mut lines = vec![("vary", format!("{} from {from} to {to}", self.keys))];
         let branches = self.branches.iter().enumerate();
         let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
@@ -49,7 +51,7 @@ impl Reported for Trace {
         let errors = self.branches.iter().flat_map(|branch| &branch.points);
         let errors = errors.filter_map(|point| point.error);
         lines.extend(errors.reduce(f64::max).map(|worst| {
-            let (worst, segments) = (bound(worst), self.segments);
+            let (worst, segments) = (bound_of_positions(worst, units), self.segments);
             let what = error_location(self);
             let error = format!("{what} within {worst}, followed on {segments} segments a vein");
             ("error", error)
@@ -104,10 +106,7 @@ fn law_line(trace: &Trace, law: &Law) -> String {
 
 /// The unit of force per displacement after a blank, or nothing if it is not known.
 pub fn slope_unit(units: &Units) -> String {
-    match (&units.force, &units.length) {
-        (Some(force), Some(length)) => format!(" {force}/{length}"),
-        _ => String::new(),
-    }
+    in_unit(String::new(), units, FORCE_PER_LENGTH)
 }
 
 pub fn error_location(trace: &Trace) -> &'static str {
@@ -124,14 +123,15 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
         [tip] if point.reaction.is_none() => {
             let error = point.error.unwrap_or(WITHOUT_ERROR * tip.length());
             let decimals = decimals_within(error.max(ROUNDING * tip.length()));
-            format!(", tip {}", numbers::point(tip.to_array(), decimals))
+            let tip = numbers::point(tip.to_array(), decimals);
+            format!(", tip {}", in_unit(tip, &trace.units, LENGTH))
         }
         _ => String::new(),
     };
     let text = |force: &DVec3| {
         let error = trace.tolerance * force.length();
         let [x, y, z] = force.to_array().map(|it| short(rounded_to(it, error)));
-        format!("({x}, {y}, {z})")
+        in_unit(format!("({x}, {y}, {z})"), &trace.units, FORCE)
     };
     let reaction = point.reaction.as_ref().map(text);
     let reaction = reaction.map_or(String::new(), |force| format!(", reaction {force}"));
@@ -147,10 +147,11 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
 /// The number that varies at a point: as it was prescribed, or with the digits that its error
 /// leaves.
 fn value_of(trace: &Trace, point: &TracePoint) -> String {
-    match point.value_error {
+    let value = match point.value_error {
         Some(error) => known(point.value, error),
         None => trace.keys.text(point.value),
-    }
+    };
+    in_unit(value, &trace.units, trace.keys.dimension())
 }
 
 /// Part of its distance from the base to which a tip without an error is told.
@@ -218,20 +219,28 @@ impl Reported for Boundary {
         format!("{}: {veins}, the boundary", self.scenario)
     }
 
-    fn lines(&self) -> Lines {
+    fn lines(&self, units: &Units) -> Lines {
         let vary = self.keys.iter().zip(self.ranges).map(|(keys, [from, to])| {
-            format!("{keys} from {} to {}", keys.text(from), keys.text(to))
+            let [from, to] = [from, to].map(|value| keys.text(value));
+            let to = in_unit(to, units, keys.dimension());
+            format!("{keys} from {from} to {to}")
         });
         let mut lines = labelled("vary", vary);
         let second = &self.keys[1];
-        let start = format!("at {second} = {}", second.text(self.start));
+        let start = in_unit(second.text(self.start), units, second.dimension());
+        let start = format!("at {second} = {start}");
         lines.push(("begun", start));
         let curves = self.curves.iter().enumerate();
         let curves = curves.flat_map(|(number, curve)| curve_lines(self, number, curve));
         lines.extend(labelled("curve", curves));
         let points = self.curves.iter().flat_map(|curve| &curve.points);
         let worst = points.map(|point| point.error).reduce(f64::max);
-        lines.extend(worst.map(|worst| ("error", format!("tips within {}", bound(worst)))));
+        lines.extend(worst.map(|worst| {
+            (
+                "error",
+                format!("tips within {}", bound_of_positions(worst, units)),
+            )
+        }));
         lines.extend((self.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
         lines
     }

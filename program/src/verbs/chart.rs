@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::job::{Delivered, Job};
 use super::progress::fraction_of;
-use super::request::{Request, VerbTraits, words};
+use super::request::{FOR_EXPERTS, Request, VerbTraits, words};
 use super::{Refusal, Status};
 use crate::files;
 use crate::report::words::contender;
@@ -31,7 +31,7 @@ pub struct Chart {
     methods: Vec<Contender>,
 
     /// Measurements of other programs, as benches/peers writes them; may repeat
-    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath, help_heading = FOR_EXPERTS)]
     peers: Vec<PathBuf>,
 
     /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35

@@ -142,7 +142,7 @@ impl Job {
         }
         let report = match self.json {
             true => String::new(),
-            false => report.report(files, self.verbose),
+            false => report.report(&self.scenario.units, files, self.verbose),
         };
         Ok(Delivered {
             status: Status::of(success),

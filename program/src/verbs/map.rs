@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use super::job::{Delivered, Job};
 use super::progress::fraction_of;
-use super::request::{Request, VerbTraits};
-use super::{Refusal, Status};
+use super::request::{FOR_EXPERTS, Request, VerbTraits};
+use super::{OnInterrupt, Refusal, Status, on_interrupt};
 use crate::files::{self, Journal, Kind};
 use crate::report::{self, FileError};
 use clap::Args;
@@ -39,7 +39,7 @@ pub struct Map {
     cell_seconds: f64,
 
     /// Solve every K-th cell from the I-th on, into map-I-of-K.csv: for jobs that share a map
-    #[arg(long, value_name = "I/K")]
+    #[arg(long, value_name = "I/K", help_heading = FOR_EXPERTS)]
     shard: Option<Shard>,
 
     /// What the figure shows: outcomes, or waves: how many the margins of stable answers make
@@ -184,6 +184,14 @@ impl Map {
         }
         let open = || Journal::open(&job.folder, &self.file_name(), request, known);
         let mut journal = keeps_rows.then(open).transpose()?;
+        if journal.is_some() {
+            let file = job.folder.join(self.file_name());
+            let file = file.display();
+            let how = format!(
+                "stopped; finished cells are in {file}: the same command goes on with the others"
+            );
+            *on_interrupt() = Some(OnInterrupt::Tell(how));
+        }
         let mut line = job.progress();
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;

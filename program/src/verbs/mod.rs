@@ -21,13 +21,22 @@ use std::process::{self, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
 use crate::files::{self, Checkpointer};
 use crate::report::{FileError, Refused, json, numbers::brief};
 use leafdyn::memory::TooMuch;
 use leafdyn::relax::RefusedOption;
-use leafdyn::scenario::{Place, ScenarioError, printable};
+use leafdyn::scenario::{ScenarioError, printable};
+
+/// What the program says without a verb.
+const FIRST_HELP: &str = "\
+leafdyn finds how a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability.
+
+  leafdyn new leaf           writes leaf.toml, a scenario to begin with; leafdyn new --help: what else there is
+  leafdyn relax leaf.toml    brings it to rest: numbers here, files and a figure in out/leaf
+  leafdyn help               all verbs; leafdyn help VERB: its options";
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
@@ -89,13 +98,8 @@ fn name_options(refusal: Refusal) -> Refusal {
     {
         return format!("--{} {value}: {reason}", option.replace('_', "-")).into();
     }
-    if let Some(ScenarioError {
-        place: Place::Set { given },
-        problem,
-        ..
-    }) = cause(&refusal)
-    {
-        return printable(&format!("--set {given}: {problem}")).into();
+    if let Some(error) = cause::<ScenarioError>(&refusal) {
+        return error.told("--set").into();
     }
     match cause::<TooMuch>(&refusal) {
         Some(too_much) => format!("{too_much}, or raise the limit with --memory").into(),
@@ -115,6 +119,10 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
     JSON.store(json, Ordering::Relaxed);
     let command_line = match Cli::try_parse_from(arguments) {
         Ok(command_line) => command_line,
+        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            note(FIRST_HELP);
+            return Status::Refused as u8;
+        }
         Err(error) if error.use_stderr() => {
             let message = error.render().to_string() + suggestion(&error);
             let message = message.trim_start_matches("error: ").trim_end();
@@ -150,7 +158,7 @@ fn show_refused(error: &str, exit_status: i32) {
 
 /// How to get a scenario, if none is named.
 fn suggestion(error: &clap::Error) -> &'static str {
-    let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
+    let missing = error.kind() == ErrorKind::MissingRequiredArgument;
     match missing && error.to_string().contains("<SCENARIO>") {
         false => "",
         true => {
@@ -191,21 +199,31 @@ impl Status {
 /// Status of a run ended by Ctrl-C: 128 and the number of the signal.
 const INTERRUPTED: i32 = 130;
 
-/// Writes a checkpoint of the running simulation, if any, when the process is stopped.
-static CHECKPOINTER: Mutex<Option<Checkpointer>> = Mutex::new(None);
+/// What a run that can be continued does when the process is stopped.
+enum OnInterrupt {
+    /// A simulation writes a checkpoint.
+    Write(Checkpointer),
+    /// What is finished is on disk: how to go on.
+    Tell(String),
+}
+
+static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
 
 /// Makes Ctrl-C end the process at once, without half-written files and with a
 /// checkpoint of a simulation.
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
-        let kept = checkpointer()
-            .as_ref()
-            .and_then(Checkpointer::write_and_stop);
+        let (kept, goes_on) = match on_interrupt().as_ref() {
+            Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
+            Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
+            None => (None, None),
+        };
         files::abandon_unfinished();
         if io::stderr().is_terminal() {
             // Clears the progress line.
             let _ = write!(io::stderr(), "\r\x1b[2K");
         }
+        goes_on.iter().for_each(|how| note(how));
         let status = match kept {
             Some(kept) if !show_checkpoint(&kept) => Status::Refused as i32,
             _ => INTERRUPTED,
@@ -218,14 +236,10 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Makes Ctrl-C write a checkpoint from now on.
-fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
-    *self::checkpointer() = Some(checkpointer);
-}
-
-fn checkpointer() -> MutexGuard<'static, Option<Checkpointer>> {
+/// What Ctrl-C does from now on.
+fn on_interrupt() -> MutexGuard<'static, Option<OnInterrupt>> {
     // It is only replaced as a whole, so it is valid even if the lock is poisoned.
-    CHECKPOINTER.lock().unwrap_or_else(PoisonError::into_inner)
+    ON_INTERRUPT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Reports the time of a checkpoint, or why it could not be written; returns whether it was.

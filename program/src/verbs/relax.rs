@@ -2,7 +2,7 @@
 
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
-use super::request::{Request, VerbTraits, words};
+use super::request::{FOR_EXPERTS, Request, VerbTraits, words};
 use super::{Refusal, Status};
 use crate::files::{Kind, LIVE};
 use crate::report::numbers::brief;
@@ -31,7 +31,7 @@ pub struct Relax {
     segments: Option<usize>,
 
     /// With --method shooting: shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = FOR_EXPERTS)]
     intervals: Option<usize>,
 
     /// Which equilibrium, where there are several: that of a leaf which is loaded slowly before its tips are brought together, or of one released from arcs under all of its loads
@@ -64,7 +64,7 @@ pub struct Relax {
     margin: bool,
 
     /// Solve for the whole leaf, even if half of it would do
-    #[arg(long)]
+    #[arg(long, help_heading = FOR_EXPERTS)]
     full_model: bool,
 }
 

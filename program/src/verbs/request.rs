@@ -52,7 +52,7 @@ pub struct Request {
     stations: Option<u32>,
 
     /// Most memory that the request may take, as in 2GB; what would take more is refused before it starts [default: half of what the machine has]
-    #[arg(long, value_name = "SIZE", value_parser = memory::parse)]
+    #[arg(long, value_name = "SIZE", value_parser = memory::parse, help_heading = FOR_EXPERTS)]
     memory: Option<u64>,
 
     /// Print the result as JSON on standard output and nothing else there
@@ -63,6 +63,9 @@ pub struct Request {
     #[arg(long, short)]
     verbose: bool,
 }
+
+/// The heading in the help of options that few need.
+pub const FOR_EXPERTS: &str = "Options for experts";
 
 /// Most stations that can be requested.
 const MOST_STATIONS: i64 = 1_000_000;

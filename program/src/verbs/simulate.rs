@@ -5,8 +5,8 @@ use std::time::Instant;
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, duration, fraction_between};
 use super::request::{Request, VerbTraits, words};
+use super::{OnInterrupt, note, on_interrupt, show_checkpoint};
 use super::{Refusal, Status};
-use super::{checkpoint_on_interrupt, note, show_checkpoint};
 use crate::files::Recording;
 use crate::report::FileError;
 use crate::report::numbers::brief;
@@ -81,7 +81,7 @@ impl Simulate {
             let (name, size) = (&job.scenario.name, memory::size(bytes));
             note(&format!("{name}: some {size} to record"));
         }
-        checkpoint_on_interrupt(recording.checkpointer());
+        *on_interrupt() = Some(OnInterrupt::Write(recording.checkpointer()));
         let ended = self.follow(&mut simulation, &mut recording, job);
         if ended.is_err() {
             write_checkpoint(&recording);

@@ -1,7 +1,6 @@
 //! The result of a relaxation: the shape, its accuracy and its stability.
 
 use crate::newton::Work;
-use crate::numbers::power_of_ten;
 use crate::relax::path::Path;
 use crate::relax::request::method::Method;
 use crate::relax::result::blade::BladeReport;
@@ -99,11 +98,6 @@ impl Model {
         }
         if planar {
             phrases.push("stable out of the plane".into());
-        }
-        for (effect, what) in [(shear_effect, "shear"), (stretch_effect, "stretch")] {
-            if let Some(effect) = effect {
-                phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
-            }
         }
         Model {
             rods,

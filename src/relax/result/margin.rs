@@ -1,7 +1,6 @@
 //! The stability margin of a stable leaf.
 
 use crate::relax::saddle::Saddle;
-use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
@@ -11,9 +10,6 @@ use std::fmt;
 /// energy barrier to another equilibrium. As JSON it is `margin` in `summary.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Margin {
-    /// Names of the units, if the scenario gives any.
-    #[serde(skip)]
-    pub units: Units,
     /// Weight of the leaf: a force.
     pub weight: f64,
     /// Whether forces act at every tip, as the tips are not joined.

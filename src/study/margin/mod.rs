@@ -213,7 +213,6 @@ fn margin(
         false => (rest.stability.neutral_directions > 0).then(|| TURNS.into()),
     };
     Ok(Margin {
-        units: scenario.units.clone(),
         weight,
         every_tip: !scenario.joined && rods > 1,
         largest_push: (!held).then_some(stable.largest),
