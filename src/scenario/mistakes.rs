@@ -24,17 +24,23 @@ impl Entries {
     /// way to one that is allowed, and all are read again.
     pub(super) fn with_others(&self, error: ScenarioError) -> ScenarioError {
         let mut entries = self.clone();
-        let mut others: Vec<ScenarioError> = Vec::new();
-        while others.len() + 1 < MOST && entries.mend(others.last().unwrap_or(&error)) {
+        let mut found = vec![error.clone()];
+        while found.len() < Key::COUNT && found.last().is_some_and(|last| entries.mend(last)) {
             let Err(next) = entries.read() else {
                 break;
             };
             let follows = |told: &ScenarioError| told.key == next.key || depends(&next, told);
-            if others.iter().chain([&error]).any(follows) {
+            if found.iter().any(follows) {
                 break;
             }
-            others.push(next);
+            found.push(next);
         }
+        // The first that is missing names all others.
+        let is_missing = |error: &ScenarioError| error.key.is_some_and(|key| !self.is_given(key));
+        let first = found.iter().position(is_missing);
+        let others = found.into_iter().enumerate().skip(1);
+        let others = others.filter(|(k, error)| first == Some(*k) || !is_missing(error));
+        let others = others.map(|(_, error)| error).take(MOST - 1).collect();
         ScenarioError { others, ..error }
     }
 
@@ -63,4 +69,85 @@ fn decides(key: Key) -> bool {
 fn depends(error: &ScenarioError, on: &ScenarioError) -> bool {
     let table = |error: &ScenarioError| error.key.map(|key| key.parts().0);
     matches!(table(error), Some("section" | "blade")) && table(error) == table(on)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::{Scenario, ScenarioError};
+
+    fn refused(leaf: &str, stiffness: &str) -> ScenarioError {
+        let text = format!(
+            "[leaf]\nrods = 3\n{leaf}\n[stiffness]\nbending_2 = 1.0\nbending_3 = 1.0\n{stiffness}\n\
+             axial = inf\nshear_2 = inf\nshear_3 = inf\n[solve]\ntolerance = 3"
+        );
+        Scenario::from_toml(&text).unwrap_err()
+    }
+
+    fn lines(error: &ScenarioError) -> Vec<String> {
+        let text = error.to_string();
+        let begin = |line: &str| line.strip_prefix("scenario:").map(String::from);
+        text.lines().filter_map(begin).collect()
+    }
+
+    /// Every mistake is told once, and what a wrong entry decides is not judged.
+    #[test]
+    fn all_mistakes_are_told_at_once() {
+        let told = lines(&refused(
+            "length = 1\nfan = [0.0]\njoined = 1",
+            "torsion = -1",
+        ));
+        let keys = [
+            "leaf.fan",
+            "stiffness.torsion",
+            "leaf.joined",
+            "solve.tolerance",
+        ];
+        assert_eq!(told.len(), keys.len(), "{told:?}");
+        for key in keys {
+            assert!(
+                told.iter().any(|line| line.contains(key)),
+                "{key}: {told:?}"
+            );
+        }
+        let rods = refused("length = [1, 1, 1]\nfan = [0, 0, 0]", "torsion = 1");
+        let rods = rods.to_string().lines().count();
+        assert_eq!(rods, 1, "only the tolerance is wrong");
+        let text = "[leaf]\nrods = 0\nlength = [1, 1, 1]\nfan = [0, 0, 0]";
+        let error = Scenario::from_toml(text).unwrap_err();
+        assert!(
+            error.others.is_empty(),
+            "lists are as long as rods says: {error}"
+        );
+    }
+
+    /// A name that is none does not hide wrong values, and is not called missing as well.
+    #[test]
+    fn unknown_names_are_told_with_the_rest() {
+        let told = lines(&refused(
+            "lenght = 1\nfan = 'paper'",
+            "torsion = -1\nbending = 2",
+        ));
+        let keys = [
+            "leaf.lenght",
+            "stiffness.bending ",
+            "stiffness.torsion",
+            "solve.tolerance",
+        ];
+        assert_eq!(told.len(), keys.len(), "{told:?}");
+        for key in keys {
+            assert!(
+                told.iter().any(|line| line.contains(key)),
+                "{key}: {told:?}"
+            );
+        }
+    }
+
+    /// What follows from a wrong entry alone is not told.
+    #[test]
+    fn what_is_missing_is_told_once() {
+        let error = Scenario::from_toml("[leaf]\nrods = 2\n[solve]\ntolerance = 3").unwrap_err();
+        let told = lines(&error);
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(told[0].contains("also missing: leaf.length"), "{told:?}");
+    }
 }

@@ -351,6 +351,6 @@ fn the_schema_has_tables_within_tables() {
         schema["properties"]["grip"]["items"]["required"],
         json!(["vein", "at"])
     );
-    assert_eq!(schema["required"], json!(["name", "leaf"]));
+    assert_eq!(schema["required"], json!(["leaf"]));
     assert!(schema["properties"].get("load.point").is_none());
 }

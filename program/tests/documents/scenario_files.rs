@@ -133,7 +133,7 @@ fn files_that_cannot_be_read() {
     assert_eq!(message(&latin), expected);
     let empty = folder.path().join("empty.toml");
     fs::write(&empty, "").unwrap();
-    assert!(message(&empty).starts_with(": name is missing"));
+    assert!(message(&empty).starts_with(": leaf.rods is missing"));
 }
 
 #[test]

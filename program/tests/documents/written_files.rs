@@ -150,7 +150,10 @@ fn a_scenario_can_come_on_standard_input() {
         Run::from(child.wait_with_output().unwrap())
     };
     let fed = |text: &str| fed_to("relax - --json --set leaf.rods=2", text);
-    contains(&fed("").ends(2).err, &["standard input: name is missing"]);
+    contains(
+        &fed("").ends(2).err,
+        &["standard input: leaf.fan is missing"],
+    );
     let found = fed(&leaf("piped", 5)).ends(0).json();
     assert_eq!(found["scenario"], "piped");
     assert_eq!(found["rods"], 2);
