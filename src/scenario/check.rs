@@ -7,6 +7,7 @@ use super::error::Result;
 use super::item::Item;
 use super::key::Key;
 use super::loads::on_one_rod;
+use super::photo::photo;
 use super::section::Property;
 use super::tissue::tissue;
 use super::veins::{Made, joined, veins};
@@ -71,6 +72,7 @@ impl Entries {
         let shared = held_tip.is_some() || joined && rods.len() > 1;
         let grips = grip::grips(self, &rods, shared)?;
         let wind = wind(self, rods.len())?;
+        let photo = photo(self)?;
         let tolerance = tolerance(self.item(Key::Tolerance)?)?;
         let loads = [gravity, tip_force, tip_moment];
         let dynamics = dynamics(self, &rods, &made, loads)?;
@@ -95,6 +97,7 @@ impl Entries {
             held_tip,
             grips,
             wind,
+            photo,
             tolerance,
             dynamics,
         })

@@ -25,6 +25,8 @@ pub(crate) enum Form {
     VectorQuantity,
     /// A place along a rod, or the two ends of a stretch: fractions of the length.
     Stretch,
+    /// A pixel of a photograph, to the right and down.
+    Pixel,
     /// Base angles: a list, or a word.
     Fan,
     /// Vectors at given times.

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::key::split;
 use super::outline::Outline;
+use super::photo::axis_of;
 use super::section::{Hollow, Property, Section};
 use super::{Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, ascending};
 
@@ -92,6 +93,7 @@ impl Scenario {
             "section" => return sections?.written(key),
             "stiffness" if sections.is_some() => return None,
             "tip" => return self.of_tip(key),
+            "photo" => return self.of_photo(key),
             "tissue" => return self.of_tissue(key),
             "wind" => return self.of_wind(key),
             "dynamics" => return self.of_dynamics(key, sections),
@@ -184,6 +186,20 @@ impl Scenario {
             Key::WindDrag => number(wind.drag),
             _ => quantity(wind.width.iter()),
         })
+    }
+
+    /// A ruler is told as the scale that follows from it.
+    fn of_photo(&self, key: Key) -> Option<Value> {
+        let photo = self.photo.as_ref()?;
+        match key {
+            Key::PhotoScale => Some(number(photo.scale)),
+            Key::PhotoX => Some(number(photo.origin[0])),
+            Key::PhotoY => Some(number(photo.origin[1])),
+            Key::PhotoRotation => Some(number(photo.rotation)),
+            Key::PhotoRight => Some(json!(axis_of(photo.right))),
+            Key::PhotoUp => Some(json!(axis_of(photo.up))),
+            _ => None,
+        }
     }
 
     fn of_tip(&self, key: Key) -> Option<Value> {

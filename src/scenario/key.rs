@@ -207,6 +207,24 @@ keys! {
     WindDrag "wind.drag": Number(NotNegative), [0, 0, 0], Required("2.0");
     /// width that a rod turns to the wind.
     WindWidth "wind.width": Quantity(Positive), [1, 0, 0], Required("0.01");
+    /// length that a pixel of a photograph shows.
+    PhotoScale "photo.scale": Number(Positive), [1, 0, 0], Required("0.01");
+    /// pixels from the left edge of a photograph to the origin of the scenario.
+    PhotoX "photo.x": Number(Finite), [0, 0, 0], Required("300.0");
+    /// pixels from its upper edge down to the origin.
+    PhotoY "photo.y": Number(Finite), [0, 0, 0], Required("1200.0");
+    /// angle by which a photograph is turned counterclockwise, in radians.
+    PhotoRotation "photo.rotation": Number(Finite), [0, 0, 0], Default("0.0");
+    /// the axis to the right in a photograph that is not turned: "x", "-x", "y", ...
+    PhotoRight "photo.right": Text, [0, 0, 0], Default("\"x\"");
+    /// the axis upwards.
+    PhotoUp "photo.up": Text, [0, 0, 0], Default("\"z\"");
+    /// in place of the scale, the pixel of a point on a ruler.
+    RulerFrom "photo.ruler_from": Pixel, [0, 0, 0], Required("[120.0, 80.0]");
+    /// that of another point on it.
+    RulerTo "photo.ruler_to": Pixel, [0, 0, 0], Required("[1120.0, 80.0]");
+    /// the length between the two.
+    RulerLength "photo.ruler_length": Number(Positive), [1, 0, 0], Required("10.0");
 }
 
 impl Key {
@@ -263,7 +281,7 @@ impl Key {
 
     /// Whether the quantities of the leaf are proportional to its numbers.
     pub(crate) fn is_linear(self) -> bool {
-        !matches!(self.parts().0, "section" | "blade")
+        !matches!(self.parts().0, "section" | "blade" | "photo")
     }
 
     /// Whether a blade determines its value.
@@ -346,7 +364,7 @@ mod tests {
             assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 15);
+        assert_eq!(Key::tables().len(), 16);
         assert_eq!(Key::allowed_in("load")[..2], ["gravity", "g"]);
         assert!(Key::allowed_in("load").contains(&"point"));
         assert!(!Key::allowed_in("").contains(&"load.point"));

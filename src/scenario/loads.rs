@@ -66,6 +66,7 @@ impl Scenario {
             tip_force: none,
             tip_moment: none,
             wind: None,
+            photo: None,
             dynamics: self.dynamics.clone().with_loads(none, none, none),
             ..self.clone()
         }

@@ -26,6 +26,7 @@ mod mistakes;
 mod moduli;
 mod outline;
 mod part;
+mod photo;
 mod profile;
 mod read;
 mod schedule;
@@ -55,6 +56,7 @@ pub use key::Key;
 pub use loads::{PointLoad, Weight};
 pub use moduli::{Moduli, Stress};
 pub use part::Part;
+pub use photo::{Photo, PhotoRate};
 pub use profile::Profile;
 pub(crate) use profile::ascending;
 pub use read::{MOST_BYTES, bytes, text, utf8};
@@ -119,6 +121,8 @@ pub struct Scenario {
     pub grips: Vec<Grip>,
     /// Wind.
     pub wind: Option<Wind>,
+    /// How a photograph shows it, if points in one are data of a fit; equilibria do not depend on it.
+    pub photo: Option<Photo>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
     /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
@@ -134,6 +138,9 @@ impl Scenario {
 
     /// The natural unit of a quantity of this key.
     pub(crate) fn unit(&self, key: Key) -> f64 {
+        if let (Key::PhotoX | Key::PhotoY, Some(photo)) = (key, &self.photo) {
+            return self.scale().length / photo.scale;
+        }
         self.scale().unit(key, self.time())
     }
 

@@ -117,7 +117,11 @@ impl Part {
             Form::VectorInTime | Form::FactorInTime if self.list.is_none() => Err(format!(
                 "takes no number that could vary; its entries do: {path}.at[0]"
             )),
-            Form::Vector | Form::VectorOrInTime | Form::Fan if self.indices[0].is_none() => list(),
+            Form::Vector | Form::VectorOrInTime | Form::Fan | Form::Pixel
+                if self.indices[0].is_none() =>
+            {
+                list()
+            }
             Form::VectorPerRod | Form::VectorQuantity if self.indices[0].is_none() => list(),
             // One index is that of a component, two are those of a rod and a component.
             Form::VectorPerRod | Form::VectorQuantity

@@ -80,6 +80,9 @@ fn entry(key: Key) -> Value {
                 json!({ "type": "array", "items": fraction(), "minItems": 2, "maxItems": 2 });
             json!({ "anyOf": [fraction(), ends] })
         }
+        Form::Pixel => {
+            json!({ "type": "array", "items": number(Range::Finite), "minItems": 2, "maxItems": 2 })
+        }
         Form::Fan => json!({ "anyOf": [
             { "enum": ["paper", "symmetric"] }, list(number(Range::Finite)),
         ] }),

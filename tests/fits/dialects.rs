@@ -256,14 +256,14 @@ fn columns_are_renamed_and_converted() {
         .iter()
         .map(|point| (point.rod, point.at))
         .collect();
-    let at = |x: f64, y: f64| [Some(x * 1e-3), None, Some(y * -1e-3 + 0.5)];
+    let at = |x: f64, y: f64| [Some(x * 1e-3), None, Some(y * -1e-3 + 0.5), None, None];
     assert_eq!(points, [(0, at(898.08, 450.56)), (0, at(892.3199, 500.32))]);
 
     // Names that stand there twice have those of their groups before them, and groups their own length.
     let groups = "Vein,,Margin,\nX,Y,X,Y\n0.9976,-0.0632,0.9,-0.1\n0.9904,-0.1254,,\n,,0.7,-0.3\n";
     let data = read_with(groups, 1, &["Vein X=x", "Vein Y=z"], 1).unwrap();
     let points: Vec<_> = data.traced.iter().map(|point| point.at).collect();
-    let at = |x, z| [Some(x), None, Some(z)];
+    let at = |x, z| [Some(x), None, Some(z), None, None];
     assert_eq!(points, [at(0.9976, -0.0632), at(0.9904, -0.1254)]);
     assert_eq!(
         self::said(&data),

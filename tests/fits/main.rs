@@ -8,6 +8,7 @@ mod grips;
 mod hanging;
 mod next;
 mod numbers;
+mod photograph;
 mod refusals;
 mod starts;
 mod undetermined_family;

@@ -297,6 +297,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         held_tip: None,
         grips: Vec::new(),
         wind: None,
+        photo: None,
         tolerance: 1e-6,
     }
 }

@@ -1,18 +1,18 @@
 //! A leaf at rest under the conditions of its experiments, its predictions for the data, and
 //! their derivatives.
 
-use glam::DVec3;
-
 use super::data::Origin;
 use super::experiments::{Case, Observed};
 use super::quantity::{Kind, Quantity};
 use super::responses::Responses;
 use super::vein::Vein;
+use super::view::{COORDINATES, IN_PHOTO, View};
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::transfer::predict::weights;
 use crate::relax::{Level, Lost, Nearby, NestedEquilibrium, Parameter, unit_forces};
+use crate::scenario::{Photo, PhotoRate};
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
@@ -36,10 +36,10 @@ pub(super) struct Component {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Compared {
     Result(Quantity),
-    /// A coordinate of a point on a rod, at this fraction of its length.
+    /// One of [`COORDINATES`] of a point on a rod, at this fraction of its length.
     Vein {
         rod: usize,
-        axis: usize,
+        coordinate: usize,
         sigma: f64,
     },
 }
@@ -48,6 +48,7 @@ impl Compared {
     pub fn kind(self) -> Kind {
         match self {
             Compared::Result(quantity) => quantity.kind(),
+            Compared::Vein { coordinate, .. } if coordinate >= IN_PHOTO => Kind::Pixel,
             Compared::Vein { .. } => Kind::Length,
         }
     }
@@ -56,7 +57,7 @@ impl Compared {
     pub fn column(self) -> String {
         match self {
             Compared::Result(quantity) => quantity.to_string(),
-            Compared::Vein { axis, .. } => ["x", "y", "z"][axis].into(),
+            Compared::Vein { coordinate, .. } => COORDINATES[coordinate].into(),
         }
     }
 
@@ -120,6 +121,7 @@ impl CaseAt {
     /// The components of an experiment.
     fn compared<'v>(&'v self, of: &Observed, veins: &mut Vec<Option<Vein<'v>>>) -> Vec<Component> {
         let mut components = Vec::new();
+        let view = self.view();
         for measured in &of.experiment.measured {
             components.push(Component {
                 experiment: of.number,
@@ -137,20 +139,20 @@ impl CaseAt {
             let beside = traced.sigma.is_none();
             let (sigma, model) = match traced.sigma {
                 Some(sigma) => (sigma, vein.point(sigma).0),
-                None => vein.nearest(traced.at),
+                None => vein.nearest(&traced.at, &view),
             };
             let seen = traced.at.iter().enumerate();
-            let seen = seen.filter_map(|(axis, value)| value.map(|value| (axis, value)));
-            for (number, (axis, observed)) in seen.enumerate() {
+            let seen = seen.filter_map(|(k, value)| value.map(|value| (k, value)));
+            for (number, (coordinate, observed)) in seen.enumerate() {
                 components.push(Component {
                     experiment: of.number,
                     what: Compared::Vein {
                         rod: traced.rod,
-                        axis,
+                        coordinate,
                         sigma,
                     },
                     observed,
-                    model: model[axis],
+                    model: view.of(coordinate, model),
                     sd: traced.sd,
                     free: beside && number == 0,
                     origin: Some(traced.origin.clone()),
@@ -215,6 +217,16 @@ impl CaseAt {
         }
     }
 
+    /// How points on its veins are seen.
+    pub fn view(&self) -> View<'_> {
+        View::new(self.photo())
+    }
+
+    fn photo(&self) -> Option<&Photo> {
+        let leaf = &self.at.levels[0].leaf.leaf;
+        leaf.scenario().photo.as_ref()
+    }
+
     fn length(&self) -> f64 {
         self.at.levels[0].leaf.leaf.scale.length
     }
@@ -227,6 +239,7 @@ impl CaseAt {
     pub fn unit(&self, kind: Kind) -> f64 {
         match kind {
             Kind::Length => self.length(),
+            Kind::Pixel => self.length() / self.photo().map_or(1.0, |photo| photo.scale),
             Kind::Force => self.force(),
             Kind::Frequency => {
                 let physics = Physics::new(&self.at.levels[0].leaf.leaf);
@@ -308,44 +321,67 @@ impl CaseAt {
         }
     }
 
-    /// The derivatives of the coordinates of a point on a vein; for the nearest point to an
-    /// unmarked one, only the components normal to the vein.
+    /// The derivatives of the coordinates of a point on a vein by numbers that change the leaf and its
+    /// photograph; for the nearest point to an unmarked one, only the components normal to the vein.
     pub fn vein_rates(
         &self,
-        responses: &Responses,
+        (responses, photos): (&Responses, &[PhotoRate]),
         (rod, sigma): (usize, f64),
         point: &[&Component],
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
-        let stencils = self.at.stencils(sigma);
-        let axes: Vec<usize> = (point.iter())
-            .map(|component| match component.what {
-                Compared::Vein { axis, .. } => axis,
-                Compared::Result(_) => 0,
-            })
-            .collect();
-        let mut along = DVec3::ZERO;
-        if point.iter().any(|component| component.free) {
-            let slope = self.at.best(|k, level| {
+        let (view, stencils) = (self.view(), self.at.stencils(sigma));
+        let coordinates = point.iter().map(|component| match component.what {
+            Compared::Vein { coordinate, .. } => coordinate,
+            Compared::Result(_) => 0,
+        });
+        let coordinates: Vec<usize> = coordinates.collect();
+        let of_vein = |derivative: usize| {
+            self.at.best(|k, level| {
                 let base = level.state.base(rod);
-                stencils[k][1].value(|i| level.state.x[base + i])
-            });
-            axes.iter().for_each(|&axis| along[axis] = slope[axis]);
-            along = along.normalize_or_zero();
+                stencils[k][derivative].value(|i| level.state.x[base + i])
+            })
+        };
+        let mut along = vec![0.0; coordinates.len()];
+        if point.iter().any(|component| component.free) {
+            let slope = of_vein(1);
+            let seen = coordinates.iter().map(|k| view.along(*k, slope));
+            along = normalized(seen.collect());
         }
-        let change = |responses: &Vec<Response>| {
+        let place = of_vein(0) * self.length();
+        let change = |(responses, photo): (&Vec<Response>, &PhotoRate)| -> Vec<f64> {
             let change = self.at.best(|k, level| {
                 stencils[k][0].value(|i| shift(&responses[k].of_node(&level.leaf, rod, i)))
             }) * self.length();
-            let mut seen = DVec3::ZERO;
-            axes.iter().for_each(|&axis| seen[axis] = change[axis]);
-            seen - seen.dot(along) * along
+            let seen = |k: &usize| view.along(*k, change) + view.rate(*k, place, photo);
+            let seen: Vec<f64> = coordinates.iter().map(seen).collect();
+            let part: f64 = seen.iter().zip(&along).map(|(a, b)| a * b).sum();
+            let both = seen.iter().zip(&along);
+            both.map(|(seen, along)| seen - part * along).collect()
         };
-        let changes: Vec<DVec3> = responses.each.iter().map(change).collect();
-        let row = |&axis: &usize| {
+        let changes: Vec<Vec<f64>> = responses.each.iter().zip(photos).map(change).collect();
+        let row = |place: usize| {
             let all = changes.iter().zip(slopes);
-            all.map(|(change, slope)| change[axis] * slope).collect()
+            all.map(|(change, slope)| change[place] * slope).collect()
         };
-        axes.iter().map(row).collect()
+        (0..coordinates.len()).map(row).collect()
     }
+
+    /// How its photograph changes with each of these numbers.
+    pub fn photo_rates(&self, numbers: &[Parameter]) -> Vec<PhotoRate> {
+        let rate = |number: &Parameter| {
+            let terms = self.photo().and_then(|_| number.rate()).unwrap_or_default();
+            let photos = terms.iter();
+            let photos = photos.filter_map(|(weight, it)| Some((*weight, it.photo.as_ref()?)));
+            PhotoRate::of(photos)
+        };
+        numbers.iter().map(rate).collect()
+    }
+}
+
+/// A vector of length one, or zero.
+fn normalized(vector: Vec<f64>) -> Vec<f64> {
+    let length = vector.iter().map(|it| it * it).sum::<f64>().sqrt();
+    let by = if length > 0.0 { 1.0 / length } else { 0.0 };
+    vector.into_iter().map(|it| it * by).collect()
 }

@@ -5,6 +5,7 @@ use super::FitError;
 use super::case::{CaseAt, Component};
 use super::least_squares::Weighting;
 use super::model::{INSIGNIFICANT, Model, Point};
+use super::quantity::Kind;
 use crate::relax::{Grids, LARGEST_TOLERANCE, Options};
 
 /// Error of an iteration on them: of positions, in standard deviations.
@@ -23,7 +24,12 @@ impl<'a> Model<'a> {
     ) -> Result<(Model<'a>, Point), FitError> {
         let length = self.base.scenario().scale().length;
         let sd = |component: &Component| component.sd.unwrap_or(weighting.assumed);
-        let least = accurate.components().map(sd).fold(f64::INFINITY, f64::min);
+        let in_lengths = |component: &Component| match component.what.kind() {
+            Kind::Pixel => sd(component) * self.pixel(),
+            _ => sd(component),
+        };
+        let all = accurate.components().map(in_lengths);
+        let least = all.fold(f64::INFINITY, f64::min);
         let tolerance = (ITERATED * least / length).min(LARGEST_TOLERANCE);
         let model = Model {
             options: Options {

@@ -11,7 +11,9 @@ use crate::study::Keys;
 pub(super) const NAME: &str = "experiment";
 
 /// Columns of points on veins.
-pub(super) const TRACED: [&str; 7] = ["rod", "x", "y", "z", "sigma", "sd", NAME];
+pub(super) const TRACED: [&str; 9] = [
+    "rod", "x", "y", "z", "pixel_x", "pixel_y", "sigma", "sd", NAME,
+];
 
 /// Whether this is the name of a column that a fit uses.
 pub(super) fn is_known(name: &str) -> bool {

@@ -14,9 +14,11 @@ pub(super) const BEYOND: f64 = 3.0;
 /// that part of the larger one.
 pub(super) fn misses<'s>(stats: &'s Statistics) -> impl Iterator<Item = &'s Component> {
     let longest = longest(&stats.model.base.scenario().rods);
+    let pixel = stats.model.pixel();
     stats.point.components().filter(move |component| {
         let (data, model) = (component.observed.abs(), component.model.abs());
         let size = match component.what {
+            Compared::Vein { .. } if component.what.kind() == Kind::Pixel => longest / pixel,
             Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
             Compared::Result(Quantity::Frequency(_)) => data.max(model),
             Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => f64::INFINITY,

@@ -6,6 +6,7 @@ use super::FitError;
 use super::columns::{MeasuredColumn, NAME, Reading, TRACED};
 use super::quantity::Quantity;
 use super::table::{Table, refuse};
+use super::view::{COORDINATES, IN_PHOTO, Seen};
 use crate::study::Keys;
 
 /// Origin of a number: a file and a line.
@@ -56,12 +57,19 @@ pub struct Traced {
     pub rod: usize,
     /// Fraction of the length, for a marked point.
     pub sigma: Option<f64>,
-    /// The coordinates measured.
-    pub at: [Option<f64>; 3],
+    /// The coordinates measured: x, y, z, or pixels of a photograph to the right and down.
+    pub at: [Option<f64>; 5],
     /// Standard deviation of each, if known.
     pub sd: Option<f64>,
     /// Its position in the data.
     pub origin: Origin,
+}
+
+impl Traced {
+    /// Whether it was traced in a photograph.
+    pub(super) fn is_in_photo(&self) -> bool {
+        self.at[IN_PHOTO..].iter().any(Option::is_some)
+    }
 }
 
 /// A file of data, and how much of it was read.
@@ -118,10 +126,8 @@ impl Data {
             names: table.names.clone(),
         });
         // A table of points has at least two of these, or one and sigma.
-        match ["rod", "x", "y", "z"]
-            .iter()
-            .any(|name| table.column(name).is_some())
-        {
+        let mut names = COORDINATES.iter().chain(&["rod"]);
+        match names.any(|name| table.column(name).is_some()) {
             true => self.read_traced(&table, veins),
             false => {
                 let experiments = experiments(&table, false, self.experiments.len())?;
@@ -192,10 +198,19 @@ impl Data {
                     format!("sigma = {sigma}: is a fraction of the vein's length, from 0 to 1");
                 return Err(refuse(table.file, line, why));
             }
-            let at = [number("x")?, number("y")?, number("z")?];
-            let seen = at.iter().flatten().count();
-            if seen < 2 && sigma.is_none() || seen == 0 {
-                let why = "at least two of x, y, z are needed, or one and sigma";
+            let mut at = Seen::default();
+            for (place, name) in at.iter_mut().zip(COORDINATES) {
+                *place = number(name)?;
+            }
+            let [seen, pixels] = [&at[..IN_PHOTO], &at[IN_PHOTO..]]
+                .map(|coordinates| coordinates.iter().flatten().count());
+            if seen > 0 && pixels > 0 {
+                let why = "a point has coordinates x, y, z, or those in a photograph, pixel_x, pixel_y: \
+                           leave one of them out";
+                return Err(refuse(table.file, line, why));
+            }
+            if seen + pixels < 2 && sigma.is_none() || seen + pixels == 0 {
+                let why = "at least two of x, y, z are needed, or pixel_x and pixel_y, or one of them and sigma";
                 return Err(refuse(table.file, line, why));
             }
             let experiment = column(NAME).map(|column| table.cell(row, column));
@@ -264,7 +279,7 @@ fn column(table: &Table, name: &str) -> Result<Column, FitError> {
             false => format!(
                 "unknown column {name}: columns are keys of the scenario, such as \
                  load.tip_force[0], results ({}), their standard deviations (sd_tip_x), \
-                 experiment, a name, or rod, x, y, z of points on veins; {}",
+                 experiment, a name, or rod, x, y, z (or pixel_x, pixel_y) of points on veins; {}",
                 Quantity::ALL,
                 renamed(name)
             ),

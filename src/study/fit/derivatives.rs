@@ -88,6 +88,7 @@ impl CaseAt {
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();
+        let photos = self.photo_rates(numbers);
         // Measured more than once, a result has the same derivatives.
         let mut known: Vec<(Quantity, Vec<f64>)> = Vec::new();
         let mut index = 0;
@@ -116,7 +117,7 @@ impl CaseAt {
                     };
                     let point: Vec<&Component> =
                         self.components[index..].iter().take_while(same).collect();
-                    let rows = self.vein_rates(responses, (rod, sigma), &point, slopes);
+                    let rows = self.vein_rates((responses, &photos), (rod, sigma), &point, slopes);
                     index += point.len();
                     gradients.extend(rows);
                 }

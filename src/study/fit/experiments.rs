@@ -51,7 +51,7 @@ impl Case {
         self.observed.iter().flat_map(|it| &it.experiment.measured)
     }
 
-    pub fn traced(&self) -> impl Iterator<Item = &Traced> {
+    pub fn traced(&self) -> impl Iterator<Item = &Traced> + Clone {
         self.observed.iter().flat_map(|it| &it.traced)
     }
 

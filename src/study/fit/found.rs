@@ -264,11 +264,14 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
         let curves = finest.state.x.chunks(nodes);
         let curves = curves.map(|rod| rod.iter().map(|x| *x * length).collect());
         let curves: Vec<_> = curves.collect();
+        let view = at.view();
         for observed in &case.observed {
             let traced = observed.traced.iter();
             let leaf = FitLeaf {
                 curves: curves.clone(),
-                traced: traced.map(|traced| (traced.rod, traced.at)).collect(),
+                traced: { traced }
+                    .map(|traced| (traced.rod, view.place(&traced.at)))
+                    .collect(),
             };
             leaves.push((observed.number, observed.experiment.name.clone(), leaf));
         }

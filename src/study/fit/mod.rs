@@ -31,6 +31,7 @@ mod starts;
 mod statistics;
 mod table;
 mod vein;
+mod view;
 mod words;
 
 pub use columns::{MeasuredColumn, Reading};

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::FitError;
 use super::case::{CaseAt, Component};
-use super::data::{Data, Measured, Origin};
+use super::data::{Data, Measured, Origin, Traced};
 use super::experiments::{self, Case};
 use super::free::Coordinate;
 use super::quantity::{Kind, Quantity};
@@ -97,6 +97,17 @@ impl<'a> Model<'a> {
                     "{} of free tips: there are {rods} of them: give the tips as points on \
                      veins (rod, sigma = 1, x, y, z)",
                     measured.quantity
+                );
+                return Err(FitError::Data(why));
+            }
+            let mut traced = case.traced();
+            if let Some(traced) = traced.find(|traced| traced.is_in_photo())
+                && base.scenario().photo.is_none()
+            {
+                let why = format!(
+                    "{}: pixels of a photograph: say in the scenario how it shows the leaf, by [photo] with \
+                     scale, x and y",
+                    traced.origin
                 );
                 return Err(FitError::Data(why));
             }
@@ -251,7 +262,9 @@ impl<'a> Model<'a> {
         let mut measured = self.cases.iter().flat_map(Case::measured);
         let mut traced = self.cases.iter().flat_map(Case::traced);
         let lengths = |measured: &Measured| measured.quantity.kind() == Kind::Length;
+        let in_photo = traced.clone().any(Traced::is_in_photo);
         match traced.next().is_some() || measured.clone().all(lengths) {
+            true if in_photo => self.base.scenario().scale().length / self.pixel(),
             true => self.base.scenario().scale().length,
             false => {
                 let sizes = measured.by_ref().filter_map(|measured| measured.value);
@@ -259,6 +272,12 @@ impl<'a> Model<'a> {
                 size.max(f64::MIN_POSITIVE)
             }
         }
+    }
+
+    /// The length of a pixel of its photograph before the fit, if there is one.
+    pub fn pixel(&self) -> f64 {
+        let photo = self.base.scenario().photo.as_ref();
+        photo.map_or(1.0, |photo| photo.scale)
     }
 
     /// Values of the coordinates after `step` times a change, within their bounds.
@@ -291,7 +310,14 @@ impl<'a> Model<'a> {
                 };
                 tolerance = known.min(tolerance);
             }
-            let traced = case.traced().map(|traced| INSIGNIFICANT * sd(traced.sd));
+            let traced = case.traced().map(|traced| {
+                let unit = if traced.is_in_photo() {
+                    self.pixel()
+                } else {
+                    1.0
+                };
+                INSIGNIFICANT * unit * sd(traced.sd)
+            });
             tolerance = traced.fold(tolerance, f64::min);
         }
         Model {
@@ -344,7 +370,7 @@ impl<'a> Model<'a> {
             let kind = datum.what.kind();
             let size = match kind {
                 // A vein is extended to any point that was traced.
-                Kind::Length => case.unit(kind),
+                Kind::Length | Kind::Pixel => case.unit(kind),
                 _ => case.unit(kind).max(datum.model.abs()),
             };
             let why = match datum.sd {

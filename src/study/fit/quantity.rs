@@ -33,6 +33,8 @@ impl Quantity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Length,
+    /// Of photographs.
+    Pixel,
     Force,
     Frequency,
 }

@@ -251,6 +251,7 @@ pub(super) fn sum(weighting: Weighting, point: &Point) -> f64 {
 /// relative to the largest of their kind.
 pub(super) fn misfit(model: &Model, point: &Point) -> f64 {
     let longest = longest(&model.base.scenario().rods);
+    let pixel = model.pixel();
     let largest = |kind: Kind| {
         let alike = point.components().filter(move |c| c.what.kind() == kind);
         alike.fold(0.0_f64, |most, c| most.max(c.observed.abs()))
@@ -259,6 +260,7 @@ pub(super) fn misfit(model: &Model, point: &Point) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0_f64);
     for component in point.components() {
         let size = match component.what {
+            Compared::Vein { .. } if component.what.kind() == Kind::Pixel => longest / pixel,
             Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
             Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => force,
             Compared::Result(Quantity::Frequency(_)) => frequency,

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::view::{Seen, View};
 use crate::relax::{NestedEquilibrium, Stencil};
 
 /// Iterations for the nearest point between two nodes, and its accuracy.
@@ -49,10 +50,13 @@ impl<'a> Vein<'a> {
     /// and the point there. The vein is extended straight beyond its ends: a traced
     /// point near an end is compared across the vein like all others, so that noise along
     /// it, half of which is beyond the end, does not lengthen the vein.
-    pub fn nearest(&self, seen: [Option<f64>; 3]) -> (f64, DVec3) {
-        let mask = DVec3::from_array(seen.map(|value| f64::from(u8::from(value.is_some()))));
-        let seen = DVec3::from_array(seen.map(|value| value.unwrap_or(0.0)));
-        let square = |node: &(f64, DVec3)| (mask * (node.1 - seen)).length_squared();
+    pub fn nearest(&self, seen: &Seen, view: &View) -> (f64, DVec3) {
+        let known = || {
+            let known = seen.iter().enumerate();
+            known.filter_map(|(coordinate, value)| Some((coordinate, (*value)?)))
+        };
+        let apart = |x: DVec3| known().map(move |(k, value)| (k, view.of(k, x) - value));
+        let square = |node: &(f64, DVec3)| apart(node.1).map(|(_, it)| it * it).sum::<f64>();
         let order =
             |a: &usize, b: &usize| square(&self.nodes[*a]).total_cmp(&square(&self.nodes[*b]));
         let last = self.nodes.len().saturating_sub(1);
@@ -62,8 +66,13 @@ impl<'a> Vein<'a> {
         // The derivative of half the squared distance, and the point.
         let rate = |sigma: f64| {
             let (x, slope) = self.point(sigma);
-            let slope = mask * slope;
-            (slope.dot(x - seen), slope.length_squared(), x)
+            let (mut value, mut squared) = (0.0, 0.0);
+            for (k, apart) in apart(x) {
+                let slope = view.along(k, slope);
+                value += slope * apart;
+                squared += slope * slope;
+            }
+            (value, squared, x)
         };
         // Newton's method without the curvature, then the secant method; bisection where a step
         // leaves the bracket of the zero.
