@@ -24,7 +24,7 @@ pub fn power_of_ten(bound: f64) -> String {
 pub fn two_digits(number: f64) -> String {
     let rounded = format!("{number:.1e}");
     match rounded.split_once('e') {
-        Some((digits, power)) if !(1e-3..1e4).contains(&number) => match power.parse() {
+        Some((digits, power)) if !(1e-3..1e4).contains(&number.abs()) => match power.parse() {
             Ok(power) => format!("{digits}×10{}", superscript(power)),
             Err(_) => rounded,
         },
@@ -57,8 +57,8 @@ mod tests {
 
     #[test]
     fn two_digits_are_rounded_to_the_nearest() {
-        let numbers = [0.8749, 2149.0, 28_400_000.0, 0.099_9, 9999.0, 3e-7, 12.0].map(two_digits);
-        let wanted = ["0.87", "2100", "2.8×10⁷", "0.1", "10000", "3.0×10⁻⁷", "12"];
+        let numbers = [0.8749, 2149.0, 28_400_000.0, 0.099_9, 9999.0, 3e-7, -12.0].map(two_digits);
+        let wanted = ["0.87", "2100", "2.8×10⁷", "0.1", "10000", "3.0×10⁻⁷", "-12"];
         assert_eq!(numbers, wanted);
         assert_eq!(two_digits(f64::INFINITY), "inf");
     }

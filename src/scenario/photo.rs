@@ -164,7 +164,7 @@ pub(super) fn axis_of(direction: DVec3) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::DualNum;
+    use num_dual::{Dual64, DualNum};
 
     fn picture() -> Photo {
         Photo {
@@ -176,8 +176,8 @@ mod tests {
         }
     }
 
-    /// The picture of a point, as the definition says, for any number.
-    fn pixel<D: DualNum<Primitive> + Copy>(by: [D; 4], right: f64, up: f64) -> [D; 2] {
+    /// The pixel of a point, as the definition says.
+    fn seen(by: [Dual64; 4], right: f64, up: f64) -> [Dual64; 2] {
         let [scale, x, y, rotation] = by;
         let (sin, cos) = rotation.sin_cos();
         [
@@ -185,8 +185,6 @@ mod tests {
             y - (sin * right + cos * up) / scale,
         ]
     }
-
-    type Primitive = f64;
 
     #[test]
     fn a_point_comes_back_from_its_pixel() {
@@ -210,7 +208,6 @@ mod tests {
 
     #[test]
     fn its_derivatives_are_those_of_dual_numbers() {
-        use num_dual::Dual64;
         let photo = picture();
         let point = DVec3::new(0.7, -1.3, 2.1);
         let values = [
@@ -226,9 +223,9 @@ mod tests {
                 origin: [unit(1), unit(2)],
                 rotation: unit(3),
             };
-            let mut dual = values.map(Dual64::from);
+            let mut dual = values.map(Dual64::from_re);
             dual[which] = dual[which].derivative();
-            let exact = pixel(dual, 1.3, 2.1);
+            let exact = seen(dual, 1.3, 2.1);
             for (found, exact) in photo.rate(point, &rate).into_iter().zip(exact) {
                 assert!((found - exact.eps).abs() < 1e-9 * (1.0 + exact.eps.abs()));
             }

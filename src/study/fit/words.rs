@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::free::Coordinate;
 use super::result::FitParameter;
+use crate::numbers::two_digits;
 
 /// An undetermined combination: coordinates and their coefficients.
 pub(super) struct Undetermined {
@@ -48,7 +49,7 @@ pub(super) fn sentences(
         let key = &parameter.key;
         said.push(match free[k].log {
             true => format!("{key}: to {}", percent(half / parameter.value.abs())),
-            false => format!("{key}: to {half:.2e}"),
+            false => format!("{key}: to {}", two_digits(half)),
         });
     }
     said.extend(parameters.iter().flat_map(lost));
@@ -82,8 +83,10 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], free: &[Coordinate
             _ if parameters[*k].lost.iter().any(Option::is_some) => {
                 format!("{}: not known, as an end of its interval is not", key(*k))
             }
-            (Some(low), None) => format!("{}: only that it is above {low:.2e}", key(*k)),
-            (None, Some(high)) => format!("{}: only that it is below {high:.2e}", key(*k)),
+            (Some(low), None) => format!("{}: only that it is above {}", key(*k), two_digits(low)),
+            (None, Some(high)) => {
+                format!("{}: only that it is below {}", key(*k), two_digits(high))
+            }
             _ => format!("{}: hardly, to no better than a factor of ten", key(*k)),
         },
         [(a, one), (b, two)] if all_logs && (one.abs() - two.abs()).abs() < 1e-3 => {

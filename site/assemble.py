@@ -1,0 +1,131 @@
+"""Puts the pages of the site together: the documents as they are, a reference of the Python package, a gallery.
+
+Called by site/build.sh: ``assemble.py FOLDER [LEAFDYN]`` with the program, which draws the pictures of the gallery;
+without it there are none.
+"""
+
+import ast
+import base64
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LINK = re.compile(r"(?<=\]\()([^)#\s]+)((?:#[^)\s]*)?)(?=\))")
+
+# Scenarios of the gallery: what to look at, and the numbers with sliders (key, low, high, logarithmic).
+GALLERY = [
+    ("paper/fig04", "The paper's leaf of 21 veins under its weight", [("scale:stiffness.bending_2", 0.02, 5.0, True)]),
+    ("study/undulation", "A leaf whose margin undulates", [("scale:stiffness.torsion", 0.1, 20.0, True)]),
+    ("measured/grass", "A blade of grass that arches over, in cm", [("scale:section.young", 0.3, 3.0, True)]),
+    ("measured/blade", "A blade from its outline and thickness", [("scale:blade.thickness", 0.5, 2.0, False)]),
+    ("classic/elastica_buckled", "Euler's elastica, far beyond buckling", [("load.tip_force[0]", -20.0, -1.0, False)]),
+]
+
+
+def documents(to: Path) -> None:
+    """Copies the documents with all they link to, below the same folders, so that links stay right."""
+    pages = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+    pages += sorted(path for path in (ROOT / "docs").rglob("*") if path.is_file())
+    known: set[Path] = set()
+    while pages:
+        page = pages.pop()
+        if page in known:
+            continue
+        known.add(page)
+        copy = to / page.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        if page.suffix != ".md":
+            shutil.copy(page, copy)
+            continue
+
+        def linked(found: re.Match[str]) -> str:
+            link, anchor = found.groups()
+            if "://" in link:
+                return found[0]
+            target = (page.parent / link).resolve()
+            if not target.exists():
+                sys.exit(f"{page.relative_to(ROOT)}: {link} leads nowhere")
+            if target.is_dir():
+                list_folder(target, to)
+                pages.extend(path for path in target.iterdir() if path.is_file())
+                return f"{link}/index.md"
+            pages.append(target)
+            return link + anchor
+
+        copy.write_text(LINK.sub(linked, page.read_text()))
+
+
+def list_folder(folder: Path, to: Path) -> None:
+    """A page in place of a folder."""
+    name = folder.relative_to(ROOT)
+    files = sorted(path.name for path in folder.iterdir() if path.is_file())
+    lines = [f"# {name}", "", *(f"- [{file}]({file})" for file in files)]
+    (to / name).mkdir(parents=True, exist_ok=True)
+    (to / name / "index.md").write_text("\n".join(lines) + "\n")
+
+
+def reference(to: Path) -> None:
+    """A page with every public name of the Python package."""
+    tree = ast.parse((ROOT / "python/lib/leafdyn/__init__.py").read_text())
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign)]
+    names = next(ast.literal_eval(it.value) for it in assigned if getattr(it.targets[0], "id", "") == "__all__")
+    public = [name for name in names if not name.startswith("_")]
+    functions = [name for name in public if name[0].islower()]
+    classes = [name for name in public if name[0].isupper()]
+    lines = ["# Python reference", "", "[How to use it](docs/python.md) is another page.", ""]
+    for title, group in (("Functions", functions), ("Results and other types", classes)):
+        lines += [f"## {title}", ""]
+        for name in group:
+            lines += [f"::: leafdyn.{name}", ""]
+    (to / "reference.md").write_text("\n".join(lines))
+
+
+def address(scenario: Path, sliders: list[tuple[str, float, float, bool]]) -> str:
+    """The part of an address that holds a scenario, as the live page reads it."""
+    shown = [{"key": key, "low": low, "high": high, "log": log} for key, low, high, log in sliders]
+    held = {"text": scenario.read_text(), "name": scenario.name, "values": [], "sliders": shown, "view": None}
+    packing = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = packing.compress(json.dumps(held).encode()) + packing.flush()
+    return "#s=" + base64.urlsafe_b64encode(packed).decode().rstrip("=")
+
+
+def gallery(to: Path, program: str | None) -> None:
+    """A page of leaves that move: each opens the live page, if that was built."""
+    live = ROOT / "web/dist/live.html"
+    lines = ["# Live leaves", ""]
+    if live.exists():
+        shutil.copy(live, to / "live.html")
+        lines += ["Each opens [the live page](docs/live.md): one file with the solver in it. Move the slider, and the leaf follows.", ""]
+    else:
+        lines += ["[The live page](docs/live.md) was not built with this site.", ""]
+    for name, words, sliders in GALLERY:
+        scenario = ROOT / f"scenarios/{name}.toml"
+        lines += [f"## {words}", ""]
+        if program is not None:
+            picture = to / "gallery" / scenario.stem
+            command = [program, "relax", str(scenario), "--write", "svg", "--out", str(picture)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            lines += [f"![{words}](gallery/{scenario.stem}/figure.svg)", ""]
+        opened = f'<a href="../live.html{address(scenario, sliders)}">Open it</a>, or take ' if live.exists() else "Take "
+        lines += [f"{opened}[its scenario](scenarios/{name}.toml).", ""]
+        copy = to / f"scenarios/{name}.toml"
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(scenario, copy)
+    (to / "gallery.md").write_text("\n".join(lines))
+
+
+def main() -> None:
+    to = Path(sys.argv[1])
+    shutil.rmtree(to, ignore_errors=True)
+    to.mkdir(parents=True)
+    documents(to)
+    reference(to)
+    gallery(to, sys.argv[2] if len(sys.argv) > 2 else None)
+
+
+main()
