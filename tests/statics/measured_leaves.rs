@@ -1,8 +1,6 @@
 //! The leaves of `scenarios/measured` that are given as one would measure them:
 //! their numbers fit each other, and they hang and swing as such leaves do.
 
-use std::fs;
-
 use leafdyn_testing::*;
 
 const NAMES: [&str; 3] = ["grass", "lily", "orchid"];
@@ -58,20 +56,4 @@ fn each_hangs_and_swings() {
         let lowest = lowest.frequency().unwrap() / (2.0 * PI);
         close(name, lowest, frequency, 1e-3);
     }
-}
-
-/// So that what README prints of it can be found again.
-#[test]
-fn the_leaf_in_the_readme_is_the_lilys() {
-    let readme = root().join("README.md");
-    let readme = fs::read_to_string(readme).unwrap();
-    let (_, text) = readme.split_once("```toml\n# my-leaf.toml\n").unwrap();
-    let (text, _) = text.split_once("```").unwrap();
-    let own = parse(text);
-    assert_eq!(own.name, "my-leaf");
-    let mut lily = leaf("lily");
-    lily.name = own.name.clone();
-    lily.dynamics.duration = own.dynamics.duration;
-    lily.dynamics.output_interval = own.dynamics.output_interval;
-    assert_eq!(own, lily);
 }

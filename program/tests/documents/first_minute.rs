@@ -27,7 +27,7 @@ fn the_way_of_a_newcomer_is_short_and_leads_to_a_page() {
     let readme = root().join("README.md");
     let readme = fs::read_to_string(readme).unwrap();
     let (_, way) = readme.split_once("## A leaf of your own").unwrap();
-    let (way, _) = way.split_once("`my-leaf.toml`").unwrap();
+    let (way, _) = way.split_once("Or write it yourself").unwrap();
     let blocks = way.split("```sh\n").skip(1);
     let commands: Vec<&str> = (blocks.flat_map(|block| block.split("```").next()))
         .flat_map(str::lines)
