@@ -10,12 +10,15 @@ const limiting = () => [current];
 class Ghost {
   constructor(leaf, color) {
     this.leaf = leaf;
-    const { points, nodes } = leaf;
-    const pieces = points.length / 3 - points.length / 3 / nodes;
+    const sub = piecesOf(leaf.nodes);
+    const fine = Math.max(1, (leaf.nodes - 1) * sub + 1);
+    const points = new Float32Array((leaf.points.length / leaf.nodes) * fine);
+    smooth(leaf, sub, points);
+    const pieces = points.length / 3 - points.length / 3 / fine;
     const ends = new Float32Array(6 * pieces);
     let to = 0;
     for (let i = 0; i + 1 < points.length / 3; i++) {
-      if ((i + 1) % nodes === 0) continue;
+      if ((i + 1) % fine === 0) continue;
       ends.set(points.subarray(3 * i, 3 * i + 6), to);
       to += 6;
     }
@@ -159,6 +162,46 @@ function across(dx, dy) {
 /// The direction in space that points down on the screen.
 const downward = () => new THREE.Vector3().setFromMatrixColumn(space.camera.matrixWorld, 1).negate().toArray();
 
+/// Looks as a camera did: from its direction and its zoom and, where these are known, at its target and with its box.
+function see([x, y, z, zoom, ...others]) {
+  const { camera, controls, box } = space;
+  if (others.length === 9) {
+    Object.assign(box, { low: others.slice(3, 6), high: others.slice(6) });
+    box.middle = box.low.map((low, k) => 0.5 * (low + box.high[k]));
+    box.extent = Math.max(...box.low.map((low, k) => box.high[k] - low));
+    controls.target.fromArray(others.slice(0, 3));
+  }
+  camera.position.copy(controls.target).add(new THREE.Vector3(x, y, z).multiplyScalar(10 * box.extent));
+  camera.far = 30 * box.extent;
+  camera.zoom = zoom;
+  controls.update();
+  camera.updateMatrixWorld();
+  fitBox();
+  redraw();
+}
+
+/// How far two leaves are apart, at the nodes that both have; infinitely where they have none.
+function apart(one, other) {
+  const [a, b] = [decode(one), decode(other)].sort((a, b) => a.nodes - b.nodes);
+  const stride = (b.nodes - 1) / (a.nodes - 1);
+  if (!Number.isInteger(stride) || a.points.length / a.nodes !== b.points.length / b.nodes) return Infinity;
+  let far = 0;
+  for (let p = 0; 3 * p < a.points.length; p++) {
+    const q = Math.floor(p / a.nodes) * b.nodes + stride * (p % a.nodes);
+    far = Math.max(far, Math.hypot(...[0, 1, 2].map((k) => a.points[3 * p + k] - b.points[3 * q + k])));
+  }
+  return far;
+}
+
+/// Colours the veins by the quantity of this name, if there is one.
+function colourBy(name) {
+  const which = quantities.findIndex((one) => one.name === name);
+  if (which < 0) return;
+  shown.quantity = which;
+  fillQuantities();
+  draw(true);
+}
+
 function leave() {
   if (!space) return;
   space.controls.dispose();
@@ -185,16 +228,9 @@ return {
   view, shown, show, moving, vibrate, beside, frame, across, downward, leave, look, picture, savePicture, setTheme, redraw, nearest, Diagram, short, fillProbe, row,
   inSpace: () => space !== null,
   controls: () => space && space.controls,
-  camera: () => space && space.camera.position.clone().sub(space.controls.target).normalize().toArray().concat(space.camera.zoom),
-  see: ([x, y, z, zoom]) => {
-    const { camera, controls, box } = space;
-    camera.position.copy(controls.target).add(new THREE.Vector3(x, y, z).multiplyScalar(10 * box.extent));
-    camera.zoom = zoom;
-    controls.update();
-    camera.updateMatrixWorld();
-    fitBox();
-    redraw();
-  },
+  camera: () => space && [...space.camera.position.clone().sub(space.controls.target).normalize().toArray(), space.camera.zoom, ...space.controls.target.toArray(), ...space.box.low, ...space.box.high],
+  see, apart, colourBy,
+  colour: () => (shown.plain ? quantities[shown.chosen] : quantity()).name,
   key: keyInSpace,
   resize: () => {
     if (space) space.stage = null;

@@ -7,7 +7,7 @@ mod show;
 
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint};
-pub use run::trace;
+pub use run::{trace, trace_through};
 pub(super) use run::traced;
 pub use show::TraceShow;
 
