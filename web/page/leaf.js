@@ -49,12 +49,16 @@ function beside(name, given, color) {
   if (current) draw(false);
 }
 
-/// The box around all that was shown; seen from where it was before.
+/// A leaf may leave the box by this part of it: smaller steps of the view are no help to anyone.
+const BEYOND = 2e-3;
+
+/// The box around all that was shown; seen from where it was before, as far aside of its middle.
 function grow() {
   const now = boxOf(sampled());
   const { box } = space;
-  const out = [0, 1, 2].some((k) => now.low[k] < box.low[k] - 1e-6 * box.extent || now.high[k] > box.high[k] + 1e-6 * box.extent);
+  const out = [0, 1, 2].some((k) => Math.max(box.low[k] - now.low[k], now.high[k] - box.high[k]) > BEYOND * box.extent);
   if (!out) return;
+  const before = [...box.middle];
   for (let k = 0; k < 3; k++) {
     box.low[k] = Math.min(box.low[k], now.low[k]);
     box.high[k] = Math.max(box.high[k], now.high[k]);
@@ -63,7 +67,7 @@ function grow() {
   box.extent = Math.max(...[0, 1, 2].map((k) => box.high[k] - box.low[k]));
   const { camera, controls } = space;
   const away = camera.position.clone().sub(controls.target);
-  controls.target.fromArray(box.middle);
+  controls.target.add(new THREE.Vector3(...box.middle.map((x, k) => x - before[k])));
   camera.position.copy(controls.target).add(away.setLength(10 * box.extent));
   camera.far = 30 * box.extent;
   controls.update();

@@ -299,8 +299,9 @@ function later() {
 
 async function wonder() {
   if (now.busy || now.pull) return;
+  const { text, name } = now;
   const values = [...sliders.values];
-  const same = () => !now.busy && JSON.stringify(values) === JSON.stringify([...sliders.values]);
+  const same = () => !now.busy && now.text === text && JSON.stringify(values) === JSON.stringify([...sliders.values]);
   now.busy = true;
   const exact = await front.ask({ ask: "set", values, modes: 3 });
   now.busy = false;
@@ -312,8 +313,8 @@ async function wonder() {
     stage.show(exact);
     tellLeaf(exact);
   }
-  const { text, name } = now;
   const { at } = await front.ask({ ask: "place" });
+  if (!same()) return;
   back = back.free();
   const opened = await back.ask({ ask: "open", text, name, values, at });
   if (opened.answer !== "opened" || !same()) return;
@@ -361,12 +362,13 @@ async function others() {
   for (let k = 0; k < 12; k++) stage.beside(`other ${k}`, null);
   if (!on) return;
   find("now").textContent = "looking for other equilibria";
+  const { text, name } = now;
   const values = [...sliders.values];
   back = back.free();
-  await back.ask({ ask: "open", text: now.text, name: now.name, values });
+  await back.ask({ ask: "open", text, name, values });
   const found = await back.ask({ ask: "equilibria" });
   find("now").textContent = "";
-  if (found.answer === "gone") return press("others", false);
+  if (found.answer === "gone" || now.text !== text || !pressed("others")) return press("others", false);
   if (found.answer !== "equilibria") return tell(found.error);
   const apart = ({ tips }) => Math.hypot(...tips[0].map((x, k) => x - now.known.tips[0][k]));
   const rest = found.list.filter((known) => apart(known) > 1e-3 * now.known.view.longest).slice(0, 12);

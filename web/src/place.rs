@@ -47,8 +47,14 @@ pub fn read(text: &str) -> Option<(Vec<f64>, Vec<RodShape>)> {
             nodes: nodes.collect::<Option<_>>()?,
         })
     });
-    let (stations, rods) = (stations.collect::<Option<Vec<f64>>>()?, rods.collect::<Option<_>>()?);
-    stations.iter().all(|at| at.is_finite()).then_some((stations, rods))
+    let (stations, rods) = (
+        stations.collect::<Option<Vec<f64>>>()?,
+        rods.collect::<Option<_>>()?,
+    );
+    stations
+        .iter()
+        .all(|at| at.is_finite())
+        .then_some((stations, rods))
 }
 
 fn node(of: &[f64]) -> Option<NodeState> {

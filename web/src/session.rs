@@ -284,7 +284,10 @@ impl Open {
             tolerance: Some(TOLERANCE),
             most_points: MOST_POINTS,
         };
-        let given = self.values.iter().find(|(keys, _)| *keys == request.vary.keys);
+        let given = self
+            .values
+            .iter()
+            .find(|(keys, _)| *keys == request.vary.keys);
         let value = given.map(|(_, value)| *value);
         let Some(value) = value.or_else(|| self.base.number(&request.vary.keys)) else {
             return refuse(format!("{key} has no value"));
