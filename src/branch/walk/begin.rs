@@ -55,7 +55,12 @@ pub fn begin<'a>(
         let mut tips = rest.tips.iter().zip(&alone.tips);
         let near = SAME_LEAF * family.scale().length;
         match tips.all(|(a, b)| a.distance(*b) < near) {
-            true => search(family, (&alone, fraction), alone.shape.stations.len() - 1, true),
+            true => search(
+                family,
+                (&alone, fraction),
+                alone.shape.stations.len() - 1,
+                true,
+            ),
             false => Err(stuck),
         }
     })
@@ -77,11 +82,14 @@ fn search<'a>(
     loop {
         if grid.segments() >= least {
             let mut grids = Grids::new(family, grid.clone());
-            let point = grids.of(&state).correct(&state, fraction, None).or_else(|_| {
-                let mut system = System::new(&discrete);
-                polish(&discrete, &mut state, &mut system, &mut Work::default());
-                grids.of(&state).correct(&state, fraction, None)
-            });
+            let point = grids
+                .of(&state)
+                .correct(&state, fraction, None)
+                .or_else(|_| {
+                    let mut system = System::new(&discrete);
+                    polish(&discrete, &mut state, &mut system, &mut Work::default());
+                    grids.of(&state).correct(&state, fraction, None)
+                });
             match point {
                 Ok(point) => {
                     let same = Some(point.index) == rest.stability.negative_eigenvalues;

@@ -6,7 +6,9 @@ use std::collections::VecDeque;
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
-use crate::branch::{Critical, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch};
+use crate::branch::{
+    Critical, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch,
+};
 use crate::leaf::Grid;
 use crate::memory;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax};
@@ -247,7 +249,11 @@ impl Run<'_, '_> {
             tangent: first.tangent.reversed(),
             ..first.clone()
         });
-        let mut entrances: VecDeque<_> = [first].into_iter().chain(back).map(|it| (it, None)).collect();
+        let mut entrances: VecDeque<_> = [first]
+            .into_iter()
+            .chain(back)
+            .map(|it| (it, None))
+            .collect();
         while let Some((first, from)) = entrances.pop_front() {
             let number = trace.branches.len();
             if number == MOST_BRANCHES {
