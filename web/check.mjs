@@ -64,6 +64,128 @@ async function slides() {
   await page.done("slides");
 }
 
+/// Pressed and let go where a pointer finds it.
+async function press(page, where) {
+  await page.locator(where).scrollIntoViewIfNeeded();
+  const box = await page.locator(where).boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+}
+
+/// A slider dragged by a pointer to a part of its way.
+async function drag(page, key, part) {
+  const slider = page.locator(`#slider-${key.replaceAll(/\W/g, "-")}`);
+  await slider.scrollIntoViewIfNeeded();
+  const box = await slider.boundingBox();
+  const x = (part) => box.x + 8 + part * (box.width - 16);
+  await page.mouse.move(x(Number(await slider.inputValue()) / 1000), box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(x(part), box.y + box.height / 2, { steps: 20 });
+  await page.mouse.up();
+}
+
+/// The Tab key, until what is wanted has the focus.
+async function tabTo(page, wanted, keys = "Tab") {
+  for (let k = 0; k < 80; k++) {
+    await page.keyboard.press(keys);
+    if (await page.evaluate((wanted) => [document.activeElement.id, document.activeElement.getAttribute("aria-label")].includes(wanted), wanted)) return;
+  }
+  assert.fail(`no key leads to ${wanted}`);
+}
+
+/// How high the waves of a leaf are, as the page says it.
+const waves = (page) => page.evaluate(() => Number(/([\d.]+) high/.exec(document.getElementById("summary").textContent)?.[1] ?? 0));
+
+/// As someone who sees the page for the first time: chooses the leaf with waves, makes its veins stiffer, and finds the torsion at which it
+/// lies flat; the address leads to the same leaf, seen from the same place. By mouse alone, and by keyboard alone.
+async function flattens(byKeys) {
+  const name = byKeys ? "flat-by-keys" : "flat-by-mouse";
+  const page = await open("", { permissions: ["clipboard-read", "clipboard-write"] });
+  const [bending, torsion] = ["scale:stiffness.bending_2", "stiffness.torsion"];
+  if (byKeys) {
+    await tabTo(page, "gallery");
+    await page.keyboard.type("undu");
+  } else await page.locator("#gallery").selectOption({ label: "undulation" });
+  await page.waitForFunction(() => document.getElementById("title").textContent === "undulation" && /0.08\d* high/.test(document.getElementById("summary").textContent));
+  await page.rest();
+  if (byKeys) {
+    await tabTo(page, `${bending}, as a number`);
+    await page.keyboard.press("Control+A");
+    await page.keyboard.type("10");
+    await page.keyboard.press("Enter");
+  } else {
+    await press(page, `[aria-label="highest ${bending}"]`);
+    await page.mouse.click(0, 0);
+    await page.fill(`[aria-label="highest ${bending}"]`, "10");
+    await page.mouse.click(640, 700);
+    await drag(page, bending, 1);
+  }
+  await page.rest();
+  assert.equal(await page.inputValue(`[aria-label="${bending}, as a number"]`), "10");
+  assert((await waves(page)) > 0.03);
+  if (byKeys) {
+    await tabTo(page, "slider-stiffness-torsion", "Shift+Tab");
+    for (let k = 0; k < 5; k++) await page.keyboard.press("PageUp");
+  } else await drag(page, torsion, 0.97);
+  await page.waitForFunction(() => Number(/([\d.]+) high/.exec(document.getElementById("summary").textContent)?.[1] ?? 0) < 0.006, null, { timeout: 60000 });
+  await page.rest();
+  if (byKeys) await tabTo(page, "space", "Shift+Tab");
+  if (byKeys) for (const key of ["ArrowLeft", "ArrowLeft", "+", "Shift+ArrowUp"]) await page.keyboard.press(key);
+  else {
+    await page.mouse.move(500, 300);
+    await page.mouse.down();
+    await page.mouse.move(600, 340, { steps: 5 });
+    await page.mouse.up();
+    await page.mouse.wheel(0, -200);
+  }
+  if (byKeys) {
+    await tabTo(page, "share", "Shift+Tab");
+    await page.keyboard.press("Enter");
+  } else await press(page, "#share");
+  await page.waitForFunction(() => document.getElementById("share").textContent === "copied", null, { timeout: 60000 });
+  const address = await page.evaluate(() => navigator.clipboard.readText());
+  const shown = (page) => page.evaluate(() => [document.querySelector("#summary").textContent.match(/tip\([^)]*\)/)[0].match(/[-\d.]+/g).map(Number), window.leafdyn.stage().camera()]);
+  const again = await open(address.slice(address.indexOf("#")));
+  const [[tip, view], [other, seen]] = [await shown(page), await shown(again)];
+  assert(Math.max(...tip.map((x, k) => Math.abs(x - other[k]))) < 2e-4, `${tip}, by its address ${other}`);
+  assert(Math.max(...view.map((x, k) => Math.abs(x - seen[k]))) < 1e-6, `seen from ${view}, by its address ${seen}`);
+  await again.done(`${name}-again`);
+  if (byKeys) {
+    await page.keyboard.press("Control+z");
+    await page.waitForFunction(() => /0.04\d* high/.test(document.getElementById("summary").textContent), null, { timeout: 60000 });
+    assert.equal(await page.evaluate(() => document.activeElement.id), "share");
+  }
+  await page.done(name);
+}
+
+/// Beyond its snap another leaf is found afresh: the address leads to the one that is shown.
+async function sharesOneOfSeveral() {
+  const page = await open();
+  await page.evaluate((text) => window.leafdyn.open({ text, name: "column.toml" }), COLUMN);
+  for (const value of [0.05, -0.05]) await page.evaluate((value) => window.leafdyn.sliders.set("load.tip_force[2]", value, true), value);
+  await page.rest();
+  const up = await page.tip();
+  assert(up[2] > 0.3);
+  const address = await page.evaluate(() => window.leafdyn.share());
+  const again = await open(address.slice(address.indexOf("#")));
+  assert(Math.abs((await again.tip())[2] - up[2]) < 2e-4);
+  await again.done("one-of-several-again");
+  await page.done("one-of-several");
+}
+
+/// Whatever can be used has a name, and whatever can be touched is large enough for a finger.
+async function named() {
+  const page = await open("", { viewport: { width: 400, height: 800 }, hasTouch: true, isMobile: true });
+  const client = await page.context().newCDPSession(page);
+  const { nodes } = await client.send("Accessibility.getFullAXTree");
+  const used = ["button", "slider", "spinbutton", "checkbox", "combobox", "textbox", "image", "DisclosureTriangle"];
+  const nameless = nodes.filter(({ ignored, role, name }) => !ignored && used.includes(role?.value) && !name?.value);
+  assert.deepEqual(nameless.map(({ role }) => role.value), []);
+  assert(nodes.filter(({ role }) => used.includes(role?.value)).length > 40);
+  const low = await page.evaluate(() => [...document.querySelectorAll("button, select, .way input, .head input")].filter((it) => it.offsetParent && it.getBoundingClientRect().height < 32).map((it) => it.id || it.textContent));
+  assert.deepEqual(low, []);
+  await page.done("named");
+}
+
 const COLUMN = `
 name = "column"
 leaf = { rods = 1, length = 1.0, fan = [0.0] }
@@ -85,12 +207,12 @@ async function snaps() {
   await page.rest();
   assert((await z()) > 0.3);
   await set(-0.3);
-  await page.waitForFunction(() => window.leafdyn.now.known.tips[0][2] < -0.3, null, { timeout: 20000 });
+  await page.waitForFunction(() => window.leafdyn.now.known.tips[0][2] < -0.3, null, { timeout: 60000 });
   await page.rest();
   await set(0.1);
   await page.rest();
   assert((await z()) < -0.3, "there is no hysteresis");
-  await page.waitForFunction(() => /fold at -0.111/.test(document.querySelector(".marks[aria-label*=fold]")?.getAttribute("aria-label")), null, { timeout: 20000 });
+  await page.waitForFunction(() => /fold at -0.111/.test(document.querySelector(".marks[aria-label*=fold]")?.getAttribute("aria-label")), null, { timeout: 60000 });
   await page.done("snaps");
 }
 
@@ -111,7 +233,7 @@ async function moves() {
   await page.mouse.move(box.x + at[0], box.y + at[1] - 120, { steps: 5 });
   await page.waitForFunction((z) => window.leafdyn.now.known.tips[0][2] > z + 0.02, before[2]);
   await page.mouse.up();
-  await page.waitForFunction(() => window.leafdyn.now.playing, null, { timeout: 10000 });
+  await page.waitForFunction(() => window.leafdyn.now.playing, null, { timeout: 60000 });
   await page.keyboard.press(" ");
   await page.rest();
   await page.done("moves");
@@ -194,7 +316,11 @@ try {
   await snaps();
   await moves();
   await hostile();
+  await flattens(false);
+  await flattens(true);
+  await sharesOneOfSeveral();
   await narrow();
+  await named();
   if (keep) await picture();
   await fast();
   console.log("the live page is as it should be");

@@ -3,7 +3,7 @@
 
 use crate::clock::Instant;
 use crate::homotopy::Homotopy;
-use crate::leaf::{Grid, Leaf, LeafRate, State};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafRate, State};
 use crate::relax::follow::{Grids, Lost, rescaled};
 use crate::relax::grids;
 use crate::relax::nested::NestedEquilibrium;
@@ -13,9 +13,11 @@ use crate::relax::rest::{decided, relax_on_grids};
 use crate::relax::result::equilibrium::Equilibrium;
 use crate::relax::sensitivity::Linearized;
 use crate::relax::settle::effort::Effort;
+use crate::relax::stability::index::project;
 use crate::relax::transfer::level::Level;
 use crate::relax::transfer::prolong::transfer;
 use crate::scenario::Scenario;
+use crate::shape::RodShape;
 use std::sync::Arc;
 
 /// The shortest step of the way, as a part of it.
@@ -95,6 +97,64 @@ impl Follower {
             at,
         };
         Ok((leaf, rests.then_some(follower)))
+    }
+
+    /// Begins with the stable equilibrium that lies near this shape of the leaf, which `begin` need not
+    /// find, as a leaf may have several; where there is none, as that does.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn begin_near(
+        scenario: &Scenario,
+        options: &Options,
+        (stations, rods): (&[f64], &[RodShape]),
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+        let alike = rods.len() == leaf.rods()
+            && stations.len() > 1
+            && rods.iter().all(|rod| rod.nodes.len() == stations.len());
+        if !alike {
+            return Follower::begin(scenario, options);
+        }
+        let grid = Grid::through(stations, leaf.kinks());
+        let mut state = project(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
+        for j in 0..leaf.rods() {
+            let base = state.base(j);
+            (state.x[base], state.q[base]) = leaf.base(j);
+        }
+        leaf.hold_tips(&mut state);
+        Follower::begin_from(scenario, options, (grid, state))
+    }
+
+    /// The same from this state on a grid.
+    fn begin_from(
+        scenario: &Scenario,
+        options: &Options,
+        (grid, state): (Grid, State),
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        rests_in_wind(scenario, options)?;
+        let clock = Instant::now();
+        let scenario = Arc::new(scenario.clone());
+        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let problem = Problem::new(&leaf, options, tolerance);
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        let begun = NestedEquilibrium::begun(&problem);
+        let usual = grid.segments();
+        match grids::follow(&problem, begun, vec![(grid, state)], &mut effort) {
+            Ok(found) if found.is_stable() => {
+                let (at, result) = decide(&problem, found, clock, &mut effort);
+                let follower = Follower {
+                    scenario: Arc::clone(&scenario),
+                    options: options.clone(),
+                    at,
+                    usual,
+                };
+                Ok((result, Some(follower)))
+            }
+            _ => Follower::begin(&scenario, options),
+        }
     }
 
     /// How it is to come to rest from now on, and which of its modes are wanted.
@@ -192,24 +252,11 @@ impl Follower {
         scenario: &Scenario,
         guess: (Grid, State),
     ) -> Result<Equilibrium, RelaxError> {
-        rests_in_wind(scenario, &self.options)?;
-        let clock = Instant::now();
-        let scenario = Arc::new(scenario.clone());
-        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
-        let problem = Problem::new(&leaf, &self.options, self.tolerance(&scenario));
-        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
-        let mut effort = Effort::new(ignored);
-        let begun = NestedEquilibrium::begun(&problem);
-        if let Ok(found) = grids::follow(&problem, begun, vec![guess], &mut effort)
-            && found.is_stable()
-        {
-            let (at, result) = decide(&problem, found, clock, &mut effort);
-            (self.at, self.scenario) = (at, scenario);
-            return Ok(result);
-        }
-        let (result, follower) = Follower::begin(&scenario, &self.options)?;
+        let (result, follower) = Follower::begin_from(scenario, &self.options, guess)?;
         if let Some(follower) = follower {
-            *self = follower;
+            // What it is brought to on a finer grid need not stay there.
+            let usual = self.usual.min(follower.usual);
+            *self = Follower { usual, ..follower };
         }
         Ok(result)
     }

@@ -1,9 +1,9 @@
 //! A leaf that follows its scenario: along its branch, to the fold and no further, and from there in
 //! motion to where a relaxation leads.
 
-use leafdyn::relax::{Followed, Follower, RelaxError};
+use leafdyn::relax::{Followed, Follower, RelaxError, RodShape};
 use leafdyn::simulate::{self, Simulation};
-use leafdyn::study::{Base, Keys, PointKind, trace};
+use leafdyn::study::{Base, Keys, PointKind, trace, trace_through};
 use leafdyn_testing::*;
 
 const TOLERANCE: f64 = 1e-6;
@@ -141,4 +141,61 @@ fn leaves_of_all_kinds_follow_to_where_they_rest() {
 fn base_of(name: &str, overrides: &str) -> Base {
     let base = Base::read(&path(name), &entries(overrides));
     base.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Of two equilibria under one force it begins with that near which it is placed, and goes on from
+/// there; placed nowhere, or by another leaf, it begins as a relaxation does.
+#[test]
+fn it_begins_with_the_equilibrium_near_a_shape() {
+    let mut follower = begin(&column(0.05));
+    let up = there(follow(&mut follower, [0.05, -0.05]));
+    let below = leafdyn::relax::relax(&column(-0.05), &options(), &mut |_| {}).unwrap();
+    assert!(up.tips[0].z > 0.3 && below.tips[0].z < -0.3);
+    let near = |shape: (&[f64], &[RodShape])| {
+        let begun = Follower::begin_near(&column(-0.05), &options(), shape);
+        let (leaf, follower) = begun.unwrap();
+        (leaf, follower.expect("the leaf is at rest"))
+    };
+    let (leaf, mut follower) = near((&up.shape.stations, &up.shape.rods));
+    let apart = leaf.tips[0].distance(up.tips[0]);
+    assert!(apart <= 2.0 * TOLERANCE, "{apart}");
+    let back = there(follow(&mut follower, [-0.05, 0.05]));
+    assert!(back.tips[0].z > 0.3);
+    for shape in [(&up.shape.stations[..], &[][..]), (&[], &up.shape.rods)] {
+        assert!(near(shape).0.tips[0].z < -0.3);
+    }
+}
+
+/// A branch through a given leaf goes both ways from it, and is that which a trace from an end finds;
+/// beyond a snap it is not the one on which a relaxation at that end lies.
+#[test]
+fn a_branch_goes_both_ways_from_the_leaf_that_follows() {
+    let mut follower = begin(&column(0.05));
+    let up = there(follow(&mut follower, [0.05, -0.05]));
+    let request = branch::request(
+        base(ROD, &format!("{COLUMN}; load.tip_force=[-2.8, 0.0, 0.5]")),
+        "load.tip_force[2]=-0.08..0.5",
+        TOLERANCE,
+        2000,
+    );
+    let through = trace_through(&request, (&up, -0.05), &mut |_, _, _| {}).unwrap();
+    assert!(through.complete, "{:?}", through.remark);
+    let [on, back] = &through.branches[..] else {
+        panic!("{} ways", through.branches.len());
+    };
+    let [first, other] = [on, back].map(|way| &way.points[0]);
+    // Both are verified in the plane across the branch, in which finer grids have it at another value.
+    assert!((first.value + 0.05).abs() < 1e-3, "{}", first.value);
+    let apart = first.tips[0].distance(other.tips[0]);
+    assert!(apart <= TOLERANCE, "{apart}");
+    let end =
+        |way: &leafdyn::study::TraceBranch| way.points.last().map(|it| (it.value, it.tips[0]));
+    let ([(high, up), (low, down)], relaxed) = (
+        [end(on).unwrap(), end(back).unwrap()],
+        trace(&request, &mut |_, _, _| {}).unwrap(),
+    );
+    assert!((high - 0.5).abs() < 1e-9 && (low + 0.08).abs() < 1e-9 && down.z > 0.3);
+    assert!(relaxed.branches[0].points[0].tips[0].z < -0.3);
+    let there = leafdyn::relax::relax(&column(0.5), &options(), &mut |_| {}).unwrap();
+    assert!(there.tips[0].distance(up) <= 2.0 * TOLERANCE);
 }

@@ -67,7 +67,7 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
         return found;
     }
     found.at_rest = 1;
-    let (mut grids, mut first) = match begin(&family, &rest, &options, None) {
+    let (mut grids, mut first) = match begin(&family, (&rest, 0.0), &options, None) {
         Ok(begun) => begun,
         Err(stuck) => {
             println!("{case}: does not begin: {stuck}");

@@ -10,12 +10,15 @@ const limiting = () => [current];
 class Ghost {
   constructor(leaf, color) {
     this.leaf = leaf;
-    const { points, nodes } = leaf;
-    const pieces = points.length / 3 - points.length / 3 / nodes;
+    const sub = piecesOf(leaf.nodes);
+    const fine = Math.max(1, (leaf.nodes - 1) * sub + 1);
+    const points = new Float32Array((leaf.points.length / leaf.nodes) * fine);
+    smooth(leaf, sub, points);
+    const pieces = points.length / 3 - points.length / 3 / fine;
     const ends = new Float32Array(6 * pieces);
     let to = 0;
     for (let i = 0; i + 1 < points.length / 3; i++) {
-      if ((i + 1) % nodes === 0) continue;
+      if ((i + 1) % fine === 0) continue;
       ends.set(points.subarray(3 * i, 3 * i + 6), to);
       to += 6;
     }
@@ -46,12 +49,16 @@ function beside(name, given, color) {
   if (current) draw(false);
 }
 
-/// The box around all that was shown; seen from where it was before.
+/// A leaf may leave the box by this part of it: smaller steps of the view are no help to anyone.
+const BEYOND = 2e-3;
+
+/// The box around all that was shown; seen from where it was before, as far aside of its middle.
 function grow() {
   const now = boxOf(sampled());
   const { box } = space;
-  const out = [0, 1, 2].some((k) => now.low[k] < box.low[k] - 1e-6 * box.extent || now.high[k] > box.high[k] + 1e-6 * box.extent);
+  const out = [0, 1, 2].some((k) => Math.max(box.low[k] - now.low[k], now.high[k] - box.high[k]) > BEYOND * box.extent);
   if (!out) return;
+  const before = [...box.middle];
   for (let k = 0; k < 3; k++) {
     box.low[k] = Math.min(box.low[k], now.low[k]);
     box.high[k] = Math.max(box.high[k], now.high[k]);
@@ -60,7 +67,7 @@ function grow() {
   box.extent = Math.max(...[0, 1, 2].map((k) => box.high[k] - box.low[k]));
   const { camera, controls } = space;
   const away = camera.position.clone().sub(controls.target);
-  controls.target.fromArray(box.middle);
+  controls.target.add(new THREE.Vector3(...box.middle.map((x, k) => x - before[k])));
   camera.position.copy(controls.target).add(away.setLength(10 * box.extent));
   camera.far = 30 * box.extent;
   controls.update();
@@ -159,6 +166,46 @@ function across(dx, dy) {
 /// The direction in space that points down on the screen.
 const downward = () => new THREE.Vector3().setFromMatrixColumn(space.camera.matrixWorld, 1).negate().toArray();
 
+/// Looks as a camera did: from its direction and its zoom and, where these are known, at its target and with its box.
+function see([x, y, z, zoom, ...others]) {
+  const { camera, controls, box } = space;
+  if (others.length === 9) {
+    Object.assign(box, { low: others.slice(3, 6), high: others.slice(6) });
+    box.middle = box.low.map((low, k) => 0.5 * (low + box.high[k]));
+    box.extent = Math.max(...box.low.map((low, k) => box.high[k] - low));
+    controls.target.fromArray(others.slice(0, 3));
+  }
+  camera.position.copy(controls.target).add(new THREE.Vector3(x, y, z).multiplyScalar(10 * box.extent));
+  camera.far = 30 * box.extent;
+  camera.zoom = zoom;
+  controls.update();
+  camera.updateMatrixWorld();
+  fitBox();
+  redraw();
+}
+
+/// How far two leaves are apart, at the nodes that both have; infinitely where they have none.
+function apart(one, other) {
+  const [a, b] = [decode(one), decode(other)].sort((a, b) => a.nodes - b.nodes);
+  const stride = (b.nodes - 1) / (a.nodes - 1);
+  if (!Number.isInteger(stride) || a.points.length / a.nodes !== b.points.length / b.nodes) return Infinity;
+  let far = 0;
+  for (let p = 0; 3 * p < a.points.length; p++) {
+    const q = Math.floor(p / a.nodes) * b.nodes + stride * (p % a.nodes);
+    far = Math.max(far, Math.hypot(...[0, 1, 2].map((k) => a.points[3 * p + k] - b.points[3 * q + k])));
+  }
+  return far;
+}
+
+/// Colours the veins by the quantity of this name, if there is one.
+function colourBy(name) {
+  const which = quantities.findIndex((one) => one.name === name);
+  if (which < 0) return;
+  shown.quantity = which;
+  fillQuantities();
+  draw(true);
+}
+
 function leave() {
   if (!space) return;
   space.controls.dispose();
@@ -185,16 +232,9 @@ return {
   view, shown, show, moving, vibrate, beside, frame, across, downward, leave, look, picture, savePicture, setTheme, redraw, nearest, Diagram, short, fillProbe, row,
   inSpace: () => space !== null,
   controls: () => space && space.controls,
-  camera: () => space && space.camera.position.clone().sub(space.controls.target).normalize().toArray().concat(space.camera.zoom),
-  see: ([x, y, z, zoom]) => {
-    const { camera, controls, box } = space;
-    camera.position.copy(controls.target).add(new THREE.Vector3(x, y, z).multiplyScalar(10 * box.extent));
-    camera.zoom = zoom;
-    controls.update();
-    camera.updateMatrixWorld();
-    fitBox();
-    redraw();
-  },
+  camera: () => space && [...space.camera.position.clone().sub(space.controls.target).normalize().toArray(), space.camera.zoom, ...space.controls.target.toArray(), ...space.box.low, ...space.box.high],
+  see, apart, colourBy,
+  colour: () => (shown.plain ? quantities[shown.chosen] : quantity()).name,
   key: keyInSpace,
   resize: () => {
     if (space) space.stage = null;

@@ -12,7 +12,7 @@ async function unpacked(hash) {
   const found = /^#s=([\w-]+)$/.exec(hash);
   if (!found) return null;
   const text = new TextDecoder().decode(await through(bytesOfLetters(found[1]), new DecompressionStream("deflate-raw")));
-  const { text: scenario, name, values, sliders: shown, view } = JSON.parse(text);
+  const { text: scenario, name, values, sliders: shown, last, view, looks, at } = JSON.parse(text);
   if (typeof scenario !== "string") return null;
   const number = ([key, value]) => typeof key === "string" && Number.isFinite(value);
   return {
@@ -20,7 +20,10 @@ async function unpacked(hash) {
     name: String(name || "shared.toml"),
     values: Array.isArray(values) ? values.filter(number) : [],
     sliders: Array.isArray(shown) ? shown.map(({ key, low, high, log }) => ({ key, low: Number(low), high: Number(high), log: Boolean(log) })).filter(({ low, high, log }) => low < high && (!log || low > 0)) : [],
-    view: Array.isArray(view) && view.length === 4 && view.every(Number.isFinite) ? view : null,
+    last: typeof last === "string" ? last : null,
+    view: Array.isArray(view) && [4, 13].includes(view.length) && view.every(Number.isFinite) && Math.hypot(...view.slice(0, 3)) > 0.5 && view[3] > 0 && view.slice(7, 10).every((low, k) => low <= view[10 + k]) ? view : null,
+    looks: looks && typeof looks === "object" ? looks : {},
+    at: typeof at === "string" ? at : null,
   };
 }
 

@@ -14,8 +14,14 @@ const past = [];
 
 /// Milliseconds without a change after which it is asked what comes.
 const IDLE = 250;
+/// How far from a traced branch, in lengths, a leaf may be that is on it.
+const NEAR = 1e-3;
 /// The part of the largest lowest eigenvalue below which a leaf is soft.
 const SOFT = 0.02;
+/// Milliseconds within which steps of one number are undone together.
+const TOGETHER = 1000;
+/// What is shown of a leaf, which an address holds too.
+const LOOKS = ["surface", "axes", "unloaded"];
 /// Milliseconds between numbers that are told.
 const TOLD = 120;
 
@@ -27,29 +33,52 @@ function tell(message) {
 const nextFrame = () => new Promise((next) => requestAnimationFrame(next));
 
 /// Opens a scenario; where it is refused, what was open stays.
-async function open({ text, name, values = [], sliders: wanted, view }) {
+async function open({ text, name, values = [], sliders: wanted, last, view, looks = {}, at = null }) {
+  const wish = (now.wish = {});
   now.playing = false;
   while (now.busy) await nextFrame();
+  // Of several that were chosen meanwhile the last one is opened.
+  if (wish !== now.wish) return false;
   now.busy = true;
   find("found").textContent = "opening";
-  const answer = await front.ask({ ask: "open", text, name, values });
+  const answer = await front.ask({ ask: "open", text, name, values, at });
   now.busy = false;
   if (answer.answer !== "opened") {
     tell(answer.error);
+    showGallery();
     if (now.known) tellLeaf(now.known);
     return false;
   }
   tell(null);
   Object.assign(now, { text, name, pull: null, pinned: null });
   past.length = 0;
+  now.modesAt = null;
+  now.before = new Map(values);
   find("text").value = text;
+  // An address is that of one leaf alone.
+  if (view === undefined) forgetAddress();
+  showGallery();
+  for (const id of LOOKS) if (typeof looks[id] === "boolean") find(id).checked = looks[id];
   restage(answer.known.view);
+  stage.colourBy(looks.colour);
   if (view && stage.inSpace()) stage.see(view);
   sliders.open(answer.sliders, wanted, values);
+  trail.choose(answer.known);
   trail.begin(null);
+  if (last && sliders.shown.some(({ key }) => key === last)) beginTrail(last, answer.known);
   show(answer.known);
   later();
   return true;
+}
+
+/// Which of the gallery is open, if it is one of these.
+function showGallery() {
+  const which = gallery.findIndex((one) => one.text === now.text);
+  find("gallery").value = which < 0 ? "" : which;
+}
+
+function forgetAddress() {
+  if (location.hash) history.replaceState(null, "", location.href.slice(0, location.href.indexOf("#")));
 }
 
 /// A stage for another leaf: what was drawn before is left.
@@ -76,7 +105,7 @@ function show(known, at = sliders.value(trail.key)) {
   now.count += 1;
   stage.show(known);
   tellSoon();
-  if (trail.key) trail.add(at, known);
+  if (trail.key && !now.pull) trail.add(at, known);
   if (!stage.inSpace()) still();
   // A notebook around it hears how the scenario stands.
   if (window.parent !== window) window.parent.postMessage({ leafdyn: { text: now.text, values: Object.fromEntries(sliders.values) } }, "*");
@@ -100,12 +129,16 @@ function tellLeaf(known) {
   find("lamp").className = known.stable === false || !view.success ? "bad" : known.stable ? (soft ? "soft" : "good") : "";
   find("what").textContent = view.rods === 1 ? "1 vein" : `${view.rods} veins`;
   const lines = [...view.summary];
-  if (known.eigenvalues.length) lines.push(["frequencies", known.eigenvalues.map((square) => (square < 0 ? `unstable, grows at ${stage.short(Math.sqrt(-square))}` : stage.short(Math.sqrt(square) / (2 * Math.PI)))).join(", ")]);
+  // Where they are not known at once their place is kept: what stands below does not jump.
+  const at = lines.findIndex(([name]) => name === "modes");
+  if (at >= 0) now.modesAt = at;
+  else if (now.modesAt) lines.splice(now.modesAt, 0, ["modes", "…"]);
   const table = lines.map(([name, text]) => stage.row(name, text));
   if (now.pinned) table.unshift(...differences(now.pinned, known));
   find("summary").tBodies[0].replaceChildren(...table);
-  find("undo").disabled = past.length === 0;
-  find("reset").disabled = sliders.values.size === 0;
+  // They keep the focus where there is nothing to undo any more.
+  find("undo").setAttribute("aria-disabled", past.length === 0);
+  find("reset").setAttribute("aria-disabled", !sliders.moved());
 }
 
 /// The largest lowest eigenvalue that was seen: what is small beside it is soft.
@@ -132,19 +165,27 @@ function differences(pinned, known) {
 /// A slider was moved, or let go.
 function changed(done) {
   if (sliders.last !== trail.key) {
-    const slider = sliders.shown.find(({ key }) => key === sliders.last) || {};
-    trail.begin(sliders.last, Boolean(slider.log) && sliders.value(sliders.last) > 0, now.known ? now.known.view.units : undefined);
-    if (now.known && now.before) trail.add(now.before.get(sliders.last) ?? sliders.all.find(({ key }) => key === sliders.last)?.value, now.known);
-    sliders.forget(null);
+    beginTrail(sliders.last, now.known);
+    if (now.known) trail.add(now.before.get(sliders.last) ?? sliders.given(sliders.last), now.known);
   }
-  if (done) remember();
+  if (done) remember(sliders.last);
   pump();
 }
 
-function remember() {
+/// The trail and what comes are those of one number.
+function beginTrail(key, known) {
+  const slider = sliders.shown.find((one) => one.key === key) || {};
+  trail.begin(key, Boolean(slider.log) && sliders.value(key) > 0, known ? known.view.units : undefined);
+  sliders.forget(null);
+}
+
+/// What can be undone: steps of one number that follow quickly, as by keys, together.
+function remember(key = null) {
   const values = [...sliders.values];
-  const last = past.at(-1);
-  if (!last || JSON.stringify(last.after) !== JSON.stringify(values)) past.push({ before: now.before ? [...now.before] : [], after: values });
+  if (JSON.stringify(values) === JSON.stringify([...now.before])) return;
+  const [last, time] = [past.at(-1), performance.now()];
+  if (last && key && last.key === key && time - last.time < TOGETHER) last.time = time;
+  else past.push({ key, time, before: [...now.before] });
   now.before = new Map(values);
 }
 
@@ -153,6 +194,8 @@ async function pump() {
   now.wanted = true;
   now.playing = false;
   clearTimeout(now.timer);
+  // Those of other numbers are none of these.
+  if (pressed("others")) others();
   if (now.busy) return;
   now.busy = true;
   while (now.wanted) {
@@ -232,6 +275,12 @@ async function play(released) {
     return;
   }
   while (now.busy) await nextFrame();
+  const { known } = now;
+  const blown = known.view.summary.some(([name]) => name === "wind");
+  if (!released && !now.pull && known.stable && !blown) {
+    find("now").textContent = "it is at rest, and stays: pull at a vein, or drop it";
+    return;
+  }
   now.busy = true;
   now.pull = null;
   find("go").textContent = "stop";
@@ -250,34 +299,61 @@ function later() {
 
 async function wonder() {
   if (now.busy || now.pull) return;
+  const { text, name } = now;
   const values = [...sliders.values];
-  const same = () => !now.busy && JSON.stringify(values) === JSON.stringify([...sliders.values]);
+  const same = () => !now.busy && now.text === text && JSON.stringify(values) === JSON.stringify([...sliders.values]);
   now.busy = true;
   const exact = await front.ask({ ask: "set", values, modes: 3 });
   now.busy = false;
   if (now.wanted) return pump();
+  // As no value has changed, this is a leaf beside its end.
+  if (exact.answer === "left") return pump();
   if (exact.answer === "followed" || exact.answer === "found") {
     now.known = exact;
     stage.show(exact);
     tellLeaf(exact);
   }
-  const { text, name } = now;
+  const { at } = await front.ask({ ask: "place" });
+  if (!same()) return;
   back = back.free();
-  const opened = await back.ask({ ask: "open", text, name, values });
+  const opened = await back.ask({ ask: "open", text, name, values, at });
   if (opened.answer !== "opened" || !same()) return;
   if (find("unloaded").checked) {
     const bare = await back.ask({ ask: "unloaded" });
     if (bare.answer === "unloaded" && same()) stage.beside("unloaded", bare.view.leaves[0], "--frame");
   }
   const slider = sliders.shown.find(({ key }) => key === trail.key);
-  if (slider && pressed("foresee") && !sliders.marks.get(slider.key) && !slider.whole && same()) {
+  if (slider && pressed("foresee") && !slider.whole && same() && !isOn(trail.branch, slider, now.known)) {
     const { key, low, high, log } = slider;
+    sliders.foresee(key, null);
+    trail.foresee(null);
     const branch = await back.ask({ ask: "trace", key, from: low, to: high, log });
     if (branch.answer === "branch" && now.text === text && trail.key === key) {
+      // Other numbers may have changed since, and the leaf may have snapped.
+      const others = (all) => JSON.stringify([...all].filter(([one]) => one !== key));
+      const asked = others(values);
+      if (asked !== others(sliders.values)) return;
+      Object.assign(branch, { low, high, log, others: asked });
       sliders.foresee(key, branch);
       trail.foresee(branch);
     }
   }
+}
+
+/// Whether a branch that was traced between the ends of a slider is that on which the leaf is.
+function isOn(branch, { key, low, high, log }, known) {
+  if (!branch || branch.low !== low || branch.high !== high || branch.log !== log) return false;
+  if (branch.others !== JSON.stringify([...sliders.values].filter(([one]) => one !== key))) return false;
+  const value = sliders.value(key);
+  const near = NEAR * known.view.longest;
+  // Between two of its points it is as far from both as these are from one another, or less.
+  return branch.points.some((a, i) => {
+    const b = branch.points[i + 1];
+    if (!b || (a.value - value) * (b.value - value) > 0 || a.value === b.value) return false;
+    const part = (value - a.value) / (b.value - a.value);
+    const bend = Math.hypot(...a.tip.map((x, k) => x - b.tip[k]));
+    return Math.hypot(...a.tip.map((x, k) => x + part * (b.tip[k] - x) - known.tips[0][k])) <= near + 0.25 * bend;
+  });
 }
 
 async function others() {
@@ -286,12 +362,13 @@ async function others() {
   for (let k = 0; k < 12; k++) stage.beside(`other ${k}`, null);
   if (!on) return;
   find("now").textContent = "looking for other equilibria";
+  const { text, name } = now;
   const values = [...sliders.values];
   back = back.free();
-  await back.ask({ ask: "open", text: now.text, name: now.name, values });
+  await back.ask({ ask: "open", text, name, values });
   const found = await back.ask({ ask: "equilibria" });
   find("now").textContent = "";
-  if (found.answer === "gone") return press("others", false);
+  if (found.answer === "gone" || now.text !== text || !pressed("others")) return press("others", false);
   if (found.answer !== "equilibria") return tell(found.error);
   const apart = ({ tips }) => Math.hypot(...tips[0].map((x, k) => x - now.known.tips[0][k]));
   const rest = found.list.filter((known) => apart(known) > 1e-3 * now.known.view.longest).slice(0, 12);
@@ -312,16 +389,15 @@ function undo() {
   if (!last) return;
   sliders.values = new Map(last.before);
   now.before = new Map(last.before);
-  sliders.fill();
+  sliders.placeAll();
   pump();
 }
 
 function reset() {
-  remember();
+  if (!sliders.moved()) return;
   sliders.values = new Map();
-  past.push({ before: now.before ? [...now.before] : [], after: [] });
-  now.before = new Map();
-  sliders.fill();
+  remember();
+  sliders.placeAll();
   pump();
 }
 
@@ -345,7 +421,12 @@ async function still() {
 async function share() {
   const shown = sliders.shown.map(({ key, low, high, log }) => ({ key, low, high, log }));
   const view = stage.inSpace() ? stage.camera() : null;
-  const hash = `#s=${await packed({ text: now.text, name: now.name, values: [...sliders.values], sliders: shown, view })}`;
+  const looks = Object.fromEntries(LOOKS.map((id) => [id, find(id).checked]));
+  looks.colour = stage.colour();
+  const { text, name } = now;
+  const values = [...sliders.values];
+  const at = await placeAmongSeveral({ text, name, values });
+  const hash = `#s=${await packed({ text, name, values, sliders: shown, last: trail.key, view, looks, at })}`;
   try {
     history.replaceState(null, "", hash);
     await navigator.clipboard.writeText(location.href);
@@ -353,8 +434,18 @@ async function share() {
   } catch {
     find("share").textContent = "in the address";
   }
-  setTimeout(() => (find("share").textContent = "link"), 1500);
+  setTimeout(() => (find("share").textContent = "copy link"), 1500);
   return location.href;
+}
+
+/// Where the leaf is, if a relaxation leads elsewhere.
+async function placeAmongSeveral(opening) {
+  if (!sliders.moved()) return undefined;
+  const { leaves, longest } = now.known.view;
+  const { at } = await front.ask({ ask: "place" });
+  back = back.free();
+  const { answer, known } = await back.ask({ ask: "open", ...opening });
+  return answer === "opened" && stage.apart(known.view.leaves[0], leaves[0]) < NEAR * longest ? undefined : at;
 }
 
 /// Weight as the view has it: towards the lower edge of the screen.

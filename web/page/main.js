@@ -53,11 +53,27 @@ function toggle(id, act) {
   });
 }
 
+const advise = (text) => (find("advice").textContent = text);
+
+function addSlider() {
+  const wanted = find("add").value;
+  if (!wanted.trim()) return;
+  const found = sliders.add(wanted);
+  if (found) find("add").value = "";
+  find("added").textContent = found ? "" : `no number of this scenario has ${wanted.trim()} in its name`;
+}
+
+function tellSlower() {
+  const factor = 2 ** Number(find("slower").value);
+  find("slower").setAttribute("aria-valuetext", factor === 1 ? "as fast as it is" : `${Number(factor.toPrecision(2))} times slower`);
+}
+
 async function readFile(file) {
   if (file) open({ text: await file.text(), name: file.name });
 }
 
 function listen() {
+  for (const event of ["pointerdown", "input"]) document.addEventListener(event, () => pressed("pull") || advise(""), { once: true });
   find("theme").addEventListener("click", () => {
     stage.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
     trail.later();
@@ -80,7 +96,10 @@ function listen() {
   find("probe").addEventListener("toggle", () => stage.fillProbe());
   find("turned").addEventListener("change", turnGravity);
   toggle("vibrate", (on) => stage.vibrate(on, swing()));
-  toggle("pull", (on) => document.body.classList.toggle("pulling", on));
+  toggle("pull", (on) => {
+    document.body.classList.toggle("pulling", on);
+    advise(on ? "Drag a vein: a spring pulls it after the pointer. Let go, and it swings." : "");
+  });
   toggle("foresee", (on) => {
     if (!on) sliders.forget(null);
     trail.foresee(null);
@@ -92,12 +111,17 @@ function listen() {
     tellLeaf(now.known);
   });
   find("sliders").addEventListener("submit", (event) => event.preventDefault());
-  find("add").addEventListener("change", () => {
-    if (sliders.add(find("add").value)) find("add").value = "";
+  find("add").addEventListener("change", addSlider);
+  // Chosen from the list, not typed.
+  find("add").addEventListener("input", ({ inputType }) => {
+    find("added").textContent = "";
+    if (!inputType || inputType === "insertReplacementText") addSlider();
   });
+  find("slower").addEventListener("input", tellSlower);
+  tellSlower();
   document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => stage.look(button.dataset.view)));
   find("gallery").addEventListener("change", () => open(gallery[Number(find("gallery").value)]));
-  find("read").addEventListener("click", () => open({ text: find("text").value, name: "scenario.toml" }));
+  find("read").addEventListener("click", read);
   find("file").addEventListener("change", () => readFile(find("file").files[0]));
   document.addEventListener("keydown", key);
   document.addEventListener("dragover", (event) => {
@@ -124,15 +148,39 @@ function listen() {
   }).observe(find("stage"));
 }
 
+/// Opens what is typed, or shows the line that is refused.
+async function read() {
+  const text = find("text").value;
+  if (await open({ text, name: "scenario.toml" })) return;
+  const line = Number(/:(\d+)/.exec(find("message").textContent)?.[1]);
+  if (!(line > 0)) return;
+  const lines = text.split("\n");
+  const start = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+  find("text").focus();
+  find("text").setSelectionRange(start, start + (lines[line - 1] || "").length);
+}
+
 function key(event) {
   if (event.target.id === "text" && event.ctrlKey && event.key === "Enter") return find("read").click();
   const typing = /INPUT|SELECT|TEXTAREA/.test(event.target.tagName);
-  if (event.ctrlKey && event.key === "z" && event.target.id !== "text") undo();
+  if ((event.ctrlKey || event.metaKey) && event.key === "z" && event.target.id !== "text") undo();
   else if (event.ctrlKey || event.metaKey || event.altKey || typing) return;
   else if (event.key === "p") find("pull").click();
   else if (event.key === " " && event.target.tagName !== "BUTTON" && event.target.tagName !== "SUMMARY") play(false);
   else if (!stage.key(event)) return;
   event.preventDefault();
+}
+
+/// The scenarios of the repository in their folders, and one that is none of them.
+function fillGallery() {
+  const folders = new Map();
+  gallery.forEach(({ name }, i) => {
+    const [folder, file] = name.replace(/\.toml$/, "").split("/");
+    if (!folders.has(folder)) folders.set(folder, Object.assign(document.createElement("optgroup"), { label: folder }));
+    folders.get(folder).append(new Option(file, i));
+  });
+  const own = Object.assign(new Option("your own", ""), { hidden: true, disabled: true });
+  find("gallery").replaceChildren(own, ...folders.values());
 }
 
 let before = 0;
@@ -144,9 +192,9 @@ function tick(time) {
 }
 
 async function begin() {
-  find("gallery").replaceChildren(...gallery.map(({ name }, i) => new Option(name.replace(/\.toml$/, ""), i)));
   const source = URL.createObjectURL(new Blob([find("worker").textContent], { type: "text/javascript" }));
   gallery = JSON.parse(new TextDecoder().decode(await unpack("gallery-data")));
+  fillGallery();
   const compiled = await code();
   [front, back] = [0, 1].map(() => new Solver(source, compiled));
   await front.ready;
@@ -155,7 +203,6 @@ async function begin() {
   const shared = await unpacked(location.hash).catch(() => null);
   const opened = (shared && (await open(shared))) || (given && (await open(given)));
   if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
-  if (given && !shared) find("gallery-row").hidden = false;
   listen();
   requestAnimationFrame(tick);
   /// For tests, and for whoever builds on the page.

@@ -5,6 +5,7 @@ const CHOICES = [
   ["tip y", "length", ({ tip }) => tip[1]],
   ["tip x", "length", ({ tip }) => tip[0]],
   ["energy", "energy", ({ energy }) => energy],
+  ["height of waves", "length", ({ waves }) => waves],
   ["reaction x", "force", ({ reaction }) => (reaction ? reaction[0] : null)],
   ["reaction z", "force", ({ reaction }) => (reaction ? reaction[2] : null)],
 ];
@@ -22,6 +23,11 @@ class Trail {
     this.begin(null);
   }
 
+  /// Waves are what one looks at where there are any.
+  choose(known) {
+    this.choice = known.waves > 0 ? CHOICES.findIndex(([name]) => name === "height of waves") : 0;
+  }
+
   /// For another number, or another scenario.
   begin(key, log = false, units = [null, null]) {
     const [length, force] = units;
@@ -36,14 +42,15 @@ class Trail {
 
   add(value, known) {
     const [tip] = known.tips;
-    this.points.push({ value, tip, energy: known.energy, reaction: known.reaction, unstable: known.stable === false });
+    const { energy, reaction, waves } = known;
+    this.points.push({ value, tip, energy, reaction, waves, unstable: known.stable === false });
     if (this.points.length > MOST) this.points.shift();
     this.later();
   }
 
   /// Where it snapped, the trail is broken.
   gap(value) {
-    this.points.push({ value, tip: [null, null, null], energy: null, reaction: null, unstable: false });
+    this.points.push({ value, tip: [null, null, null], energy: null, reaction: null, waves: null, unstable: false });
   }
 
   foresee(branch) {

@@ -4,7 +4,7 @@ use crate::motion::Instant;
 use base64::prelude::{BASE64_STANDARD, Engine};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
-use leafdyn::study::{Number, PointKind, Trace};
+use leafdyn::study::{Number, PointKind, Trace, TraceBranch};
 use leafdyn_program::page::{self, View};
 use serde::Serialize;
 
@@ -35,6 +35,10 @@ pub enum Answer {
     #[serde(serialize_with = "list")]
     Sensitivity(Vec<Told>),
     Unloaded(Known),
+    /// Where the leaf is, as [`place`](crate::place) writes it.
+    Place {
+        at: String,
+    },
     Version {
         version: &'static str,
     },
@@ -80,6 +84,8 @@ pub struct Known {
     /// Squares of the angular frequencies.
     pub eigenvalues: Vec<f64>,
     pub reaction: Option<[f64; 3]>,
+    /// Height of the waves along its margins; 0 without waves.
+    pub waves: Option<f64>,
 }
 
 impl Known {
@@ -100,6 +106,7 @@ impl Known {
             index: leaf.stability.negative_eigenvalues,
             eigenvalues: modes.map(|mode| mode.eigenvalue).collect(),
             reaction: (leaf.reaction.as_ref()).map(|reaction| reaction.force.to_array()),
+            waves: leaf.undulation.margin().map(|vein| vein.amplitude),
         }
     }
 }
@@ -155,7 +162,7 @@ pub struct Told {
     pub energy: f64,
 }
 
-/// A branch of equilibria: of each point the value, the tip, the energy and the index.
+/// A branch of equilibria: of each point the value, the tip, the energy, the waves and the index.
 #[derive(Serialize)]
 pub struct Branch {
     key: String,
@@ -170,31 +177,49 @@ struct BranchPoint {
     value: f64,
     tip: [f64; 3],
     energy: f64,
+    waves: Option<f64>,
+    /// The larger of both sides, at a fold or a branch point.
     index: usize,
     /// `fold` or `branch-point`, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind: Option<&'static str>,
 }
 
-/// The first branch of a trace.
+/// The branches of a trace that goes both ways from one point, as one.
 pub fn branch(trace: &Trace) -> Branch {
-    let points = trace.branches.first().map(|branch| &branch.points);
-    let points = points.into_iter().flatten().map(|point| BranchPoint {
-        value: point.value,
-        tip: point
-            .tips
-            .first()
-            .map_or([f64::NAN; 3], |tip| tip.to_array()),
-        energy: point.energy,
-        index: point.index,
-        kind: (point.kind != PointKind::Regular).then(|| point.kind.word()),
-    });
-    let branch = trace.branches.first();
+    let ways = &trace.branches;
+    let back = ways.get(1).map(points).unwrap_or_default();
+    let on = ways.first().map(points).unwrap_or_default();
+    let remark = ways.iter().find_map(|branch| branch.remark.clone());
     Branch {
         key: trace.keys.to_string(),
         log: trace.log,
         complete: trace.complete,
-        remark: trace.remark.clone().or_else(|| branch?.remark.clone()),
-        points: points.collect(),
+        remark: trace.remark.clone().or(remark),
+        // The first point is on both.
+        points: back.into_iter().skip(1).rev().chain(on).collect(),
     }
+}
+
+fn points(branch: &TraceBranch) -> Vec<BranchPoint> {
+    let mut before = 0;
+    let each = branch.points.iter().map(|point| {
+        let tip = point.tips.first();
+        let special = point.kind != PointKind::Regular;
+        let index = if special {
+            point.index.max(before)
+        } else {
+            point.index
+        };
+        before = point.index;
+        BranchPoint {
+            value: point.value,
+            tip: tip.map_or([f64::NAN; 3], |tip| tip.to_array()),
+            energy: point.energy,
+            waves: point.undulation.margin().map(|vein| vein.amplitude),
+            index,
+            kind: special.then(|| point.kind.word()),
+        }
+    });
+    each.collect()
 }

@@ -6,10 +6,12 @@
 //! result()        there
 //! ```
 //!
-//! [`question`] has the questions, [`mod@answer`] the answers, and [`session`] how one follows from the other.
+//! [`question`] has the questions, [`mod@answer`] the answers, and [`session`] how one follows from the other;
+//! [`mod@place`] says where a leaf is.
 
 pub mod answer;
 pub mod motion;
+pub mod place;
 pub mod question;
 pub mod session;
 

@@ -13,13 +13,18 @@ pub type Values = Vec<(String, f64)>;
 #[derive(Deserialize)]
 #[serde(tag = "ask", rename_all = "lowercase")]
 pub enum Question {
-    /// A scenario, with the values of some of its numbers.
+    /// A scenario, with the values of some of its numbers; where it has several equilibria, the one
+    /// near a place that was asked for.
     Open {
         text: String,
         name: String,
         #[serde(default)]
         values: Values,
+        #[serde(default)]
+        at: Option<String>,
     },
+    /// Where the leaf is.
+    Place,
     /// The leaf with other values, followed there.
     Set {
         values: Values,
@@ -47,7 +52,7 @@ pub enum Question {
     },
     /// The end of the motion: the leaf at rest.
     Land,
-    /// The branch of equilibria between two values of a number.
+    /// The branch of the present equilibrium between two values of a number.
     Trace {
         key: String,
         from: f64,

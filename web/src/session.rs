@@ -2,6 +2,7 @@
 
 use crate::answer::{Answer, Known, Slider, Told, branch};
 use crate::motion::Motion;
+use crate::place;
 use crate::question::{Pull, Question, Values};
 use leafdyn::relax::{
     Equilibrium, Followed, Follower, Limit, Options, RelaxError, SemiImplicit, relax,
@@ -9,7 +10,7 @@ use leafdyn::relax::{
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{
     Base, Keys, SensitivityError, TraceRequest, Vary, VaryError, equilibria, sensitivities_of,
-    trace,
+    trace_through,
 };
 use leafdyn_program::files::{self, Document};
 use std::time::Duration;
@@ -81,8 +82,13 @@ impl Session {
 
     fn ask(&mut self, question: Question) -> Result<Answer, Refusal> {
         match question {
-            Question::Open { text, name, values } => {
-                let open = Open::new(Base::of_text(text, name, &[])?, values)?;
+            Question::Open {
+                text,
+                name,
+                values,
+                at,
+            } => {
+                let open = Open::new(Base::of_text(text, name, &[])?, values, at)?;
                 let sliders = open.sliders();
                 let known = open.known();
                 (self.open, self.motion) = (Some(open), None);
@@ -112,7 +118,11 @@ impl Session {
             }
             _ => {}
         }
-        let motion = self.motion.take();
+        // What only asks leaves a motion as it is.
+        let motion = match question {
+            Question::Set { .. } | Question::Settle | Question::Land => self.motion.take(),
+            _ => None,
+        };
         let open = self.opened()?;
         match question {
             Question::Set {
@@ -120,6 +130,9 @@ impl Session {
                 modes,
                 pull,
             } => open.set(values, modes, pull),
+            Question::Place => Ok(Answer::Place {
+                at: place::write(&open.leaf.shape),
+            }),
             Question::Settle => open.settle(None),
             Question::Land => open.settle(motion),
             Question::Trace { key, from, to, log } => open.trace(&key, [from, to], log),
@@ -172,10 +185,17 @@ fn keyed(values: Values) -> Result<Vec<(Keys, f64)>, Refusal> {
 }
 
 impl Open {
-    fn new(base: Base, values: Values) -> Result<Self, Refusal> {
+    fn new(base: Base, values: Values, at: Option<String>) -> Result<Self, Refusal> {
         let values = keyed(values)?;
         let scenario = scenario_of(&base, &values)?;
-        let (leaf, follower) = Follower::begin(&calm(scenario.clone()), &options(&scenario, 0))?;
+        let (calm, how) = (calm(scenario.clone()), options(&scenario, 0));
+        let (leaf, follower) = match at.as_deref().and_then(place::read) {
+            // Without an energy there is no branch to be on.
+            Some((stations, rods)) if !calm.has_moments() => {
+                Follower::begin_near(&calm, &how, (&stations, &rods))?
+            }
+            _ => Follower::begin(&calm, &how)?,
+        };
         Ok(Open {
             base,
             values,
@@ -251,7 +271,7 @@ impl Open {
         Ok(Answer::Found(self.known()))
     }
 
-    /// The equilibria between two values of a number.
+    /// The branch of the leaf between two values of a number.
     fn trace(&self, key: &str, [from, to]: [f64; 2], log: bool) -> Result<Answer, Refusal> {
         let mark = if log { "log" } else { "" };
         let vary: Vary = format!("{key}={from:?}..{to:?}{mark}").parse()?;
@@ -264,7 +284,15 @@ impl Open {
             tolerance: Some(TOLERANCE),
             most_points: MOST_POINTS,
         };
-        match trace(&request, &mut |_, _, _| {}) {
+        let given = self
+            .values
+            .iter()
+            .find(|(keys, _)| *keys == request.vary.keys);
+        let value = given.map(|(_, value)| *value);
+        let Some(value) = value.or_else(|| self.base.number(&request.vary.keys)) else {
+            return refuse(format!("{key} has no value"));
+        };
+        match trace_through(&request, (&self.leaf, value), &mut |_, _, _| {}) {
             Ok(trace) => Ok(Answer::Branch(branch(&trace))),
             Err(why) => refuse(why),
         }

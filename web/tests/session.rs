@@ -76,6 +76,61 @@ fn a_column_goes_along_snaps_and_comes_back_late() {
     assert!(back["tips"][0][2].as_f64().unwrap() < -0.3);
 }
 
+/// Told where it is, another session begins with the same of two equilibria, and traces its branch both
+/// ways; told nonsense, it begins as a relaxation does.
+#[test]
+fn a_place_leads_to_the_same_of_several_equilibria() {
+    let mut session = Session::default();
+    let key = "load.tip_force[2]";
+    ask(
+        &mut session,
+        json!({ "ask": "open", "text": COLUMN, "name": "column.toml" }),
+    );
+    let values = json!([[key, -0.05]]);
+    let up = ask(&mut session, json!({ "ask": "set", "values": values }));
+    let at = ask(&mut session, json!({ "ask": "place" }))["at"].clone();
+    let opened = |at: Value| {
+        let mut other = Session::default();
+        let question =
+            json!({ "ask": "open", "text": COLUMN, "name": "", "values": values, "at": at });
+        let tip = ask(&mut other, question)["known"]["tips"][0][2].as_f64();
+        (other, tip.unwrap())
+    };
+    let (mut other, tip) = opened(at);
+    assert!((tip - up["tips"][0][2].as_f64().unwrap()).abs() < 2e-4);
+    let question = json!({ "ask": "trace", "key": key, "from": -0.5, "to": 0.5 });
+    let branch = ask(&mut other, question);
+    let points = branch["points"].as_array().unwrap();
+    let number = |point: &Value, of: &str| point[of].as_f64().unwrap();
+    let ends = [&points[0], points.last().unwrap()].map(|it| number(it, "value"));
+    assert_eq!(ends, [-0.5, 0.5]);
+    let folds = points.iter().filter(|it| it["kind"] == "fold");
+    let folds: Vec<f64> = folds.map(|it| number(it, "value")).collect();
+    assert_eq!(folds.len(), 2);
+    assert!(folds.iter().all(|at| (at.abs() - 0.1113).abs() < 2e-3));
+    assert!(
+        points
+            .iter()
+            .any(|it| (number(it, "value") + 0.05).abs() < 1e-3)
+    );
+    for nonsense in ["", "x", "AAAA", "////////////////////////////////"] {
+        assert!(opened(json!(nonsense)).1 < -0.3);
+    }
+}
+
+/// A question in between leaves a motion as it is.
+#[test]
+fn a_motion_goes_on_after_what_only_asks() {
+    let mut session = Session::default();
+    open(&mut session, "paper/fig04.toml");
+    ask(&mut session, json!({ "ask": "go", "released": true }));
+    for asked in ["place", "unloaded", "version"] {
+        ask(&mut session, json!({ "ask": asked }));
+        let frame = ask(&mut session, json!({ "ask": "frame" }));
+        assert_eq!(frame["answer"], "moving", "{asked}");
+    }
+}
+
 /// Under a dead moment, which has no potential, it is found anew for every value.
 #[test]
 fn a_leaf_under_a_moment_is_not_said_to_be_left() {

@@ -59,7 +59,7 @@ class Diagram {
       this.add("path", { d: `M${left} ${y}H${right}`, stroke: "var(--grid)" });
       this.add("text", { x: left - 6, y: y + 4, "text-anchor": "end" }, tickText(value, rising.decimals, rising.step));
     }
-    const across = ticks(this.x[0], this.x[1], chart.log ? Math.min(5, this.x[1] - this.x[0]) : 5);
+    const across = chart.log ? logTicks(this.x) : ticks(this.x[0], this.x[1], 5);
     const sign = this.curves.some((curve) => curve.x.some((x) => x < 0)) ? -1 : 1;
     for (const value of across.values) {
       const x = left + ((value - this.x[0]) / (this.x[1] - this.x[0])) * (right - left);
@@ -139,6 +139,15 @@ class Diagram {
       });
     if (best.far < Infinity) this.go(best);
   }
+}
+
+/// Powers of ten between two logarithms or, where these are few, rounder and rounder numbers between them.
+function logTicks([low, high]) {
+  if (high - low > 2) return ticks(low, high, Math.min(5, high - low));
+  const decades = Array.from({ length: Math.floor(high) - Math.floor(low) + 1 }, (_, k) => Math.floor(low) + k);
+  const within = (digits) => decades.flatMap((k) => digits.map((digit) => k + Math.log10(digit))).filter((x) => x >= low - 1e-9 && x <= high + 1e-9);
+  const values = [[1], [1, 3], [1, 2, 5], [1, 1.5, 2, 3, 4, 5, 7]].map(within).find((some) => some.length > 2);
+  return { values: values || ticks(10 ** low, 10 ** high, 4).values.map(Math.log10) };
 }
 
 function range(values) {

@@ -44,10 +44,39 @@ function quads(count, stride, along, across, step, side) {
 }
 
 /// A leaf in the scene, whose shape and colours can be set again without new buffers.
+/// Points on the cubic through neighbouring nodes, so many pieces between two: with the exact slopes R v where they are known.
+function smooth(leaf, sub, points) {
+  const { nodes, points: from } = leaf;
+  if (sub === 1) {
+    points.set(from.subarray(0, points.length));
+    return;
+  }
+  const fine = (nodes - 1) * sub + 1;
+  const slope = leaf.state ? slopeOfState(leaf) : slopeOfPoints(leaf);
+  const [a, b] = [[0, 0, 0], [0, 0, 0]];
+  for (let j = 0; j * 3 * nodes < from.length; j++)
+    for (let i = 0; i + 1 < nodes; i++) {
+      const p = j * nodes + i;
+      slope(p, i, 1, a);
+      slope(p + 1, i + 1, -1, b);
+      const last = i + 2 === nodes ? sub : sub - 1;
+      for (let s = 0; s <= last; s++) {
+        const t = s / sub;
+        const [h0, h1] = [(1 + 2 * t) * (1 - t) ** 2, t * (1 - t) ** 2];
+        const [h2, h3] = [t * t * (3 - 2 * t), t * t * (t - 1)];
+        const to = 3 * (j * fine + i * sub + s);
+        for (let k = 0; k < 3; k++) points[to + k] = h0 * from[3 * p + k] + h1 * a[k] + h2 * from[3 * p + 3 + k] + h3 * b[k];
+      }
+    }
+}
+
+/// Pieces between two nodes, so that a vein has enough to look smooth.
+const piecesOf = (nodes) => (nodes > 1 ? Math.max(1, Math.ceil(PIECES / (nodes - 1))) : 1);
+
 class LeafMesh {
   constructor(leaf) {
     this.nodes = leaf.nodes;
-    this.sub = leaf.nodes > 1 ? Math.max(1, Math.ceil(PIECES / (leaf.nodes - 1))) : 1;
+    this.sub = piecesOf(leaf.nodes);
     this.fine = Math.max(1, (leaf.nodes - 1) * this.sub + 1);
     this.points = new Float32Array(3 * veins * this.fine);
     const vertices = veins * this.fine * RING;
@@ -104,7 +133,7 @@ class LeafMesh {
 
   /// Takes over the shape of a leaf with as many nodes.
   shape(leaf) {
-    this.smooth(leaf);
+    smooth(leaf, this.sub, this.points);
     this.moved = true;
     const last = (j) => 3 * (j * this.fine + this.fine - 1);
     this.tips.forEach((tip, j) => tip.position.fromArray(this.points, last(j)));
@@ -112,32 +141,6 @@ class LeafMesh {
     const membrane = this.surface.geometry;
     membrane.attributes.position.needsUpdate = true;
     if (this.surface.visible) membrane.computeVertexNormals();
-  }
-
-  /// Points on the cubic through neighbouring nodes: with the exact slopes R v where they are known.
-  smooth(leaf) {
-    const { sub, fine, nodes, points } = this;
-    const from = leaf.points;
-    if (sub === 1) {
-      points.set(from.subarray(0, points.length));
-      return;
-    }
-    const slope = leaf.state ? slopeOfState(leaf) : slopeOfPoints(leaf);
-    const [a, b] = [[0, 0, 0], [0, 0, 0]];
-    for (let j = 0; j < veins; j++)
-      for (let i = 0; i + 1 < nodes; i++) {
-        const p = j * nodes + i;
-        slope(p, i, 1, a);
-        slope(p + 1, i + 1, -1, b);
-        const last = i + 2 === nodes ? sub : sub - 1;
-        for (let s = 0; s <= last; s++) {
-          const t = s / sub;
-          const [h0, h1] = [(1 + 2 * t) * (1 - t) ** 2, t * (1 - t) ** 2];
-          const [h2, h3] = [t * t * (3 - 2 * t), t * t * (t - 1)];
-          const to = 3 * (j * fine + i * sub + s);
-          for (let k = 0; k < 3; k++) points[to + k] = h0 * from[3 * p + k] + h1 * a[k] + h2 * from[3 * p + 3 + k] + h3 * b[k];
-        }
-      }
   }
 
   /// Turns the tubes to the reader, who looks from this direction, if that is not done yet.

@@ -24,8 +24,8 @@ const COARSEST: usize = 8;
 /// Distances from the branch point at which the other branch is sought, in this order.
 const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
-/// The first point of a branch and its grid: the equilibrium `rest`, found with these
-/// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
+/// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
+/// these `options`; on a grid of at least `segments` segments, or, if none is given, on
 /// the first one, at least twice as fine as the stations of the relaxation, on which the index
 /// is that of `rest`.
 ///
@@ -33,13 +33,14 @@ const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The failure on the finest grid, if Newton's method converges on none.
 pub fn begin<'a>(
     family: &'a Family<'a>,
-    rest: &Equilibrium,
+    (rest, fraction): (&Equilibrium, f64),
     options: &Options,
     segments: Option<usize>,
 ) -> Result<(Grids<'a>, Point), Stuck> {
     let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
     let least = segments.unwrap_or(2 * coarsest);
-    search(family, rest, least, segments.is_some()).or_else(|stuck| {
+    let rest_at = (rest, fraction);
+    search(family, rest_at, least, segments.is_some()).or_else(|stuck| {
         // Interpolation between the stations may be too inaccurate: relax once more, on the
         // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();
@@ -47,14 +48,19 @@ pub fn begin<'a>(
             method: options.method.on_grid(finest),
             ..options.clone()
         };
-        let alone = relax(&family.scenario([0.0])?, &options, &mut |_| {});
+        let alone = relax(&family.scenario([fraction])?, &options, &mut |_| {});
         let Ok(alone) = alone else {
             return Err(stuck);
         };
         let mut tips = rest.tips.iter().zip(&alone.tips);
         let near = SAME_LEAF * family.scale().length;
         match tips.all(|(a, b)| a.distance(*b) < near) {
-            true => search(family, &alone, alone.shape.stations.len() - 1, true),
+            true => search(
+                family,
+                (&alone, fraction),
+                alone.shape.stations.len() - 1,
+                true,
+            ),
             false => Err(stuck),
         }
     })
@@ -64,11 +70,11 @@ pub fn begin<'a>(
 /// with the index of `rest`.
 fn search<'a>(
     family: &'a Family<'a>,
-    rest: &Equilibrium,
+    (rest, fraction): (&Equilibrium, f64),
     least: usize,
     any_index: bool,
 ) -> Result<(Grids<'a>, Point), Stuck> {
-    let leaf = family.first();
+    let leaf = &family.leaf([fraction])?;
     let mut grid = Grid::through(&rest.shape.stations, leaf.kinks());
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     let mut state = project(leaf, &discrete, &rest.shape.rods);
@@ -76,11 +82,14 @@ fn search<'a>(
     loop {
         if grid.segments() >= least {
             let mut grids = Grids::new(family, grid.clone());
-            let point = grids.of(&state).correct(&state, 0.0, None).or_else(|_| {
-                let mut system = System::new(&discrete);
-                polish(&discrete, &mut state, &mut system, &mut Work::default());
-                grids.of(&state).correct(&state, 0.0, None)
-            });
+            let point = grids
+                .of(&state)
+                .correct(&state, fraction, None)
+                .or_else(|_| {
+                    let mut system = System::new(&discrete);
+                    polish(&discrete, &mut state, &mut system, &mut Work::default());
+                    grids.of(&state).correct(&state, fraction, None)
+                });
             match point {
                 Ok(point) => {
                     let same = Some(point.index) == rest.stability.negative_eigenvalues;

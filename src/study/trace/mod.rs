@@ -7,8 +7,8 @@ mod show;
 
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint};
-pub use run::trace;
 pub(super) use run::traced;
+pub use run::{trace, trace_through};
 pub use show::TraceShow;
 
 use super::vary::{Base, Vary};

@@ -6,7 +6,9 @@ use std::collections::VecDeque;
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
-use crate::branch::{Critical, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, switch};
+use crate::branch::{
+    Critical, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch,
+};
 use crate::leaf::Grid;
 use crate::memory;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax};
@@ -33,6 +35,19 @@ pub fn trace(
     Ok(traced(request, progress)?.trace)
 }
 
+/// The same from a leaf at rest, which the scenario has at this `value` of its number: through that
+/// leaf towards both ends of the range, as two branches, of which the first goes to larger fractions.
+///
+/// # Errors
+/// Requests that cannot be met; failures during the run are part of the result.
+pub fn trace_through(
+    request: &TraceRequest,
+    leaf: (&Equilibrium, f64),
+    progress: &mut dyn FnMut(usize, usize, f64),
+) -> Result<Trace, TraceError> {
+    Ok(traced_from(request, Some(leaf), progress)?.trace)
+}
+
 /// A trace, with its first point and its critical points.
 pub struct Traced {
     pub trace: Trace,
@@ -44,6 +59,15 @@ pub struct Traced {
 /// The same as [`trace`], with those points.
 pub fn traced(
     request: &TraceRequest,
+    progress: &mut dyn FnMut(usize, usize, f64),
+) -> Result<Traced, TraceError> {
+    traced_from(request, None, progress)
+}
+
+/// Both: from a relaxation at the start of the range, or both ways from a given leaf.
+fn traced_from(
+    request: &TraceRequest,
+    given: Option<(&Equilibrium, f64)>,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Traced, TraceError> {
     request.check()?;
@@ -59,12 +83,21 @@ pub fn traced(
     }
     let family = Family::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
-    let scenario = request.base.at(&[(keys, ends[0])])?.scenario;
+    let value = given.map_or(ends[0], |(_, value)| value);
+    let scenario = request.base.at(&[(keys, value)])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
     let last = request.base.at(&[(keys, ends[1])])?.scenario;
     let leaning = total_load(&last) - total_load(&scenario);
-    let (rest, options) =
-        first_equilibrium(&scenario, (tolerance, leaning), request.keep_unstable)?;
+    let keep_unstable = request.keep_unstable;
+    let (rest, options) = match given {
+        Some((leaf, _)) => (leaf.clone(), options((tolerance, leaning), keep_unstable)),
+        None => first_equilibrium(&scenario, (tolerance, leaning), keep_unstable)?,
+    };
+    let fraction = Range {
+        ends,
+        log: vary.log,
+    }
+    .fraction(value);
     let check = |least| check_grid(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
@@ -89,7 +122,9 @@ pub fn traced(
         wall_seconds: 0.0,
     };
     let began = match rest.stability.negative_eigenvalues {
-        Some(_) => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
+        Some(_) => {
+            begin(&family, (&rest, fraction), &options, wanted).map_err(|stuck| stuck.to_string())
+        }
         None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
     let (mut first, mut critical) = (None, Vec::new());
@@ -104,11 +139,11 @@ pub fn traced(
                 critical: Vec::new(),
                 progress,
             };
-            run.follow_all(point, &mut trace);
+            run.follow_all(point, given.is_some(), &mut trace);
             (first, critical) = (run.first, run.critical);
         }
         Err(why) => {
-            let at = keys.text(ends[0]);
+            let at = keys.text(value);
             let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
             trace.remark = Some(remark);
         }
@@ -136,7 +171,18 @@ fn first_equilibrium(
     (tolerance, leaning): (f64, DVec3),
     keep_unstable: bool,
 ) -> Result<(Equilibrium, Options), RelaxError> {
-    let options = |keep_unstable| Options {
+    let wanted = options((tolerance, leaning), keep_unstable);
+    let mut rest = relax(scenario, &wanted, &mut |_| {})?;
+    if keep_unstable && !rest.outcome.is_at_rest() {
+        // Newton's method leads nowhere from this start.
+        let stable = options((tolerance, leaning), false);
+        rest = relax(scenario, &stable, &mut |_| {})?;
+    }
+    Ok((rest, wanted))
+}
+
+fn options((tolerance, leaning): (f64, DVec3), keep_unstable: bool) -> Options {
+    Options {
         tolerance: Some(tolerance),
         leaning,
         method: SemiImplicit {
@@ -145,14 +191,7 @@ fn first_equilibrium(
         }
         .into(),
         ..Options::default()
-    };
-    let wanted = options(keep_unstable);
-    let mut rest = relax(scenario, &wanted, &mut |_| {})?;
-    if keep_unstable && !rest.outcome.is_at_rest() {
-        // Newton's method leads nowhere from this start.
-        rest = relax(scenario, &options(false), &mut |_| {})?;
     }
-    Ok((rest, wanted))
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
@@ -198,15 +237,23 @@ struct Run<'r, 'p> {
 }
 
 impl Run<'_, '_> {
-    /// Follows the branch of the first point and, if requested, those that
-    /// cross it, breadth first.
-    fn follow_all(&mut self, mut first: Point, trace: &mut Trace) {
+    /// Follows the branch of the first point, `both_ways` or to larger fractions, and, if requested,
+    /// those that cross it, breadth first.
+    fn follow_all(&mut self, mut first: Point, both_ways: bool, trace: &mut Trace) {
         trace.segments = first.state.segments();
         first.tangent = first.tangent.growing();
         let values = self.request.vary.values.len();
         let longest = (1.0 / (values - 1) as f64).min(LONGEST);
         let how = Walk::new(longest, self.request.most_points);
-        let mut entrances = VecDeque::from([(first, None)]);
+        let back = both_ways.then(|| Point {
+            tangent: first.tangent.reversed(),
+            ..first.clone()
+        });
+        let mut entrances: VecDeque<_> = [first]
+            .into_iter()
+            .chain(back)
+            .map(|it| (it, None))
+            .collect();
         while let Some((first, from)) = entrances.pop_front() {
             let number = trace.branches.len();
             if number == MOST_BRANCHES {
