@@ -111,7 +111,8 @@ impl Follower {
     ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
         let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
         let alike = rods.len() == leaf.rods()
-            && stations.len() > 1
+            && (stations.first(), stations.last()) == (Some(&0.0), Some(&1.0))
+            && stations.is_sorted_by(|a, b| a < b)
             && rods.iter().all(|rod| rod.nodes.len() == stations.len());
         if !alike {
             return Follower::begin(scenario, options);
