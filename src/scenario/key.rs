@@ -244,7 +244,7 @@ impl Key {
     }
 
     /// Exponents of length, force and time in its unit.
-    pub(crate) fn dimension(self) -> [i32; 3] {
+    pub fn dimension(self) -> [i32; 3] {
         self.row().dimension
     }
 

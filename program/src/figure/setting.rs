@@ -113,6 +113,7 @@ fn weight(scenario: &Scenario) -> DVec3 {
 /// A name with its unit, if that is known.
 pub fn with_unit(name: &str, unit: Option<&str>) -> String {
     match unit {
+        Some(unit) if unit.contains('/') => format!("{name} / ({unit})"),
         Some(unit) => format!("{name} / {unit}"),
         None => name.into(),
     }

@@ -299,13 +299,18 @@ impl<'s> Scene<'s> {
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
     }
 
-    /// Draws the shadows of all veins on the floor, the pieces of the veins, those
-    /// farther away first, and the leaf's markers.
-    pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+    /// Draws the shadows of all veins on the floor.
+    pub fn draw_shadows(&self, page: &mut Drawing, veins: &Veins, width: f64) {
         for vein in &veins.veins {
             let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
             page.stroke(shadow, Stroke::new(SHADOW, width));
         }
+    }
+
+    /// Draws the shadows of all veins on the floor, the pieces of the veins, those
+    /// farther away first, and the leaf's markers.
+    pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+        self.draw_shadows(page, veins, width);
         let depth = |piece: &Piece| self.camera.toward.dot(piece[0] + piece[3]);
         let mut pieces: Vec<(f64, &Piece, &Vein)> = Vec::new();
         for vein in &veins.veins {
