@@ -156,7 +156,7 @@ fn draw_curves(
             draw_cells(page, &axes, boundary, map);
             false
         }
-        None => shade(page, cell, &lines),
+        None => shade(page, looked_at(boundary, &axes), &lines),
     };
     axes.draw(page);
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
@@ -181,6 +181,15 @@ fn draw_curves(
     labels.draw(page);
     write_indices(page, &lines, &mut labels);
     draw_key(page, boundary, (&lines, shaded), cell);
+}
+
+/// The part of the panel in which curves were looked for.
+fn looked_at(boundary: &Boundary, axes: &Axes) -> Cell {
+    let [first, second] = boundary.ranges;
+    let ends = [0, 1].map(|k| axes.at((first[k], second[k])).unwrap_or(axes.cell.corner));
+    let (low, high) = (axes.cell.corner, axes.cell.end());
+    let corner = ends[0].min(ends[1]).clamp(low, high);
+    Cell::new(corner, ends[0].max(ends[1]).clamp(low, high) - corner)
 }
 
 /// The stroke of a curve by its number, thicker if it bounds stable ground.

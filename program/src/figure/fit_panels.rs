@@ -17,6 +17,8 @@ use leafdyn::study::{FitLeaf, FitResidual, MeasuredQuantity};
 
 const RESULT: f64 = 190.0;
 const RESIDUALS: f64 = 70.0;
+/// Least pixels between ticks of residuals.
+const RESIDUAL_TICKS: f64 = 16.0;
 /// Between results and their residuals.
 const GAP: f64 = 12.0;
 /// Heights of a leaf, and between its two views.
@@ -172,9 +174,10 @@ fn draw_residuals(
     let corner = DVec2::new(above.corner.x, above.end().y + GAP);
     let cell = Cell::new(corner, DVec2::new(above.size.x, RESIDUALS));
     let sizes = points.iter().map(|(_, residual, _)| residual.abs());
-    let most = 1.1 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
+    let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
     let up = Axis {
         emphasizes_zero: true,
+        tick_spacing: Some(RESIDUAL_TICKS),
         ..Axis::linear("residual", -most, most)
     };
     let axes = Axes { cell, across, up };

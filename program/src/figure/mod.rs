@@ -249,11 +249,11 @@ mod tests {
             mass: 0.0,
         }];
         let pictures = record.stills.len();
-        // An arc and its head in every panel.
-        assert_eq!(drawn(&turned), [rest + 8, moving + 2 * pictures]);
+        // An arc and its head in every panel, and one view at rest.
+        assert_eq!(drawn(&turned), [rest + 2, moving + 2 * pictures]);
         turned.points.clear();
         turned.tip_moment = [0.0, 0.0, 0.5];
-        assert_eq!(drawn(&turned), [rest + 8, moving]);
+        assert_eq!(drawn(&turned), [rest + 2, moving]);
     }
 
     #[test]

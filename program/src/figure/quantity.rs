@@ -323,7 +323,7 @@ mod tests {
             ("method.step", "time step"),
             (
                 "dynamics.gravity.value[0][2]",
-                "dynamics.gravity.value[0][2]",
+                "dynamics.gravity.value[0][2] / (N/cm)",
             ),
         ] {
             assert_eq!(Quantity::of(keys, &cm()).axis(), axis, "{keys}");

@@ -26,6 +26,8 @@ const PADDING: f64 = 0.07;
 const FLAT: f64 = 0.02;
 /// Unloaded shapes nearer than this to the rod are not drawn, in its extents.
 const VISIBLE: f64 = 0.004;
+/// An unloaded shape that is so many times as large as a coiled rod is cut off.
+const FARTHEST: f64 = 4.0;
 /// Points of the unloaded shape.
 const POINTS: usize = 96;
 const LINE: f64 = 2.4;
@@ -53,6 +55,8 @@ struct Rod<'a> {
     veins: &'a Veins,
     /// Its unloaded shape, if that looks different.
     unloaded: Vec<DVec3>,
+    /// Whether its end is left out.
+    cut_off: bool,
     forces: Vec<Force>,
 }
 
@@ -110,7 +114,7 @@ impl<'a> Rod<'a> {
     fn of(leaf: &Equilibrium, scenario: &Scenario, veins: &'a Veins) -> Self {
         let natural = Natural::new(scenario, true);
         let at = |k: usize| natural.at(0, k as f64 / POINTS as f64).0 / veins.unit;
-        let unloaded: Vec<DVec3> = (0..=POINTS).map(at).filter(|&it| is_drawable(it)).collect();
+        let mut unloaded: Vec<DVec3> = (0..=POINTS).map(at).filter(|&it| is_drawable(it)).collect();
         let (stations, curve) = match leaf.shape.curves.first() {
             Some(curve) => (&leaf.shape.curve_stations[..], &curve[..]),
             None => Default::default(),
@@ -123,6 +127,19 @@ impl<'a> Rod<'a> {
             let there = point(k as f64 / POINTS as f64);
             there.is_some_and(|it| it.distance(*natural) > VISIBLE * veins.extent())
         });
+        let extent = |(low, high): (DVec3, DVec3)| (high - low).max_element();
+        let own = extent((veins.low, veins.high));
+        let whole = unloaded
+            .iter()
+            .fold((DVec3::ZERO, DVec3::ZERO), |(low, high), &it| {
+                (low.min(it), high.max(it))
+            });
+        let cut_off = extent(whole) > FARTHEST * own && own > 0.0;
+        if cut_off {
+            let near = |it: &&DVec3| it.length() < 1.5 * own;
+            let count = unloaded.iter().take_while(near).count();
+            unloaded.truncate(count);
+        }
         let forces = forces(scenario, veins.extent(), |sigma| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
             Some((point(sigma)?, (there? - before?).normalize_or_zero()))
@@ -130,6 +147,7 @@ impl<'a> Rod<'a> {
         Rod {
             veins,
             unloaded: if differs { unloaded } else { Vec::new() },
+            cut_off,
             forces,
         }
     }
@@ -178,7 +196,11 @@ impl<'a> Rod<'a> {
             cell.line(page, Stroke::new(own, LINE))
         });
         if !self.unloaded.is_empty() {
-            key.entry(page, "unloaded", |page, cell| {
+            let name = match self.cut_off {
+                true => "unloaded, cut off",
+                false => "unloaded",
+            };
+            key.entry(page, name, |page, cell| {
                 cell.line(page, UNLOADED.dashed(true));
             });
         }
@@ -255,4 +277,97 @@ fn draw_wall(page: &mut Drawing, at: DVec2, inward: DVec2, size: f64) {
         path.extend([Step::Move(from), Step::Line(from + behind)]);
     }
     page.stroke(path, Stroke::new(INK, 1.0));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::leaf;
+    use crate::figure::svg::text;
+    use crate::report::sample;
+    use glam::DVec3;
+    use leafdyn::scenario::{Clamp, HeldTip, PointLoad};
+
+    /// The sample rod in a picture of this scenario.
+    fn svg(change: impl FnOnce(&mut Scenario)) -> String {
+        let mut scenario = sample::scenario("rod", 1);
+        change(&mut scenario);
+        text(&leaf(&sample::fan(1, 8), &scenario))
+    }
+
+    /// How often one of its strokes is as thick as that of a wall: the key has one more.
+    fn walls(svg: &str) -> usize {
+        svg.matches("stroke=\"#202024\" stroke-width=\"2\"").count() - 1
+    }
+
+    #[test]
+    fn a_rod_has_one_view_with_its_loads_and_supports() {
+        let hanging = svg(|_| ());
+        for part in [
+            ">at rest<",
+            ">unloaded<",
+            ">free tip<",
+            ">gravity<",
+            ">from the side<",
+        ] {
+            assert_eq!(hanging.matches(part).count(), 1, "{part}");
+        }
+        assert_eq!(walls(&hanging), 1);
+        let loaded = svg(|it| {
+            it.tip_force = [0.0, 0.0, -2.0];
+            it.points = vec![PointLoad {
+                vein: 0,
+                at: 0.5,
+                force: [0.0, 0.0, 0.5],
+                moment: [0.0; 3],
+                mass: 0.0,
+            }];
+        });
+        assert!(loaded.contains(">force 2<") && loaded.contains(">force 0.5<"));
+        // A clamped tip is drawn as a clamp, a pinned one as pinned.
+        let hold = |it: &mut Scenario, clamps| {
+            let position = [1.0, 0.0, 0.0];
+            it.held_tip = Some(HeldTip { position, clamps });
+        };
+        let clamp = Clamp {
+            angle: 0.0,
+            twist: 0.0,
+        };
+        let clamped = svg(|it| hold(it, Some(vec![clamp])));
+        assert_eq!(walls(&clamped), 2);
+        let pinned = svg(|it| hold(it, None));
+        assert_eq!(walls(&pinned), 1);
+        assert!(pinned.contains(">pinned<"));
+        assert!(
+            ![clamped, pinned]
+                .iter()
+                .any(|svg| svg.contains(">free tip<"))
+        );
+    }
+
+    #[test]
+    fn a_rod_that_leaves_every_plane_is_drawn_in_space() {
+        let mut rod = sample::fan(1, 8);
+        for (k, point) in rod.shape.curves[0].iter_mut().enumerate() {
+            *point += 0.02 * (k * k) as f64 * 0.25 * DVec3::Y;
+        }
+        let drawn = text(&leaf(&rod, &sample::scenario("rod", 1)));
+        assert!(drawn.contains(">in space, with its shadow on the floor<"));
+        assert!(!drawn.contains(">from the side<"));
+    }
+
+    #[test]
+    fn the_unloaded_shape_is_drawn_where_it_differs() {
+        let unloaded = |svg: &str| svg.contains(">unloaded");
+        let straight = |scale: f64| {
+            let mut rod = sample::fan(1, 8);
+            for (k, point) in rod.shape.curves[0].iter_mut().enumerate() {
+                *point = scale * k as f64 / 8.0 * DVec3::X;
+            }
+            text(&leaf(&rod, &sample::scenario("rod", 1)))
+        };
+        assert!(!unloaded(&straight(1.0)) && unloaded(&straight(0.9)));
+        // Of a coiled rod only the beginning.
+        assert!(straight(0.1).contains(">unloaded, cut off<"));
+    }
 }

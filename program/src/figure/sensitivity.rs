@@ -24,7 +24,11 @@ const BAR: f64 = 12.0;
 /// From a bar to its value.
 const VALUE: f64 = 4.0;
 /// Room for the values beside the longest bars, as a fraction of the panel.
-const BESIDE: f64 = 0.36;
+const BESIDE: f64 = 0.42;
+/// Least pixels between ticks.
+const TICKS: f64 = 40.0;
+/// Values are shown to this part of them.
+const SHOWN: f64 = 5e-3;
 const BOTTOM: f64 = 4.0;
 const MOST_ROWS: usize = 40;
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
@@ -138,6 +142,7 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         };
         let across = Axis {
             emphasizes_zero: true,
+            tick_spacing: Some(TICKS),
             ..Axis::linear(&name, -end, end)
         };
         page.group("changes", |page| {
@@ -161,6 +166,8 @@ fn draw_bars(
         ..Axis::linear("", 0.0, 1.0)
     };
     let axes = Axes::titled(page, cell, ["", what], across, up);
+    // Values are in the unit of the labels of the axis.
+    let unit = 10f64.powi(axes.across.power());
     let Some(zero) = axes.at((0.0, 0.0)) else {
         return;
     };
@@ -181,7 +188,8 @@ fn draw_bars(
             Anchor::End
         };
         let at = DVec2::new(end.x + side * VALUE, middle);
-        page.centered_label(at, &short(value), TICK_SIZE, anchor, NOTE);
+        let shown = rounded_to(value, SHOWN * value.abs()) / unit;
+        page.centered_label(at, &short(shown), TICK_SIZE, anchor, NOTE);
     }
     let line = zero.with_y(cell.corner.y);
     page.line(line, line.with_y(cell.end().y), Stroke::new(FRAME, 0.8));
@@ -235,9 +243,9 @@ mod tests {
             ">bending stiffness A2<",
             ">by 1 % of 1 N cm²<",
             ">0, by 0.01 N/cm<",
-            ">0.005<",
-            ">\u{2212}0.0025<",
-            ">displacement of the tip / cm<",
+            ">5<",
+            ">\u{2212}2.5<",
+            ">displacement of the tip / cm · 10³<",
         ] {
             assert!(svg.contains(part), "{part}");
         }

@@ -195,8 +195,10 @@ impl Veins {
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
         }
-        if !self.moments.is_empty() {
-            notes.push("curved arrows: moments".into());
+        match self.moments.as_slice() {
+            [] => (),
+            [one] => notes.push(format!("curved arrow: moment {}", setting.moment(one.size))),
+            _ => notes.push("curved arrows: moments".into()),
         }
         notes
     }

@@ -43,6 +43,7 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
     let svg = figure(&format!("{PITCHFORK} --show x,energy,twist"));
     let panels = groups(&svg, "branches");
     assert_eq!(panels.len(), 3);
+    assert!(svg.contains(">force on the tip along x<") && !svg.contains("load.tip_force"));
     // A twist that is rounding is drawn as none: its axis is wider.
     let names = [">x of the tip<", ">energy<", ">mean twist / rad · 10⁹<"];
     for (panel, name) in panels.iter().zip(names) {
