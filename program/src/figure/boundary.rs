@@ -9,7 +9,7 @@ use super::stable_ground::shade;
 use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{
-    Anchor, BLUE, Color, Dash, Drawing, GREEN, INK, ORANGE, PURPLE, SLATE, Stroke, VERMILION,
+    Anchor, BLUE, Color, Dash, Drawing, GREEN, INK, PURPLE, SKY, SLATE, Stroke, VERMILION,
 };
 use crate::figure::labels::Labels;
 use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, title};
@@ -36,7 +36,7 @@ const VISIBLE: f64 = 0.1;
 /// Most leaves drawn, each at a named point.
 const MOST_LEAVES: usize = 4;
 /// Colours of neighbouring curves; they also differ in their dashes.
-const COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, ORANGE];
+const COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);

@@ -78,10 +78,10 @@ pub const DARKEST_INDEX: usize = 4;
 pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
     let color = match index {
         0 => PALE,
-        1 => Color(255, 236, 212),
-        2 => Color(252, 212, 174),
-        3 => Color(243, 184, 140),
-        _ => Color(226, 152, 110),
+        1 => Color(255, 240, 222),
+        2 => Color(252, 224, 194),
+        3 => Color(246, 204, 168),
+        _ => Color(236, 182, 144),
     };
     page.shape(rectangle(cell.corner, cell.size), color, None);
 }
