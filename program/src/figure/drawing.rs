@@ -53,11 +53,11 @@ pub enum Dash {
     Solid,
     Dashed,
     Dotted,
-    DashDotted,
+    Alternating,
 }
 
 impl Dash {
-    pub const ALL: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::DashDotted];
+    pub const ALL: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::Alternating];
 
     /// Lengths of dashes and of the gaps between them, in turn; none of a solid line.
     pub fn lengths(self) -> &'static [f64] {
@@ -65,7 +65,7 @@ impl Dash {
             Dash::Solid => &[],
             Dash::Dashed => &[5.0, 4.0],
             Dash::Dotted => &[0.1, 4.0],
-            Dash::DashDotted => &[8.0, 4.0, 0.1, 4.0],
+            Dash::Alternating => &[8.0, 4.0, 0.1, 4.0],
         }
     }
 }

@@ -57,7 +57,7 @@ impl Row {
             }
         };
         let (change, error) = match &found.reaction {
-            Some(reaction) => (DVec3::from(reaction.force), found.tip_reaction_error),
+            Some(reaction) => (reaction.force, found.tip_reaction_error),
             None => {
                 // Of free tips that which moves most.
                 let tips = found.tips.iter().copied();

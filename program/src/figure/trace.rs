@@ -190,11 +190,11 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
         TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
         TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
         TraceShow::Reaction(axis) => {
-            let force = format!("reaction, {}", TraceShow::Tip(axis));
+            let force = format!("reaction along {}", TraceShow::Tip(axis));
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         TraceShow::Grip { grip, axis } => {
-            let force = format!("on grip {}, {}", grip + 1, TraceShow::Tip(axis));
+            let force = format!("force on grip {} along {}", grip + 1, TraceShow::Tip(axis));
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         tip => {

@@ -49,7 +49,10 @@ fn forces_on_grips_are_columns() {
     let rows = place.table("out/small/trace.csv", &columns);
     let pushed: f64 = rows.last().unwrap()[18].parse().unwrap();
     assert!(pushed < -0.1, "{pushed}");
-    contains(&place.picture("out/small/trace"), &["on grip 1, z"]);
+    contains(
+        &place.picture("out/small/trace"),
+        &["force on grip 1 along z"],
+    );
     let refused = place.run(format!("{run} --show grip_3_x"));
     contains(&refused.ends(2).err, &["there are 2 of [[grip]]"]);
 }
