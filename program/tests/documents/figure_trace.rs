@@ -138,3 +138,16 @@ fn a_force_that_moves_nothing_has_no_law() {
     let svg = figure("scenarios/classic/elastica_buckled.toml --vary load.tip_force[0]=0..-2");
     assert!(groups(&svg, "law").is_empty());
 }
+
+/// Of leaves whose differences are invisible in a small panel one is drawn.
+#[test]
+fn leaves_are_drawn_only_where_they_look_different() {
+    let leaf = "scenarios/paper/fig04.toml --set leaf.rods=3";
+    for (to, count) in [("-1.01", 1), ("-50", 3)] {
+        let svg = figure(&format!("{leaf} --vary load.gravity[2]=-1..{to}"));
+        let [leaves] = groups(&svg, "leaves")[..] else {
+            panic!("one group of leaves")
+        };
+        assert_eq!(leaves.matches(">at ").count(), count, "to {to}");
+    }
+}
