@@ -256,10 +256,11 @@ fn axis(boundary: &Boundary, units: &Units, which: usize) -> Axis {
         false => Axis::holding(&name, values),
         true => {
             let sign = ends[0].signum();
-            let fewest = 0.0;
+            let decades = values.map(|value| (sign * value).log10());
             Axis {
                 sign: Some(sign),
-                ..Axis::logarithmic(&name, values.map(|value| sign * value), fewest)
+                emphasizes_zero: false,
+                ..Axis::holding(&name, decades)
             }
         }
     }
