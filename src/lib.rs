@@ -106,7 +106,7 @@ mod limit;
 pub mod memory;
 mod modes;
 mod motion;
-mod natural;
+pub mod natural;
 mod newton;
 pub mod numbers;
 mod refusal;

@@ -8,6 +8,7 @@ use crate::figure::drawing::{
 use crate::figure::font::Font;
 use crate::figure::layout::{Cell, TEXT_SIZE, TICK_SIZE, title};
 use crate::figure::markers::Marker;
+use crate::figure::smooth::smooth;
 use glam::DVec2;
 
 const TICK: f64 = 4.0;
@@ -131,10 +132,33 @@ impl Axes {
     /// gaps where a point cannot be drawn.
     pub fn curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
         let columns = self.cell.size.x.ceil().max(1.0) as usize;
+        let places = thinned(points, columns).into_iter();
+        let places: Vec<Option<DVec2>> = places.map(|point| self.at(point)).collect();
+        self.line(page, &places, stroke);
+    }
+
+    /// A smooth curve through these points as straight pieces on the page: for every point but the
+    /// last those that lead to the next; none where one of both cannot be drawn.
+    pub fn smooth(&self, points: &[(f64, f64)]) -> Vec<Vec<DVec2>> {
+        let places: Vec<Option<DVec2>> = points.iter().map(|&point| self.at(point)).collect();
+        let mut pieces = Vec::with_capacity(points.len());
+        for run in places.split_inclusive(Option::is_none) {
+            let drawn: Vec<DVec2> = run.iter().flatten().copied().collect();
+            pieces.extend(smooth(&drawn));
+            pieces.resize(pieces.len() + usize::from(!drawn.is_empty()), Vec::new());
+            pieces.resize(pieces.len() + run.len() - drawn.len(), Vec::new());
+        }
+        pieces.truncate(points.len().saturating_sub(1));
+        pieces
+    }
+
+    /// Draws what is inside the frame of a line through these points on the page, with gaps where
+    /// one is missing.
+    pub fn line(&self, page: &mut Drawing, places: &[Option<DVec2>], stroke: Stroke) {
         let mut path: Path = Vec::new();
         let mut pen = None;
-        for pair in thinned(points, columns).windows(2) {
-            let inside = self.at(pair[0]).zip(self.at(pair[1]));
+        for pair in places.windows(2) {
+            let inside = pair[0].zip(pair[1]);
             let Some((from, to)) = inside.and_then(|(from, to)| self.clipped(from, to)) else {
                 continue;
             };
@@ -237,6 +261,22 @@ mod tests {
         let heights = [0.5, f64::INFINITY, 1e300, -1e280];
         let extreme = [0, 1, 2, 3].map(|i| (0.1 * i as f64, heights[i]));
         assert!(!curve(&extreme).contains("<path"));
+    }
+
+    #[test]
+    fn smooth_curves_have_gaps_at_invalid_points() {
+        let axes = Axes {
+            cell: Cell::new(DVec2::ZERO, DVec2::splat(100.0)),
+            across: Axis::linear("x", 0.0, 1.0),
+            up: Axis::linear("y", 0.0, 1.0),
+        };
+        let x = [0.0, 0.1, f64::NAN, 0.3, f64::NAN, 0.5, 0.6, 0.8];
+        let points = x.map(|x| (x, x));
+        let drawn = axes.smooth(&points);
+        let there: Vec<bool> = drawn.iter().map(|piece| !piece.is_empty()).collect();
+        assert_eq!(there, [true, false, false, false, false, true, true]);
+        assert_eq!(drawn[5].first(), axes.at(points[5]).as_ref());
+        assert!(axes.smooth(&points[..1]).is_empty());
     }
 
     #[test]

@@ -155,7 +155,7 @@ impl Axis {
     }
 
     /// The power of ten that is the unit of the tick labels.
-    fn power(&self) -> i32 {
+    pub fn power(&self) -> i32 {
         let size = self.start.abs().max(self.end.abs()).log10();
         match (self.sign, &self.ticks) {
             (None, Ticks::Round) if !PLAIN.contains(&size) => 3 * (size / 3.0).floor() as i32,

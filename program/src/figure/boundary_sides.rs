@@ -23,17 +23,14 @@ const ACROSS: f64 = 0.15;
 
 /// Labels both sides of every curve where the clearance is largest; curves close to each other
 /// only on the outside. A curve without enough clearance anywhere is described by the key alone.
-pub fn write_indices(page: &mut Drawing, axes: &Axes, boundary: &Boundary, labels: &mut Labels) {
-    let curves: Vec<Line> = (boundary.curves.iter())
-        .map(|curve| Line::of(axes, boundary, curve))
-        .collect();
+pub fn write_indices(page: &mut Drawing, curves: &[Line], labels: &mut Labels) {
     let mut named = vec![false; curves.len()];
     for c in 0..curves.len() {
         if named[c] {
             continue;
         }
         let places = curves[c].places().into_iter();
-        let best = clearest(places.map(|place| Sides::of(&curves, c, place)), |sides| {
+        let best = clearest(places.map(|place| Sides::of(curves, c, place)), |sides| {
             let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
             room.fold(f64::INFINITY, f64::min)
         });
@@ -50,38 +47,87 @@ pub fn write_indices(page: &mut Drawing, axes: &Axes, boundary: &Boundary, label
 type Place = (DVec2, DVec2, [usize; 2]);
 
 /// A curve on the page.
-struct Line {
+pub struct Line {
     /// Segments: their ends, and the indices to the left and to the right.
     pieces: Vec<([DVec2; 2], [usize; 2])>,
     /// Whether two branches meet and vanish there, so that it has no sides.
     fold: bool,
+    /// Of a fold, to which side there is a stable leaf, if that is known.
+    stable: Option<[bool; 2]>,
 }
 
 impl Line {
-    fn of(axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) -> Self {
-        let place = |values: [f64; 2]| axes.at((values[0], values[1]));
+    /// A line of these segments, along which branches cross, or where two meet.
+    pub fn new(pieces: Vec<([DVec2; 2], [usize; 2])>, fold: bool) -> Self {
+        Line {
+            pieces,
+            fold,
+            stable: None,
+        }
+    }
+
+    pub fn of(axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) -> Self {
         // Along the axis the first number may move towards the end of its range, or away.
         let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
-        let pieces = curve.points.windows(2).filter_map(|pair| {
-            let ends = [place(pair[0].values)?, place(pair[1].values)?];
-            // Where curves cross, the index counts other modes as well.
-            let point = match is_special(&pair[1]) {
-                true => &pair[0],
-                false => &pair[1],
-            };
-            let (before, after) = (point.index_before, point.index_behind);
-            let sides = match from < to {
-                true => [before, after],
-                false => [after, before],
-            };
-            Some((ends, sides))
-        });
+        let points = curve.points.iter();
+        let points: Vec<(f64, f64)> = points.map(|it| (it.values[0], it.values[1])).collect();
+        let drawn = axes.smooth(&points).into_iter();
+        let pieces = curve
+            .points
+            .windows(2)
+            .zip(drawn)
+            .flat_map(|(pair, drawn)| {
+                // Where curves cross, the index counts other modes as well.
+                let point = match is_special(&pair[1]) {
+                    true => &pair[0],
+                    false => &pair[1],
+                };
+                let (before, after) = (point.index_before, point.index_behind);
+                let sides = match from < to {
+                    true => [before, after],
+                    false => [after, before],
+                };
+                let ends = drawn.windows(2).map(|ends| ([ends[0], ends[1]], sides));
+                ends.collect::<Vec<_>>()
+            });
         let first = curve.points.first();
+        let fold = curve.multiplicity == 1
+            && first.is_some_and(|point| matches!(point.kind, "fold" | "cusp"));
+        let line = Line::new(pieces.collect(), fold);
+        let mut stable = curve.beside.iter();
+        let stable = stable.find(|leaf| leaf.index == 0 && leaf.fallen_from.is_none());
+        let stable = stable.and_then(|leaf| axes.at((leaf.values[0], leaf.values[1])));
+        let to_left = stable.and_then(|at| Some(line.crossings(at, DVec2::X).next()?.0 > 0.0));
         Line {
-            pieces: pieces.collect(),
-            fold: curve.multiplicity == 1
-                && first.is_some_and(|point| matches!(point.kind, "fold" | "cusp")),
+            stable: to_left.map(|left| [left, !left]),
+            ..line
         }
+    }
+
+    /// Its segments.
+    pub fn segments(&self) -> impl Iterator<Item = [DVec2; 2]> {
+        self.pieces.iter().map(|(ends, _)| *ends)
+    }
+
+    /// Whether ground on one of its sides is stable.
+    pub fn bounds_stable(&self) -> bool {
+        self.pieces.iter().any(|(_, sides)| sides.contains(&0))
+    }
+
+    /// Its crossings with a line: how far along the line, and whether the ground on both sides is
+    /// stable, unless that is not known.
+    pub fn stable_beside(
+        &self,
+        at: DVec2,
+        normal: DVec2,
+    ) -> impl Iterator<Item = (f64, Option<[bool; 2]>)> {
+        self.crossings(at, normal).map(|(along, sides)| {
+            let stable = match self.fold {
+                true => self.stable.filter(|_| sides.contains(&0)),
+                false => Some(sides.map(|index| index == 0)),
+            };
+            (along, stable)
+        })
     }
 
     /// Places on it, from the middle outwards.

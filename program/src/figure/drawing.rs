@@ -29,7 +29,7 @@ pub enum Mark {
 pub struct Stroke {
     pub color: Color,
     pub width: f64,
-    pub dashed: bool,
+    pub dash: Dash,
 }
 
 impl Stroke {
@@ -37,17 +37,38 @@ impl Stroke {
         Stroke {
             color,
             width,
-            dashed: false,
+            dash: Dash::Solid,
         }
     }
 
     pub fn dashed(self, dashed: bool) -> Self {
-        Stroke { dashed, ..self }
+        let dash = if dashed { Dash::Dashed } else { Dash::Solid };
+        Stroke { dash, ..self }
     }
 }
 
-/// Lengths of the dashes of dashed lines and of the gaps between them.
-pub const DASHES: [f64; 2] = [5.0, 4.0];
+/// How a line is interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dash {
+    Solid,
+    Dashed,
+    Dotted,
+    Alternating,
+}
+
+impl Dash {
+    pub const ALL: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::Alternating];
+
+    /// Lengths of dashes and of the gaps between them, in turn; none of a solid line.
+    pub fn lengths(self) -> &'static [f64] {
+        match self {
+            Dash::Solid => &[],
+            Dash::Dashed => &[5.0, 4.0],
+            Dash::Dotted => &[0.1, 4.0],
+            Dash::Alternating => &[8.0, 4.0, 0.1, 4.0],
+        }
+    }
+}
 
 #[derive(Clone, Copy)]
 pub enum Step {

@@ -1,30 +1,34 @@
-//! A leaf at rest, all equilibria of a leaf, and how far its tip moves when a number changes.
+//! A leaf at rest, and all equilibria of a leaf.
 
 use super::panels::Panels;
-use crate::figure::axes::Axes;
-use crate::figure::axis::{Axis, Ticks};
-use crate::figure::drawing::{Anchor, BLUE, Drawing, INK, rectangle};
-use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
+use super::rod;
+use crate::figure::drawing::Drawing;
+use crate::figure::layout::{HEADER, LEFT};
 use crate::figure::page::new_page;
 use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels};
 use crate::figure::veins::Veins;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, stable_or_index, verdict};
-use glam::DVec2;
-use leafdyn::relax::{Equilibrium, Sensitivity};
+use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::Equilibria;
 
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let veins = Veins::of(leaf, scenario);
-    let panels = Panels::below(HEADER, &veins);
     let notes = notes(leaf, &veins, &setting);
-    let mut drawing = new_page(LEFT, &leaf.scenario, &notes, Some(&veins));
+    let mut drawing = match veins.count {
+        1 => rod::draw(leaf, scenario, &veins, &setting, &notes),
+        _ => {
+            let panels = Panels::below(HEADER, &veins);
+            let mut drawing = new_page(LEFT, &leaf.scenario, &notes, Some(&veins));
+            drawing.height = panels.end().ceil();
+            panels.draw(&mut drawing, &veins, &setting);
+            drawing
+        }
+    };
     drawing.description = format!("{}: {}", leaf.scenario, verdict(leaf));
-    drawing.height = panels.end().ceil();
-    panels.draw(&mut drawing, &veins, &setting);
     drawing
 }
 
@@ -74,63 +78,4 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
         });
     }
     drawing
-}
-
-/// Room left of the panel, for the keys.
-const NAMES: f64 = 190.0;
-const ROW: f64 = 22.0;
-const BAR: f64 = 12.0;
-const BOTTOM: f64 = 4.0;
-const MOST_ROWS: usize = 40;
-const FEWEST_DECADES: f64 = 2.0;
-
-/// How far the tip of a leaf moves when a number changes by 1 %, largest first.
-pub fn draw_sensitivity(leaf: &Equilibrium) -> Drawing {
-    let found = leaf.sensitivities.as_deref().unwrap_or_default();
-    let length = leaf.shape.longest();
-    let change = |found: &Sensitivity| {
-        let by = match found.value {
-            0.0 => 1.0,
-            value => 0.01 * value,
-        };
-        let moved = found.tips.iter().map(|tip| (*tip * by).length());
-        moved.fold(0.0, f64::max) / length
-    };
-    let rows = found.iter().map(|it| (it.key.as_str(), change(it)));
-    let mut rows: Vec<(&str, f64)> = rows.collect();
-    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rows.truncate(MOST_ROWS);
-    let height = ROW * rows.len().max(1) as f64;
-    let name = format!("{}: what each number does to the tip", leaf.scenario);
-    let notes = ["a number that is zero: one of its units".to_string()];
-    let mut page = new_page(LEFT, &name, &notes, None);
-    page.height = HEADER + PANEL_TITLE + height + PANEL_AXIS + BOTTOM;
-    let cell = Cell::new(
-        DVec2::new(LEFT + NAMES, HEADER + PANEL_TITLE),
-        DVec2::new(WIDTH - LEFT - RIGHT - NAMES, height),
-    );
-    let values = rows.iter().map(|row| row.1);
-    let name = "displacement of the tip by 1 %, in L";
-    let across = Axis::logarithmic(name, values, FEWEST_DECADES);
-    let up = Axis {
-        ticks: Ticks::At(Vec::new()),
-        labelled: false,
-        ..Axis::linear("", 0.0, 1.0)
-    };
-    page.group("changes", |page| {
-        let what = "by a hundredth of each number";
-        let axes = Axes::titled(page, cell, ["", what], across, up);
-        for (k, (key, value)) in rows.iter().enumerate() {
-            let middle = cell.corner.y + ROW * (k as f64 + 0.5);
-            let at = DVec2::new(cell.corner.x - 8.0, middle);
-            page.centered_label(at, key, TICK_SIZE, Anchor::End, INK);
-            let fraction = axes.across.fraction(*value);
-            if fraction.is_finite() && fraction > 0.0 {
-                let corner = DVec2::new(cell.corner.x, middle - 0.5 * BAR);
-                let size = DVec2::new(fraction.min(1.0) * cell.size.x, BAR);
-                page.shape(rectangle(corner, size), BLUE, None);
-            }
-        }
-    });
-    page
 }

@@ -62,9 +62,40 @@ pub fn tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
-/// Draws the markers of a leaf: points of a second solution, moments, grips, the clamps and all tips,
-/// small if there are many.
+/// Marks what is held of a vein's end.
+pub fn hold_marker(page: &mut Drawing, at: DVec2, held: Hold) {
+    match held {
+        Hold::Clamped => clamp_marker(page, at),
+        Hold::Pinned => Marker::Triangle.draw(page, at, INK),
+    }
+}
+
+/// Draws the markers of a leaf: those along its veins, and of its bases and tips.
 pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
+    vein_markers(page, veins, &place);
+    let mut bases: Vec<DVec3> = Vec::new();
+    for base in veins.bases() {
+        if !bases.contains(&base) {
+            hold_marker(page, place(base), veins.base_held);
+            bases.push(base);
+        }
+    }
+    if let [(tip, _)] = veins.tips.as_slice() {
+        return match veins.tip_held {
+            Some(held) => hold_marker(page, place(*tip), held),
+            None => tip_marker(page, place(*tip)),
+        };
+    }
+    // Many are small.
+    let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
+    for (tip, color) in &veins.tips {
+        let rim = Stroke::new(*color, 0.5 * radius);
+        page.shape(circle(place(*tip), radius), WHITE, Some(rim));
+    }
+}
+
+/// Draws the markers along veins: points of a second solution, moments and grips.
+pub fn vein_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
         dot(page, place(point), radius);
@@ -74,21 +105,6 @@ pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> 
     }
     for grip in &veins.grips {
         grip_markers(page, grip, veins.line_width(), &place);
-    }
-    let mut bases: Vec<DVec3> = Vec::new();
-    for base in veins.bases() {
-        if !bases.contains(&base) {
-            clamp_marker(page, place(base));
-            bases.push(base);
-        }
-    }
-    if let [(tip, _)] = veins.tips.as_slice() {
-        return tip_marker(page, place(*tip));
-    }
-    let radius = if veins.tips.len() > 30 { 1.5 } else { 2.4 };
-    for (tip, color) in &veins.tips {
-        let rim = Stroke::new(*color, 0.5 * radius);
-        page.shape(circle(place(*tip), radius), WHITE, Some(rim));
     }
 }
 

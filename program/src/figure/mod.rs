@@ -17,7 +17,11 @@ mod energy;
 mod film;
 mod filmstrip;
 mod fit;
+mod fit_numbers;
+mod fit_panels;
+mod fit_series;
 mod font;
+mod forces;
 mod labels;
 mod layout;
 mod leaf;
@@ -28,10 +32,15 @@ mod moments;
 mod page;
 mod panels;
 pub mod png;
+mod quantity;
+mod rod;
 mod round;
+mod sensitivity;
 pub mod setting;
 mod small;
+mod smooth;
 mod space;
+mod stable_ground;
 pub mod svg;
 mod trace;
 pub mod veins;
@@ -43,9 +52,10 @@ pub use energy::draw as energy;
 pub use film::write as film;
 pub use filmstrip::draw as filmstrip;
 pub use fit::draw as fit;
-pub use leaf::{draw as leaf, draw_equilibria as equilibria, draw_sensitivity as sensitivity};
+pub use leaf::{draw as leaf, draw_equilibria as equilibria};
 pub use map::draw as map;
 pub use modes::draw as modes;
+pub use sensitivity::draw as sensitivity;
 pub use trace::draw as trace;
 
 pub use drawing::Drawing;
@@ -239,11 +249,11 @@ mod tests {
             mass: 0.0,
         }];
         let pictures = record.stills.len();
-        // An arc and its head in every panel.
-        assert_eq!(drawn(&turned), [rest + 8, moving + 2 * pictures]);
+        // An arc and its head in every panel, and one view at rest.
+        assert_eq!(drawn(&turned), [rest + 2, moving + 2 * pictures]);
         turned.points.clear();
         turned.tip_moment = [0.0, 0.0, 0.5];
-        assert_eq!(drawn(&turned), [rest + 8, moving]);
+        assert_eq!(drawn(&turned), [rest + 2, moving]);
     }
 
     #[test]

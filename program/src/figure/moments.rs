@@ -18,6 +18,7 @@ pub struct Moment {
     pub at: DVec3,
     /// Of length one.
     pub axis: DVec3,
+    pub size: f64,
 }
 
 /// The moments on a leaf, that on its tip among them; `at` gives the point at a fraction of the rod.
@@ -30,8 +31,10 @@ pub fn moments(
     let all = points.map(|point| (point.at, point.moment));
     let all = all.chain([(1.0, on_tip)]);
     all.filter_map(|(sigma, moment)| {
+        let moment = DVec3::from_array(moment);
         Some(Moment {
-            axis: DVec3::from_array(moment).try_normalize()?,
+            axis: moment.try_normalize()?,
+            size: moment.length(),
             at: at(sigma)?,
         })
     })

@@ -5,7 +5,7 @@ use crate::figure::drawing::{
 };
 use crate::figure::font::Font;
 use crate::figure::layout::{Cell, RIGHT, TEXT_SIZE, TICK_SIZE, TITLE_SIZE, WIDTH};
-use crate::figure::markers::{Marker, clamp_marker, tip_marker};
+use crate::figure::markers::{Marker, hold_marker, tip_marker};
 use crate::figure::veins::Veins;
 use glam::DVec2;
 use leafdyn::scenario::Hold;
@@ -65,18 +65,26 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
         text_before(page, &mut x, "vein 1");
         x -= 16.0;
     }
+    let held = |how: Hold| {
+        let mut grips = veins.grips.iter();
+        let ends = veins.base_held == how || veins.tip_held == Some(how);
+        ends || grips.any(|grip| grip.held == how)
+    };
     let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
-    text_before(page, &mut x, tips);
-    tip_marker(page, DVec2::new(x - 3.0, MIDDLE));
-    x -= 26.0;
-    text_before(page, &mut x, "clamp");
-    clamp_marker(page, DVec2::new(x - 3.0, MIDDLE));
-    if veins.grips.iter().any(|grip| grip.held == Hold::Pinned) {
+    let mut entry = |page: &mut Drawing, name: &str, marker: &dyn Fn(&mut Drawing, DVec2)| {
+        text_before(page, &mut x, name);
+        marker(page, DVec2::new(x - 3.0, MIDDLE));
         x -= 26.0;
-        text_before(page, &mut x, "pinned");
-        Marker::Triangle.draw(page, DVec2::new(x - 3.0, MIDDLE), INK);
+    };
+    if veins.tip_held.is_none() {
+        entry(page, tips, &tip_marker);
     }
-    x - 10.0
+    for (how, name) in [(Hold::Clamped, "clamp"), (Hold::Pinned, "pinned")] {
+        if held(how) {
+            entry(page, name, &|page, at| hold_marker(page, at, how));
+        }
+    }
+    x + 16.0
 }
 
 /// Between a sample and its name.
@@ -89,7 +97,7 @@ const ROW: f64 = 20.0;
 const SAMPLE_HEIGHT: f64 = 12.0;
 
 /// Most of many curves that a key names.
-const MOST_NAMED: usize = 7;
+pub const MOST_NAMED: usize = 7;
 
 /// The key of a panel: a column of samples with their names.
 pub struct Key {

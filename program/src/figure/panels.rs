@@ -43,17 +43,16 @@ const MARGINS: Margins = Margins {
     below: 36.0,
 };
 
-/// Draws the projection of the leaf onto two axes, centred, with `scale` pixels per
-/// length.
-fn draw_flat(
+/// Draws a panel of two axes with `scale` pixels per length and this point in its middle; returns how
+/// it shows points.
+pub fn flat(
     page: &mut Drawing,
-    veins: &Veins,
+    middle: DVec3,
     setting: &Setting,
     cell: Cell,
     scale: f64,
     [across, up]: [usize; 2],
-) {
-    let middle = 0.5 * (veins.low + veins.high);
+) -> Camera {
     let camera = Camera::new(DVec3::AXES[across], DVec3::AXES[up]);
     let camera = camera.placed(scale, middle, cell.middle());
     let shown = setting.scale();
@@ -71,6 +70,20 @@ fn draw_flat(
         up: axis(up, cell.size.y),
     };
     axes.draw(page);
+    camera
+}
+
+/// Draws the projection of the leaf onto two axes, centred.
+fn draw_flat(
+    page: &mut Drawing,
+    veins: &Veins,
+    setting: &Setting,
+    cell: Cell,
+    scale: f64,
+    axes: [usize; 2],
+) {
+    let middle = 0.5 * (veins.low + veins.high);
+    let camera = flat(page, middle, setting, cell, scale, axes);
     let place = |point: DVec3| camera.place(point);
     // Veins farther from the viewer first.
     let nearness = |vein: &Vein| {

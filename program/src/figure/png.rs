@@ -10,7 +10,7 @@ use tiny_skia::{
     Transform,
 };
 
-use super::drawing::{Anchor, Color, DASHES, Drawing, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, Color, Drawing, Mark, Path, Step, Stroke};
 use super::font::Font;
 
 const SCALE: f64 = 2.0;
@@ -136,12 +136,13 @@ fn ink(Color(red, green, blue): Color) -> Paint<'static> {
 }
 
 fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, transform: Transform) {
-    let dash = stroke.dashed.then(|| DASHES.map(|length| length as f32));
+    let dash = stroke.dash.lengths().iter().map(|&length| length as f32);
     let pen = Pen {
         width: stroke.width as f32,
         line_cap: LineCap::Round,
         line_join: LineJoin::Round,
-        dash: dash.and_then(|dash| StrokeDash::new(dash.to_vec(), 0.0)),
+        // None of no lengths.
+        dash: StrokeDash::new(dash.collect(), 0.0),
         ..Pen::default()
     };
     canvas.stroke_path(path, &ink(stroke.color), &pen, transform, None);

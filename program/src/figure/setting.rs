@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::report::numbers::short;
 use leafdyn::scenario::{Scenario, Schedule, Units};
 
 /// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
@@ -84,9 +85,15 @@ impl Setting {
     /// The length of the longest rod, as text.
     pub fn length(&self) -> String {
         match &self.units.length {
-            Some(unit) => format!("{} {unit}", self.length),
-            None => self.length.to_string(),
+            Some(unit) => format!("{} {unit}", short(self.length)),
+            None => short(self.length),
         }
+    }
+
+    /// A moment of this size, as text.
+    pub fn moment(&self, size: f64) -> String {
+        let unit = self.units.energy();
+        short(size) + &unit.map_or(String::new(), |unit| format!(" {unit}"))
     }
 
     /// The unit of the values shown.
@@ -113,6 +120,7 @@ fn weight(scenario: &Scenario) -> DVec3 {
 /// A name with its unit, if that is known.
 pub fn with_unit(name: &str, unit: Option<&str>) -> String {
     match unit {
+        Some(unit) if unit.contains('/') => format!("{name} / ({unit})"),
         Some(unit) => format!("{name} / {unit}"),
         None => name.into(),
     }

@@ -44,6 +44,12 @@ const TICK_DISTANCE: f64 = 30.0;
 /// Least distance of a name from the right edge of the page.
 const PAGE_EDGE: f64 = 6.0;
 
+/// Least distance of the name of an axis from its edge, besides half of its widest label.
+const BEYOND_LABELS: f64 = 25.0;
+
+/// From the middle of an edge to the name of its axis in a small panel.
+const NEAR_NAME: f64 = 14.0;
+
 /// From the top of a vertical edge to its name.
 const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
@@ -275,6 +281,14 @@ impl<'s> Scene<'s> {
     /// are shown.
     pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for (edge, middle) in self.edges.iter().zip(self.middles()) {
+            let widths = edge.ticks.iter();
+            let widths = widths.map(|(_, text)| Font::embedded().width(text, TICK_SIZE));
+            let beyond = BEYOND_LABELS + 0.5 * widths.fold(0.0, f64::max);
+            let distance = if values {
+                distance.max(beyond)
+            } else {
+                distance
+            };
             let at = middle + label_offset(edge.out, distance);
             let name = self.setting.brief_axis(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
@@ -294,18 +308,25 @@ impl<'s> Scene<'s> {
     /// is not the first what may differ from it.
     pub fn draw_arrows(&self, page: &mut Drawing, first: bool, time: f64) {
         let taken = corners([self.low, self.high]).map(|corner| self.place(corner));
-        let taken = taken.chain(self.middles());
+        let names = self.edges.iter().zip(self.middles());
+        let names = names.flat_map(|(edge, middle)| [middle, middle + NEAR_NAME * edge.out]);
+        let taken = taken.chain(names);
         let arrows = self.setting.arrows(first, time);
         self.camera.draw_arrows(page, &arrows, self.cell, taken);
+    }
+
+    /// Draws the shadows of all veins on the floor.
+    pub fn draw_shadows(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+        for vein in &veins.veins {
+            let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
+            page.stroke(shadow, Stroke::new(SHADOW, width));
+        }
     }
 
     /// Draws the shadows of all veins on the floor, the pieces of the veins, those
     /// farther away first, and the leaf's markers.
     pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
-        for vein in &veins.veins {
-            let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
-            page.stroke(shadow, Stroke::new(SHADOW, width));
-        }
+        self.draw_shadows(page, veins, width);
         let depth = |piece: &Piece| self.camera.toward.dot(piece[0] + piece[3]);
         let mut pieces: Vec<(f64, &Piece, &Vein)> = Vec::new();
         for vein in &veins.veins {

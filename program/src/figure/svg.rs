@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use glam::DVec2;
 
-use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Step};
+use super::drawing::{Anchor, Color, Drawing, Label, Mark, Step};
 
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let Drawing { width, height, .. } = drawing;
@@ -43,9 +43,10 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
                 if let Some(stroke) = stroke {
                     let color = hex(stroke.color);
                     write!(out, " stroke=\"{color}\" stroke-width=\"{}\"", stroke.width)?;
-                    if stroke.dashed {
-                        let [dash, gap] = DASHES;
-                        write!(out, " stroke-dasharray=\"{dash} {gap}\"")?;
+                    let dash: Vec<String> =
+                        (stroke.dash.lengths().iter().map(f64::to_string)).collect();
+                    if !dash.is_empty() {
+                        write!(out, " stroke-dasharray=\"{}\"", dash.join(" "))?;
                     }
                 }
                 writeln!(out, "/>")?;

@@ -8,13 +8,14 @@ use crate::figure::labels::Labels;
 use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, letters};
 use crate::figure::markers::Marker;
 use crate::figure::page::{Key, new_page};
+use crate::figure::quantity::Quantity;
 use crate::figure::setting::{Setting, with_unit};
 use crate::figure::small::SmallPanels;
 use crate::figure::veins::{Veins, longest};
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
@@ -27,10 +28,8 @@ const LAW: f64 = 240.0;
 const BETWEEN: f64 = 26.0;
 /// Most leaves drawn.
 const MOST_LEAVES: usize = 8;
-/// Smaller differences are invisible in small panels: in lengths, and as a fraction of
-/// the largest.
+/// Smaller differences are invisible in small panels, in lengths.
 const VISIBLE: f64 = 0.04;
-const VISIBLE_FRACTION: f64 = 0.25;
 /// Equal parts of each vein at whose ends leaves are compared.
 const PARTS: usize = 8;
 /// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
@@ -42,13 +41,14 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
     let longest = longest(shown.iter().map(point).flat_map(|point| &point.curves));
     let shapes: Vec<Veins> = (shown.iter().map(point))
-        .map(|point| Veins::through(&point.curves, &point.tips, longest))
+        .map(|point| Veins::through(&point.curves, &point.tips, longest).held_as(scenario))
         .collect();
+    let varied = Quantity::of(&trace.keys.to_string(), &trace.units);
     let quantities = match trace.show.as_slice() {
         [] => vec![most_varying(trace)],
         asked => asked.to_vec(),
     };
-    let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
+    let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
     let mut drawing = new_page(LEFT, &name, &notes(trace), None);
     let mut letters = letters();
     let mut letter = || letters.next().unwrap_or_default();
@@ -57,7 +57,8 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         let height = if place == 0 { DIAGRAM } else { MORE };
         let cell = Cell::left_of_key(below + PANEL_TITLE, height, KEY);
         drawing.group("branches", |page| {
-            draw_branches(page, trace, quantity, &shown, cell, &letter());
+            let axis = across(trace, &varied);
+            draw_branches(page, trace, (axis, quantity), &shown, cell, &letter());
             if place == 0 {
                 draw_key(page, trace, cell);
             }
@@ -75,7 +76,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let caption = format!("at {}", caption(point(at)));
+            let caption = caption(point(at), varied.unit.as_deref());
             panels.draw(page, index, veins, [&(index + 1).to_string(), &caption]);
         }
     });
@@ -118,14 +119,9 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     }
     wanted.sort_by_key(|&(rank, _)| rank);
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
-    let first = wanted.first().map(|&(_, at)| at);
-    let distance = |at: [usize; 2]| first.map_or(0.0, |first| difference(point(at), point(first)));
-    let farthest = wanted.iter().map(|&(_, at)| distance(at));
-    let farthest = farthest.fold(0.0, f64::max);
-    let visible = VISIBLE.min(VISIBLE_FRACTION * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| difference(point(at), point(other)) <= visible;
+        let alike = |&other: &[usize; 2]| difference(point(at), point(other)) <= VISIBLE;
         if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
             shown.push(at);
         }
@@ -147,12 +143,21 @@ fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
     distances.fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
 }
 
-fn caption(point: &TracePoint) -> String {
+fn caption(point: &TracePoint, unit: Option<&str>) -> String {
     let kind = match point.kind {
         PointKind::Regular => stable_or_index(point.index),
         kind => kind.word().replace('-', " "),
     };
-    format!("{}, {kind}", short(point.value))
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    format!("at {}{unit}, {kind}", short(point.value))
+}
+
+/// The axis of the number that varies, whose values increase along it: logarithmic if they are
+/// spaced logarithmically.
+fn across(trace: &Trace, varied: &Quantity) -> Axis {
+    let values = trace.branches.iter().flat_map(|branch| &branch.points);
+    let sign = trace.log.then(|| trace.range[0].signum());
+    Axis::covering(&varied.axis(), values.map(|point| point.value), sign)
 }
 
 /// The coordinate of the tip that varies most; of a leaf that is held the component of a reaction
@@ -185,11 +190,11 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
         TraceShow::Energy => (with_unit("energy", units.energy().as_deref()), 0.0),
         TraceShow::Twist => (with_unit("mean twist", Some("rad")), ROUNDING),
         TraceShow::Reaction(axis) => {
-            let force = format!("reaction, {}", TraceShow::Tip(axis));
+            let force = format!("reaction along {}", TraceShow::Tip(axis));
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         TraceShow::Grip { grip, axis } => {
-            let force = format!("on grip {}, {}", grip + 1, TraceShow::Tip(axis));
+            let force = format!("force on grip {} along {}", grip + 1, TraceShow::Tip(axis));
             (with_unit(&force, units.force.as_deref()), 0.0)
         }
         tip => {
@@ -208,22 +213,13 @@ fn tip(point: &TracePoint, axis: usize) -> f64 {
 fn draw_branches(
     page: &mut Drawing,
     trace: &Trace,
-    quantity: TraceShow,
+    (across, quantity): (Axis, TraceShow),
     shown: &[[usize; 2]],
     cell: Cell,
     letter: &str,
 ) {
     let at = |point: &TracePoint| (point.value, point.shown(quantity));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
-    let across = match trace.keys.to_string() {
-        force if force.starts_with("load.tip_force") => {
-            with_unit(&force, trace.units.force.as_deref())
-        }
-        other => other,
-    };
-    // Logarithmic if the values are spaced logarithmically; they increase along the axis.
-    let sign = trace.log.then(|| trace.range[0].signum());
-    let across = Axis::covering(&across, all().map(|point| at(point).0), sign);
     // The title names only the kinds that occur.
     let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
     let what = match indices {
@@ -235,13 +231,26 @@ fn draw_branches(
     let mut labels = Labels::within(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
         let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
-        for (points, stable) in pieces(origin, branch) {
-            let line: Vec<(f64, f64)> = points.into_iter().map(at).collect();
+        let points: Vec<&TracePoint> = origin.into_iter().chain(&branch.points).collect();
+        let line: Vec<(f64, f64)> = points.iter().map(|point| at(point)).collect();
+        let drawn = axes.smooth(&line);
+        let mut begun = 0;
+        for (count, stable) in pieces(&points, origin.is_some()) {
             let width = if stable { 2.0 } else { 1.2 };
             let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
-            axes.curve(page, &line, stroke);
-            labels.avoid(&axes, &line);
+            let piece: Vec<Option<DVec2>> = (drawn[begun..begun + count].iter())
+                .flat_map(|run| {
+                    if run.is_empty() {
+                        vec![None]
+                    } else {
+                        run.iter().copied().map(Some).collect()
+                    }
+                })
+                .collect();
+            axes.line(page, &piece, stroke);
+            begun += count;
         }
+        labels.avoid(&axes, &line);
     }
     for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
         let critical = trace.branches.iter().flat_map(TraceBranch::critical);
@@ -277,22 +286,18 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     }
 }
 
-/// The points of a branch, after the one where it leaves another branch, split into pieces
-/// of equal stability; a piece begins where the one before it ends.
-fn pieces<'t>(
-    origin: Option<&'t TracePoint>,
-    branch: &'t TraceBranch,
-) -> Vec<(Vec<&'t TracePoint>, bool)> {
-    let mut pieces: Vec<(Vec<&TracePoint>, bool)> = Vec::new();
-    if let (Some(origin), Some(first)) = (origin, branch.points.first()) {
-        pieces.push((vec![origin, first], first.index == 0));
-    }
-    for pair in branch.points.windows(2) {
-        // The index of a critical point is the one after it.
-        let stable = pair[0].index == 0;
+/// How many segments of a branch between these points are equally stable, one after the other, and
+/// whether they are stable. With an `origin` the first of the points is that where it leaves another
+/// branch.
+fn pieces(points: &[&TracePoint], origin: bool) -> Vec<(usize, bool)> {
+    let mut pieces: Vec<(usize, bool)> = Vec::new();
+    for (k, pair) in points.windows(2).enumerate() {
+        // The index of a critical point is the one after it, but that of the other branch.
+        let of = if origin && k == 0 { pair[1] } else { pair[0] };
+        let stable = of.index == 0;
         match pieces.last_mut() {
-            Some((points, same)) if *same == stable => points.push(&pair[1]),
-            _ => pieces.push((vec![&pair[0], &pair[1]], stable)),
+            Some((count, same)) if *same == stable => *count += 1,
+            _ => pieces.push((1, stable)),
         }
     }
     pieces

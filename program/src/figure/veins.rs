@@ -51,6 +51,9 @@ pub struct Veins {
     pub count: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
+    /// How the bases are held, and the tips if they are.
+    pub base_held: Hold,
+    pub tip_held: Option<Hold>,
     pub grips: Vec<Gripped>,
     pub moments: Vec<Moment>,
     /// Corners of the bounding box.
@@ -65,7 +68,9 @@ impl Veins {
         let shape = &equilibrium.shape;
         let veins = Veins::through(&shape.curves, &equilibrium.tips, shape.longest());
         let nodes = (&shape.curve_stations[..], &shape.curves[..]);
-        veins.loaded(scenario, scenario.tip_moment, nodes)
+        veins
+            .held_as(scenario)
+            .loaded(scenario, scenario.tip_moment, nodes)
     }
 
     /// Where the veins that are drawn begin.
@@ -80,7 +85,9 @@ impl Veins {
         let veins = Veins::through(&still.curves, &tips, record.length);
         let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
         let on_tip = scenario.dynamics.tip_moment.at(time);
-        veins.loaded(scenario, on_tip, (&record.stations, &still.curves))
+        veins
+            .held_as(scenario)
+            .loaded(scenario, on_tip, (&record.stations, &still.curves))
     }
 
     /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
@@ -105,6 +112,20 @@ impl Veins {
             });
         }
         self
+    }
+
+    /// With bases and tips that are held as in a scenario.
+    pub fn held_as(self, scenario: &Scenario) -> Self {
+        let tip = scenario.held_tip.as_ref();
+        let tip_held = tip.map(|tip| match tip.clamps {
+            Some(_) => Hold::Clamped,
+            None => Hold::Pinned,
+        });
+        Veins {
+            base_held: scenario.base_held,
+            tip_held,
+            ..self
+        }
     }
 
     /// Veins through these points, with the longest rod as the unit. Tips are extrapolated,
@@ -137,6 +158,8 @@ impl Veins {
             count,
             dots: Vec::new(),
             tips,
+            base_held: Hold::Clamped,
+            tip_held: None,
             grips: Vec::new(),
             moments: Vec::new(),
             low,
@@ -172,8 +195,10 @@ impl Veins {
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
         }
-        if !self.moments.is_empty() {
-            notes.push("curved arrows: moments".into());
+        match self.moments.as_slice() {
+            [] => (),
+            [one] => notes.push(format!("curved arrow: moment {}", setting.moment(one.size))),
+            _ => notes.push("curved arrows: moments".into()),
         }
         notes
     }

@@ -47,9 +47,7 @@ impl Written for Equilibrium {
         Format::Table("modes.csv", report::modes_table),
         Format::Figure(["modes.svg", "modes.png"], figure::modes),
         Format::Table("sensitivity.csv", report::sensitivity_table),
-        Format::Figure(["sensitivity.svg", "sensitivity.png"], |it, _| {
-            figure::sensitivity(it)
-        }),
+        Format::Figure(["sensitivity.svg", "sensitivity.png"], figure::sensitivity),
     ];
 
     fn has_more(&self, file: &str) -> bool {

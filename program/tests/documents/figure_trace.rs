@@ -43,6 +43,7 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
     let svg = figure(&format!("{PITCHFORK} --show x,energy,twist"));
     let panels = groups(&svg, "branches");
     assert_eq!(panels.len(), 3);
+    assert!(svg.contains(">force on the tip along x<") && !svg.contains("load.tip_force"));
     // A twist that is rounding is drawn as none: its axis is wider.
     let names = [">x of the tip<", ">energy<", ">mean twist / rad · 10⁹<"];
     for (panel, name) in panels.iter().zip(names) {
@@ -136,4 +137,17 @@ fn what_varies_by_its_logarithm_has_a_logarithmic_axis() {
 fn a_force_that_moves_nothing_has_no_law() {
     let svg = figure("scenarios/classic/elastica_buckled.toml --vary load.tip_force[0]=0..-2");
     assert!(groups(&svg, "law").is_empty());
+}
+
+/// Of leaves whose differences are invisible in a small panel one is drawn.
+#[test]
+fn leaves_are_drawn_only_where_they_look_different() {
+    let leaf = "scenarios/paper/fig04.toml --set leaf.rods=3";
+    for (to, count) in [("-1.01", 1), ("-50", 3)] {
+        let svg = figure(&format!("{leaf} --vary load.gravity[2]=-1..{to}"));
+        let [leaves] = groups(&svg, "leaves")[..] else {
+            panic!("one group of leaves")
+        };
+        assert_eq!(leaves.matches(">at ").count(), count, "to {to}");
+    }
 }

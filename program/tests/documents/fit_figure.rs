@@ -20,42 +20,95 @@ const PULLS: &str = "load.tip_force[2],tip_x,tip_z
 
 const PHOTOGRAPH: &str = "rod,x,z\n1,2.5,-0.02\n1,5.0,-0.05\n1,7.5,-0.09\n1,10.0,-0.13\n";
 
-/// Experiments have their numbers in the data, axes their units, and there is no view in
-/// which nothing was measured; counts of one are no plurals.
-#[test]
-fn panels_are_those_of_the_data() {
+/// The figure of a fit to such experiments, and what it says.
+fn figure(experiments: &str, photograph: &str) -> (String, String) {
     let place = Workplace::new();
     place.write("vein.toml", VEIN);
-    place.write("pulls.csv", PULLS);
-    place.write("photograph.csv", PHOTOGRAPH);
-    let run = place.run(
-        "fit vein.toml --data pulls.csv --data photograph.csv --free stiffness.bending_2 \
-         --write svg --out out",
-    );
-    contains(&run.out, &["vein: fit of 1 number to 12 data"]);
-    let svg = place.read("out/fit.svg");
-    let misfit = run.out.split_once("standard deviation ").unwrap().1;
+    place.write("pulls.csv", experiments);
+    let mut data = "--data pulls.csv".to_string();
+    if !photograph.is_empty() {
+        place.write("photograph.csv", photograph);
+        data += " --data photograph.csv";
+    }
+    let run = place.run(format!(
+        "fit vein.toml {data} --free stiffness.bending_2 --write svg --out out"
+    ));
+    (place.read("out/fit.svg"), run.out)
+}
+
+fn groups<'s>(svg: &'s str, name: &str) -> Vec<&'s str> {
+    let start = format!("<g class=\"{name}\">");
+    let groups = svg.split(start.as_str()).skip(1);
+    groups.flat_map(|rest| rest.split("</g>").next()).collect()
+}
+
+/// Results are drawn along the column that varies, axes have words and units, and there is no view
+/// in which nothing was measured; counts of one are no plurals.
+#[test]
+fn panels_are_those_of_the_data() {
+    let (svg, out) = figure(PULLS, PHOTOGRAPH);
+    contains(&out, &["vein: fit of 1 number to 12 data"]);
+    let misfit = out.split_once("standard deviation ").unwrap().1;
     let sd = misfit.split(' ').next().unwrap();
     let parts = [
         "12 data, 1 free number",
-        ">tip_z / cm<",
-        ">tip_x / cm<",
+        ">z of the tip / cm<",
+        ">x of the tip / cm<",
         ">x / cm<",
         ">z / cm<",
-        "experiment as it is, from the side<",
+        ">traced veins, from the side<",
     ];
     contains(&svg, &parts);
     contains(&svg, &[&format!("residuals of {sd}")]);
     assert!(!svg.contains("free numbers") && !svg.contains("from above"));
-    // Ticks 1 and 2, then 3 and 4, then those of the data.
-    let panels: Vec<&str> = svg.split("<g class=\"result\">").skip(1).collect();
-    let [tip_z, tip_x] = panels[..] else {
-        panic!("{} panels of results", panels.len());
+    let [tip_z, tip_x] = groups(&svg, "result")[..] else {
+        panic!("two panels of results");
     };
-    let tip_z = tip_z.split("</g>").next().unwrap();
-    let tip_x = tip_x.split("</g>").next().unwrap();
-    assert!(tip_z.contains(">2<") && !tip_z.contains(">3<"), "{tip_z}");
-    assert!(tip_x.contains(">4<") && !tip_x.contains(">2<"), "{tip_x}");
-    let data = svg.split("<g class=\"residuals\">").nth(1).unwrap();
-    assert!(data.contains(">7<") && !data.contains(">2.5<"), "{data}");
+    for panel in [tip_z, tip_x] {
+        contains(
+            panel,
+            &[">force on the tip along z / N · 10³<", "data less model"],
+        );
+        assert!(!panel.contains(">experiment<"));
+    }
+    // From a pull of 1 mN to one of 2, and from 3 to 4.
+    assert!(
+        tip_z.contains(">\u{2212}1.6<") && !tip_z.contains(">\u{2212}3.6<"),
+        "{tip_z}"
+    );
+    assert!(
+        tip_x.contains(">\u{2212}3.6<") && !tip_x.contains(">\u{2212}1.6<"),
+        "{tip_x}"
+    );
+}
+
+/// The numbers are drawn with the intervals that are written.
+#[test]
+fn intervals_are_those_of_the_numbers() {
+    let (svg, out) = figure(PULLS, PHOTOGRAPH);
+    let (_, told) = out.split_once("stiffness.bending_2 = ").unwrap();
+    let (value, rest) = told.split_once(" (95 %: ").unwrap();
+    let interval = rest.split(')').next().unwrap();
+    let [numbers] = groups(&svg, "numbers")[..] else {
+        panic!("one panel of numbers");
+    };
+    let text = format!(">{value} ({interval}) N cm²<");
+    contains(numbers, &[">bending stiffness A2<", &text]);
+}
+
+/// Experiments between which more than one column varies keep their numbers, as in the data.
+#[test]
+fn experiments_without_one_varied_column_have_numbers() {
+    let experiments = "load.tip_force[1],load.tip_force[2],tip_y
+0,-1e-3,0.001
+2e-3,-1e-3,0.65
+2e-3,-2e-3,0.66
+1e-3,0,0.33
+";
+    let (svg, _) = figure(experiments, "");
+    let [panel] = groups(&svg, "result")[..] else {
+        panic!("one panel of results");
+    };
+    contains(panel, &[">experiment<", ">1<", ">4<"]);
+    assert!(!panel.contains("force on the tip"));
 }

@@ -49,7 +49,10 @@ fn forces_on_grips_are_columns() {
     let rows = place.table("out/small/trace.csv", &columns);
     let pushed: f64 = rows.last().unwrap()[18].parse().unwrap();
     assert!(pushed < -0.1, "{pushed}");
-    contains(&place.picture("out/small/trace"), &["on grip 1, z"]);
+    contains(
+        &place.picture("out/small/trace"),
+        &["force on grip 1 along z"],
+    );
     let refused = place.run(format!("{run} --show grip_3_x"));
     contains(&refused.ends(2).err, &["there are 2 of [[grip]]"]);
 }
@@ -70,7 +73,13 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
     let files = "boundary.csv boundary.json boundary.png boundary.svg";
     place.holds("out/small", files);
     let picture = place.picture("out/small/boundary");
-    let parts = ["load.tip_force[0]", "stiffness.bending_3", "curve 1"];
+    let parts = [
+        ">force on the tip along x<",
+        ">bending stiffness A3<",
+        "curve 1",
+        ">stable<",
+        "looked for in 0 to \u{2212}6 and 0.5 to 2",
+    ];
     contains(&picture, &parts);
     let rows = place.table("out/small/boundary.csv", BOUNDARY);
     assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);

@@ -268,6 +268,8 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
         for observed in &case.observed {
             let traced = observed.traced.iter();
             let leaf = FitLeaf {
+                number: observed.number + 1,
+                settings: observed.experiment.settings.clone(),
                 curves: curves.clone(),
                 traced: { traced }
                     .map(|traced| (traced.rod, view.place(&traced.at)))

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::data::DataFile;
 use crate::newton::Work;
+use crate::study::Keys;
 use crate::words;
 
 words! {
@@ -174,6 +175,10 @@ pub struct Fit {
 /// A leaf at the minimum, for drawing.
 #[derive(Clone, Debug)]
 pub struct FitLeaf {
+    /// The position of its experiment in the data, from 1.
+    pub number: usize,
+    /// Numbers of the scenario during that experiment.
+    pub settings: Vec<(Keys, f64)>,
     /// Centerlines, one per rod.
     pub curves: Vec<Vec<glam::DVec3>>,
     /// Traced points: rod, counted from 0, and coordinates seen.

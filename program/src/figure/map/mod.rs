@@ -17,7 +17,7 @@ use crate::figure::setting::with_unit;
 use crate::report::words::map_shows;
 use glam::DVec2;
 use leafdyn::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
-pub use panel::{DARKEST_INDEX, fill_index, name};
+pub use panel::{DARKEST_INDEX, PALE, fill_index};
 use panel::{Panel, Varied, waves};
 
 const SWATCH: f64 = 12.0;
@@ -60,7 +60,9 @@ pub fn draw(map: &Map) -> Drawing {
             end = draw_meaning(page, end);
         }
     });
-    let axes: Vec<Varied> = map.request.axes.iter().map(Varied::of).collect();
+    let axes: Vec<Varied> = (map.request.axes.iter())
+        .map(|axis| Varied::of(axis, &map.request.base.scenario().units))
+        .collect();
     drawing.height = match axes.split_first() {
         Some((x, more)) => draw_panels(&mut drawing, map, x, more.first(), end),
         None => end,
@@ -335,7 +337,7 @@ mod tests {
         for outcome in MapOutcome::ALL {
             assert!(svg.contains(&outcome.word().replace('-', " ")), "{outcome}");
         }
-        for axis in ["load.gravity[2]", "stiffness.bending_2"] {
+        for axis in ["gravity along z", "bending stiffness A2"] {
             assert!(svg.contains(axis), "{axis}");
         }
         assert!(svg.contains("no reference") && svg.contains("10⁻¹"));
@@ -386,6 +388,6 @@ mod tests {
         map.rows.retain(|row| row.cell < 3);
         let svg = svg(&map);
         assert!(svg.contains("3 of 4 cells"));
-        assert!(!svg.contains("stiffness.bending_2"));
+        assert!(!svg.contains("bending stiffness"));
     }
 }

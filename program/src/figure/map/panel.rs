@@ -3,10 +3,12 @@
 use crate::figure::axes::Axes;
 use crate::figure::axis::{Axis, Ticks};
 use crate::figure::drawing::{
-    Anchor, Color, Drawing, FRAME, INK, Stroke, WHITE, circle, rectangle, vein_color,
+    Anchor, Color, Drawing, INK, NOTE, Stroke, WHITE, circle, rectangle, vein_color,
 };
 use crate::figure::layout::Cell;
+use crate::figure::quantity::Quantity;
 use glam::DVec2;
+use leafdyn::scenario::Units;
 use leafdyn::study::{Confidence, Knob, MapOutcome, MapRequest, MapRow, MapShow, Vary};
 
 /// Smaller cells have no gaps between them and no marks.
@@ -14,21 +16,22 @@ const SEPARATE: f64 = 5.0;
 /// Smaller cells have no numbers.
 const NUMBERED: f64 = 13.0;
 const NUMBER_SIZE: f64 = 8.0;
-const PALE: Color = Color(226, 236, 226);
+/// Of stable leaves.
+pub const PALE: Color = Color(226, 236, 226);
 /// More waves than this have the same colour.
 const MOST_WAVES: f64 = 2.5;
 
 /// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
-/// light.
+/// light. Those that are alike without colours also differ in their marks.
 fn color(outcome: MapOutcome) -> Color {
     match outcome {
         MapOutcome::Right => Color(170, 214, 240),
         MapOutcome::OtherEquilibrium => Color(240, 228, 66),
         MapOutcome::Saddle => Color(213, 94, 0),
         MapOutcome::Inaccurate => Color(204, 121, 167),
-        MapOutcome::NotConverged => Color(150, 150, 156),
+        MapOutcome::NotConverged => Color(128, 128, 134),
         MapOutcome::Diverged => Color(32, 32, 36),
-        MapOutcome::Refused => Color(232, 232, 236),
+        MapOutcome::Refused => Color(240, 240, 242),
         MapOutcome::OutOfTime => Color(0, 92, 158),
     }
 }
@@ -38,15 +41,25 @@ pub fn waves(show: MapShow, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
-/// Fills a cell; one that was refused is crossed out.
+/// Fills a cell, with the mark of its outcome if it has one and is large enough.
 pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
     page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
-    if outcome == MapOutcome::Refused && cell.size.min_element() >= SEPARATE {
-        let inset = 0.25 * cell.size;
-        let (low, high) = (cell.corner + inset, cell.end() - inset);
-        let thin = Stroke::new(FRAME, 0.8);
-        page.line(low, high, thin);
-        page.line(low.with_y(high.y), high.with_y(low.y), thin);
+    if cell.size.min_element() < SEPARATE {
+        return;
+    }
+    let inset = 0.25 * cell.size;
+    let (low, high) = (cell.corner + inset, cell.end() - inset);
+    let rising = (low.with_y(high.y), high.with_y(low.y));
+    let level = (low.with_y(cell.middle().y), high.with_y(cell.middle().y));
+    let (color, lines): (Color, &[(DVec2, DVec2)]) = match outcome {
+        MapOutcome::Refused => (NOTE, &[(low, high), rising]),
+        MapOutcome::OtherEquilibrium => (NOTE, &[(low, high)]),
+        MapOutcome::NotConverged => (WHITE, &[rising]),
+        MapOutcome::Inaccurate => (WHITE, &[level]),
+        _ => return,
+    };
+    for &(from, to) in lines {
+        page.line(from, to, Stroke::new(color, 1.0));
     }
 }
 
@@ -65,10 +78,10 @@ pub const DARKEST_INDEX: usize = 4;
 pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
     let color = match index {
         0 => PALE,
-        1 => Color(250, 232, 214),
-        2 => Color(246, 218, 196),
-        3 => Color(240, 204, 182),
-        _ => Color(232, 190, 170),
+        1 => Color(255, 240, 222),
+        2 => Color(252, 224, 194),
+        3 => Color(246, 204, 168),
+        _ => Color(236, 182, 144),
     };
     page.shape(rectangle(cell.corner, cell.size), color, None);
 }
@@ -97,7 +110,7 @@ pub struct Varied {
 
 impl Varied {
     /// Cells in the order given, each around its value.
-    pub fn of(vary: &Vary) -> Self {
+    pub fn of(vary: &Vary, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -112,7 +125,8 @@ impl Varied {
         };
         edges.insert(0, start);
         edges.push(end);
-        let mut axis = Axis::linear(&name(&vary.keys.to_string()), start, end);
+        let name = Quantity::of(&vary.keys.to_string(), units).axis();
+        let mut axis = Axis::linear(&name, start, end);
         axis.sign = sign;
         if vary.keys.is_whole() {
             axis.ticks = Ticks::At(vary.values.clone());
@@ -238,34 +252,13 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Of more keys than this only the first and the last are named.
-const NAMED: usize = 4;
-
-/// The name of an axis. Keys of one table share its name: `stiffness: axial = shear_2`.
-pub fn name(keys: &str) -> String {
-    let keys: Vec<&str> = keys.split('+').collect();
-    let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
-    let first = table(keys[0]);
-    let joined = |keys: &[&str]| match keys {
-        [first, .., last] if keys.len() > NAMED => format!("{first} = … = {last}"),
-        few => few.join(" = "),
-    };
-    if keys.len() == 1 || keys.iter().any(|key| table(key) != first) {
-        return joined(&keys);
-    }
-    let short: Vec<&str> = (keys.iter())
-        .map(|key| key.split_once('.').map_or(*key, |(_, name)| name))
-        .collect();
-    format!("{first}: {}", joined(&short))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::figure::axis::Direction;
 
     fn varied(given: &str) -> Varied {
-        Varied::of(&given.parse().unwrap())
+        Varied::of(&given.parse().unwrap(), &Units::default())
     }
 
     #[test]
@@ -298,15 +291,5 @@ mod tests {
         let whole = texts("leaf.rods=1..5:5", 250.0);
         assert_eq!(whole, ["1", "2", "3", "4", "5"]);
         assert_eq!(texts("rest.twist=0..1:3", 250.0), ["0.0", "0.5", "1.0"]);
-    }
-
-    #[test]
-    fn a_shared_table_is_named_once() {
-        let h = "stiffness.axial+stiffness.shear_2";
-        assert_eq!(name(h), "stiffness: axial = shear_2");
-        let many: Vec<String> = (0..6).map(|i| format!("rest.twist[{i}]")).collect();
-        assert_eq!(name(&many.join("+")), "rest: twist[0] = … = twist[5]");
-        assert_eq!(name("load.gravity[2]"), "load.gravity[2]");
-        assert_eq!(name("method.step+leaf.length"), "method.step = leaf.length");
     }
 }

@@ -1,0 +1,109 @@
+//! Dead forces on a rod as arrows, on its tip, on points and along it.
+
+use crate::figure::drawing::{Anchor, Drawing, INK, NOTE, Stroke, polygon};
+use crate::figure::font::Font;
+use crate::figure::layout::{Cell, TICK_SIZE};
+use crate::report::numbers::short;
+use glam::{DVec2, DVec3};
+use leafdyn::scenario::Scenario;
+
+/// Length of the arrow of the largest force, as a part of the rod's largest extent, and the shortest
+/// arrow, as a part of that.
+const LONGEST: f64 = 0.16;
+const SHORTEST: f64 = 0.35;
+/// Length of the arrow of the largest force along the rod, likewise, and how many there are.
+const ALONG: f64 = 0.07;
+const COUNT: usize = 9;
+/// Length and half the width of the heads of arrows, in pixels.
+const HEAD: [f64; 2] = [10.0, 4.2];
+const SMALL_HEAD: [f64; 2] = [6.0, 2.6];
+/// From an arrow to the middle of its label.
+const GAP: f64 = 9.0;
+/// An arrow that is shorter on the page is seen end-on.
+const END_ON: f64 = 6.0;
+
+/// The arrow of a force on a rod.
+pub struct Force {
+    /// From its tail to its head.
+    pub ends: [DVec3; 2],
+    head: [f64; 2],
+    /// Empty of those along the rod.
+    label: String,
+}
+
+/// The forces on a single rod whose largest extent is `extent`; `at` gives the point at a fraction of
+/// its length, with the tangent there.
+pub fn forces(
+    scenario: &Scenario,
+    extent: f64,
+    at: impl Fn(f64) -> Option<(DVec3, DVec3)>,
+) -> Vec<Force> {
+    let unit = scenario.units.force.as_deref();
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    let g = DVec3::from_array(scenario.g);
+    let points = scenario.points.iter();
+    let points = points.map(|it| (it.at, DVec3::from_array(it.force) + it.mass * g));
+    let tip = (1.0, DVec3::from_array(scenario.tip_force));
+    let single: Vec<(f64, DVec3)> = points.chain([tip]).collect();
+    let along = scenario.distributed.iter().flatten().take(1);
+    let along: Vec<(f64, DVec3)> = along
+        .flat_map(|force| {
+            let of = |s: f64| DVec3::from_array(force.each_ref().map(|profile| profile.at(s)));
+            (0..COUNT)
+                .map(move |k| k as f64 / (COUNT - 1) as f64)
+                .map(move |s| (s, of(s)))
+        })
+        .collect();
+    let arrows = |forces: &[(f64, DVec3)], longest: f64, head: [f64; 2], named: bool| {
+        let largest = forces.iter().map(|(_, force)| force.length());
+        let largest = largest.fold(0.0, f64::max);
+        let arrow = |&(s, force): &(f64, DVec3)| {
+            let (place, tangent) = at(s)?;
+            let direction = force.try_normalize()?;
+            let least = if named { SHORTEST } else { 0.0 };
+            let size = (force.length() / largest).max(least) * longest * extent;
+            // One that pushes against the rod ends at the point, any other begins there.
+            let pushes = direction.dot(tangent) < -0.5;
+            let start = if pushes || !named { -1.0 } else { 0.0 };
+            let label = format!("force {}{unit}", short(force.length()));
+            Some(Force {
+                ends: [start, start + 1.0].map(|part| place + part * size * direction),
+                head,
+                label: if named { label } else { String::new() },
+            })
+        };
+        forces.iter().filter_map(arrow).collect::<Vec<_>>()
+    };
+    let mut all = arrows(&along, ALONG, SMALL_HEAD, false);
+    all.extend(arrows(&single, LONGEST, HEAD, true));
+    all
+}
+
+impl Force {
+    /// Draws it; its label stays inside the panel.
+    pub fn draw(&self, page: &mut Drawing, cell: Cell, place: impl Fn(DVec3) -> DVec2) {
+        let [tail, tip] = self.ends.map(place);
+        let [length, half] = self.head;
+        let along = (tip - tail).normalize_or_zero();
+        if (tip - tail).length() > END_ON {
+            let (neck, side) = (tip - length * along, half * along.perp());
+            page.line(tail, neck, Stroke::new(INK, 1.5));
+            page.shape(polygon(&[tip, neck + side, neck - side]), INK, None);
+        }
+        // Beside the middle of the arrow, or below it where it lies flat.
+        let size = DVec2::new(Font::embedded().width(&self.label, TICK_SIZE), TICK_SIZE);
+        let side = if along.x.abs() < 0.7 {
+            DVec2::X
+        } else {
+            DVec2::Y
+        };
+        let reach = GAP + 0.5 * (size * side).element_sum();
+        let middle = 0.5 * (tail + tip) + reach * side;
+        let (low, high) = (
+            cell.corner + 0.5 * size + 3.0,
+            cell.end() - 0.5 * size - 3.0,
+        );
+        let middle = middle.max(low).min(high);
+        page.centered_label(middle, &self.label, TICK_SIZE, Anchor::Middle, NOTE);
+    }
+}

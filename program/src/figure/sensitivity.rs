@@ -1,0 +1,261 @@
+//! What a change of each number does to the tip of a leaf or, if that is held, to the force on its
+//! holder: signed bars along each axis.
+
+use super::quantity::Quantity;
+use crate::figure::axes::Axes;
+use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::{
+    Anchor, BLUE, Drawing, FRAME, INK, NOTE, Stroke, VERMILION, rectangle,
+};
+use crate::figure::font::Font;
+use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
+use crate::figure::page::new_page;
+use crate::figure::setting::with_unit;
+use crate::report::numbers::{power_of_ten, rounded_to, short};
+use glam::{DVec2, DVec3};
+use leafdyn::relax::{Equilibrium, Sensitivity};
+use leafdyn::scenario::{Scenario, Units};
+
+/// Room left of the panels, for the numbers in words, and between the panels.
+const WORDS: f64 = 216.0;
+const GAP: f64 = 16.0;
+const ROW: f64 = 34.0;
+const BAR: f64 = 12.0;
+/// From a bar to its value.
+const VALUE: f64 = 4.0;
+/// Room for the values beside the longest bars, as a fraction of the panel.
+const BESIDE: f64 = 0.42;
+/// Least pixels between ticks.
+const TICKS: f64 = 40.0;
+/// Values are shown to this part of them.
+const SHOWN: f64 = 5e-3;
+const BOTTOM: f64 = 4.0;
+const MOST_ROWS: usize = 40;
+/// By how much each number changes: this part of it or, if it is zero, of its unit.
+const PART: f64 = 0.01;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What changes with a number.
+struct Row {
+    words: String,
+    by: String,
+    change: DVec3,
+    /// Bound on the error of each component.
+    error: f64,
+}
+
+impl Row {
+    fn of(found: &Sensitivity, units: &Units) -> Self {
+        let number = Quantity::of(&found.key, units);
+        let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let (factor, by) = match found.value {
+            0.0 => (PART, format!("0, by {}{unit}", short(PART))),
+            value => {
+                let value = format!("{}{unit}", short(value));
+                (PART * found.value, format!("by 1 % of {value}"))
+            }
+        };
+        let (change, error) = match &found.reaction {
+            Some(reaction) => (reaction.force, found.tip_reaction_error),
+            None => {
+                // Of free tips that which moves most.
+                let tips = found.tips.iter().copied();
+                let tip = tips.max_by(|a, b| a.length().total_cmp(&b.length()));
+                (tip.unwrap_or_default(), found.tip_error)
+            }
+        };
+        Row {
+            words: number.words,
+            by,
+            change: factor * change,
+            error: factor.abs() * error.unwrap_or(0.0),
+        }
+    }
+
+    /// A component without the digits below its error: zero if it is no larger.
+    fn known(&self, axis: usize) -> f64 {
+        rounded_to(self.change[axis], self.error)
+    }
+
+    fn size(&self) -> f64 {
+        let known = [0, 1, 2].map(|axis| self.known(axis));
+        DVec3::from_array(known).length()
+    }
+}
+
+pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
+    let found = leaf.sensitivities.as_deref().unwrap_or_default();
+    let units = &scenario.units;
+    let mut rows: Vec<Row> = found.iter().map(|it| Row::of(it, units)).collect();
+    rows.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    rows.truncate(MOST_ROWS);
+    let reaction = found.iter().any(|found| found.reaction.is_some());
+    let (what, unit) = match reaction {
+        true => ("force on the holder", units.force.as_deref()),
+        false => ("displacement of the tip", units.length.as_deref()),
+    };
+    let name = match reaction {
+        true => "what each number does to the force on the holder",
+        false => "what each number does to the tip",
+    };
+    let name = format!("{}: {name}", leaf.scenario);
+    let mut notes = vec!["every number changed by a hundredth, largest effect first".to_string()];
+    let error = rows.iter().map(|row| row.error).fold(0.0, f64::max);
+    if error > 0.0 {
+        notes.push(format!(
+            "no bar where the change is within its error, ≤ {}",
+            power_of_ten(error)
+        ));
+    }
+    let mut page = new_page(LEFT, &name, &notes, None);
+    let height = ROW * rows.len().max(1) as f64;
+    page.height = HEADER + PANEL_TITLE + height + PANEL_AXIS + BOTTOM;
+    let width = (WIDTH - LEFT - RIGHT - WORDS - 2.0 * GAP) / 3.0;
+    let corner = DVec2::new(LEFT + WORDS, HEADER + PANEL_TITLE);
+    page.group("words", |page| {
+        for (k, row) in rows.iter().enumerate() {
+            let middle = corner + DVec2::new(-10.0, ROW * (k as f64 + 0.5));
+            let room = WORDS + LEFT - 16.0;
+            for (text, up, color) in [(&row.words, -6.5, INK), (&row.by, 7.0, NOTE)] {
+                let text = Font::embedded().shortened(text, TICK_SIZE, room);
+                let at = middle + DVec2::new(0.0, up);
+                page.centered_label(at, &text, TICK_SIZE, Anchor::End, color);
+            }
+        }
+    });
+    // One scale for all axes, with room for the values beside the bars.
+    let largest = (rows.iter()).flat_map(|row| [0, 1, 2].map(|axis| row.known(axis).abs()));
+    let largest = largest.filter(|it| it.is_finite()).fold(0.0, f64::max);
+    let end = if largest > 0.0 {
+        (1.0 + 2.0 * BESIDE) * largest
+    } else {
+        1.0
+    };
+    for (axis, of) in AXES.into_iter().enumerate() {
+        let shift = DVec2::new(axis as f64 * (width + GAP), 0.0);
+        let cell = Cell::new(corner + shift, DVec2::new(width, height));
+        let name = if axis == 1 {
+            with_unit(what, unit)
+        } else {
+            String::new()
+        };
+        let across = Axis {
+            emphasizes_zero: true,
+            tick_spacing: Some(TICKS),
+            ..Axis::linear(&name, -end, end)
+        };
+        page.group("changes", |page| {
+            draw_bars(page, cell, (&format!("along {of}"), across), &rows, axis);
+        });
+    }
+    page
+}
+
+/// Draws the changes along an axis, each with its value.
+fn draw_bars(
+    page: &mut Drawing,
+    cell: Cell,
+    (what, across): (&str, Axis),
+    rows: &[Row],
+    axis: usize,
+) {
+    let up = Axis {
+        ticks: Ticks::At(Vec::new()),
+        labelled: false,
+        ..Axis::linear("", 0.0, 1.0)
+    };
+    let axes = Axes::titled(page, cell, ["", what], across, up);
+    // Values are in the unit of the labels of the axis.
+    let unit = 10f64.powi(axes.across.power());
+    let Some(zero) = axes.at((0.0, 0.0)) else {
+        return;
+    };
+    for (k, row) in rows.iter().enumerate() {
+        let middle = cell.corner.y + ROW * (k as f64 + 0.5);
+        let value = row.known(axis);
+        let Some(end) = axes.at((value, 0.0)).filter(|_| value != 0.0) else {
+            continue;
+        };
+        let color = if value > 0.0 { BLUE } else { VERMILION };
+        let corner = DVec2::new(zero.x.min(end.x), middle - 0.5 * BAR);
+        let size = DVec2::new((end.x - zero.x).abs(), BAR);
+        page.shape(rectangle(corner, size), color, None);
+        let side = value.signum();
+        let anchor = if value > 0.0 {
+            Anchor::Start
+        } else {
+            Anchor::End
+        };
+        let at = DVec2::new(end.x + side * VALUE, middle);
+        let shown = rounded_to(value, SHOWN * value.abs()) / unit;
+        page.centered_label(at, &short(shown), TICK_SIZE, anchor, NOTE);
+    }
+    let line = zero.with_y(cell.corner.y);
+    page.line(line, line.with_y(cell.end().y), Stroke::new(FRAME, 0.8));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::svg::text;
+    use crate::report::sample;
+
+    /// The sample leaf with numbers that move its tip so far along the axes.
+    fn svg(changes: &[(&str, f64, [f64; 3])]) -> String {
+        let mut leaf = sample::fan(3, 8);
+        let found = changes.iter().map(|(key, value, tip)| Sensitivity {
+            key: (*key).into(),
+            value: *value,
+            tips: vec![DVec3::from_array(*tip)],
+            tip_error: Some(1e-6),
+            energy: 0.0,
+            energy_error: None,
+            lowest_eigenvalue: None,
+            lowest_eigenvalue_error: None,
+            frequencies: Vec::new(),
+            reaction: None,
+            tip_reaction_error: None,
+            grip_reactions: Vec::new(),
+            grip_reactions_error: None,
+            stations: Vec::new(),
+            positions: Vec::new(),
+            positions_error: None,
+        });
+        leaf.sensitivities = Some(found.collect());
+        let mut scenario = sample::scenario("fan", 3);
+        scenario.units.length = Some("cm".into());
+        scenario.units.force = Some("N".into());
+        text(&draw(&leaf, &scenario))
+    }
+
+    #[test]
+    fn bars_have_signs_and_none_is_noise() {
+        let svg = svg(&[
+            ("stiffness.bending_2", 1.0, [0.0, 1e-9, 0.5]),
+            ("load.gravity[2]", -1.0, [0.0, -1e-7, 0.25]),
+            ("load.gravity[1]", 0.0, [0.0, 0.0, 0.0]),
+        ]);
+        let bars = |color: &str| svg.matches(&format!("fill=\"{color}\"")).count();
+        // Up along z, and down: by a hundredth of a negative number.
+        assert_eq!([bars("#0072b2"), bars("#d55e00")], [1, 1]);
+        for part in [
+            ">bending stiffness A2<",
+            ">by 1 % of 1 N cm²<",
+            ">0, by 0.01 N/cm<",
+            ">5<",
+            ">\u{2212}2.5<",
+            ">displacement of the tip / cm · 10³<",
+        ] {
+            assert!(svg.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn nothing_and_extreme_numbers_are_drawn() {
+        for value in [f64::NAN, f64::INFINITY, 1e300, 0.0] {
+            svg(&[("stiffness.torsion", value, [value, -value, 1.0])]);
+        }
+        svg(&[]);
+    }
+}
