@@ -6,6 +6,7 @@ mod first_minute;
 mod fit_figure;
 mod fit_files;
 mod help;
+mod numbers_on_two_pages;
 mod refusals;
 mod relax_cli;
 mod report_digits;
