@@ -1,7 +1,6 @@
 //! The numbers of a scenario in words, with their units: for pictures.
 
 use super::setting::with_unit;
-use crate::report::numbers::superscript;
 use leafdyn::scenario::{Key, Units};
 
 /// What the entries of a list belong to.
@@ -84,6 +83,10 @@ const WORDS: &[(&str, &str, Entries)] = &[
     ("wind.density", "density of the air", Plain),
     ("wind.drag", "drag coefficient", Plain),
     ("wind.width", "width in the wind", Veins),
+    ("photo.scale", "length of a pixel", Plain),
+    ("photo.x", "pixel of the origin, to the right", Plain),
+    ("photo.y", "pixel of the origin, down", Plain),
+    ("photo.rotation", "rotation of the photograph", Plain),
     ("method.step", "time step", Plain),
     ("method.segments", "segments a vein", Plain),
 ];
@@ -215,7 +218,7 @@ impl<'t> Part<'t> {
         if self.scale || self.list == Some("at") {
             return None;
         }
-        unit_of(Key::from_path(&self.path)?.dimension(), units)
+        units.of(Key::from_path(&self.path)?.dimension())
     }
 }
 
@@ -247,33 +250,6 @@ fn alike_veins(parts: &[Part]) -> Option<String> {
     Some(format!("{factor}{words}, veins {}", runs.join(", ")))
 }
 
-/// The unit with these exponents of length, force and time, if it has one and the scenario names
-/// those of which it consists.
-fn unit_of([length, force, time]: [i32; 3], units: &Units) -> Option<String> {
-    if time != 0 {
-        return None;
-    }
-    let power = |unit: &str, exponent: i32| match exponent {
-        1 => unit.to_string(),
-        exponent => format!("{unit}{}", superscript(exponent)),
-    };
-    let (mut above, mut below) = (Vec::new(), Vec::new());
-    for (exponent, unit) in [(force, &units.force), (length, &units.length)] {
-        match exponent {
-            0 => (),
-            1.. => above.push(power(unit.as_ref()?, exponent)),
-            _ => below.push(power(unit.as_ref()?, -exponent)),
-        }
-    }
-    let above = above.join(" ");
-    match (above.is_empty(), below.as_slice()) {
-        (true, []) => None,
-        (false, []) => Some(above),
-        (true, below) => Some(format!("1/{}", below.join(" "))),
-        (false, below) => Some(format!("{above}/{}", below.join(" "))),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -282,6 +258,7 @@ mod tests {
         Units {
             length: Some("cm".into()),
             force: Some("N".into()),
+            time: None,
         }
     }
 
