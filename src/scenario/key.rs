@@ -244,7 +244,7 @@ impl Key {
     }
 
     /// Exponents of length, force and time in its unit.
-    pub(crate) fn dimension(self) -> [i32; 3] {
+    pub fn dimension(self) -> [i32; 3] {
         self.row().dimension
     }
 
@@ -282,7 +282,8 @@ impl Key {
         Key::REPEATED.contains(&self.parts().0)
     }
 
-    pub(crate) fn all() -> impl Iterator<Item = Key> {
+    /// All keys of the format, by tables.
+    pub fn all() -> impl Iterator<Item = Key> {
         FORMAT.iter().map(|row| row.key)
     }
 
