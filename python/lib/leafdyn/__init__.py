@@ -30,6 +30,7 @@ from ._sensitivity import Sensitivity
 from ._simulate import frames, simulate
 from ._study import Chart, Check, Equilibria, Map
 from ._sweep import sweep
+from ._typed import ScenarioDict
 from ._verbs import chart, check, equilibria, stability_map
 from ._view import Page
 
@@ -62,6 +63,7 @@ __all__ = [
     "Prediction",
     "Result",
     "Scenario",
+    "ScenarioDict",
     "ScenarioError",
     "Sensitivity",
     "Source",

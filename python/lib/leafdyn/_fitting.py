@@ -107,8 +107,8 @@ def fit(
         raise ValueError(f"every = {every!r}: must be a whole number from 1")
     keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
     leaf = checked(scenario, set)
-    tables = measurements(data, "data")
-    others = None if candidates is None else measurements(candidates, "candidates")[0]
+    tables = measurements(data, "data", leaf.units)
+    others = None if candidates is None else measurements(candidates, "candidates", leaf.units)[0]
     with reporter(progress) as heard:
         found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), tolerance, heard))
     for remark in found.remarks:

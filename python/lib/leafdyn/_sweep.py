@@ -15,6 +15,7 @@ from . import _leafdyn
 from ._data import column_unit, pandas
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
+from ._quantities import plain
 from ._range import Range, values
 from ._relax import asked_for, relaxed, warn
 from ._scenario import Scenario, Source, checked
@@ -112,7 +113,7 @@ def sweep(
     wanted, modes = _wanted(columns)
     asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, None, path=path)
     base = checked(scenario, set)
-    axes = {key: values(key, span) for key, span in vary.items()}
+    axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point))) for point in grid]
     if client is None:
