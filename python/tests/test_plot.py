@@ -144,11 +144,10 @@ def test_a_fit_is_drawn_over_what_was_varied() -> None:
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("load.tip_force[0]", "tip x")
     data = ax.containers[0].lines[0]
     assert data.get_xdata().tolist() == pull["load.tip_force[0]"]
-    curve = next(line for line in ax.lines if len(line.get_xdata()) > 20)
+    curve = next(line for line in ax.lines if len(line.get_xdata()) > 10)
     assert np.interp(12, curve.get_xdata(), curve.get_ydata()) == pytest.approx(fit.columns["model"][2], abs=1e-4)
     axial = fit.parameters["stiffness.axial"]
-    told = ax.get_legend().get_title().get_text()
-    assert told == f"stiffness.axial = {axial.value:.4g} ({axial.low:.4g} to {axial.high:.4g})"
+    assert ax.get_title() == f"stiffness.axial = {axial.value:.4g} ({axial.low:.4g} to {axial.high:.4g})"
     with pytest.raises(ValueError, match="show = 'tip_y': must be one of tip_x"):
         fit.plot(show="tip_y")
     with pytest.raises(ValueError, match="against = 'leaf.length': must be one of load.tip_force"):

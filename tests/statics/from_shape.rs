@@ -1,7 +1,7 @@
 //! A leaf that is given a shape to begin with stays in the valley in which that lies, and ends in the
 //! same equilibrium, to its bar, as closed forms and relaxations from nowhere.
 
-use leafdyn::relax::{RelaxError, relax, relax_from};
+use leafdyn::relax::{Progress, RelaxError, relax, relax_from};
 use leafdyn_testing::*;
 
 fn nothing() -> impl FnMut(&Progress) {

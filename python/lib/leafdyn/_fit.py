@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,7 +14,7 @@ from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
 from ._draw import axes
 from ._leaf import Array
-from ._predict import Prediction, draw, predicted, series
+from ._predict import Measurement, Prediction, draw, predicted, series
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 from ._sweep import quantity
@@ -135,7 +134,6 @@ class Fit(Table):
         errors = np.array([one.standard_error for one in self.parameters.values()])
         self.covariance = np.where(np.eye(count, dtype=bool), errors**2, self.correlations * np.outer(errors, errors))
         read_only(self.covariance)
-        self._settings = {entry["experiment"]: entry["settings"] for entry in said["experiments"]}
         for name in (
             "coverage_factor",
             "remarks",
@@ -259,7 +257,7 @@ class Fit(Table):
 
     def plot(self, ax: Any = None, *, show: str | None = None, against: str | None = None) -> Any:
         """Draw the measurements over the number that was varied with matplotlib, with their standard deviations, and the
-        fitted leaf with its 95 % band; in the legend the fitted values with their intervals.
+        fitted leaf with its 95 % band; above them the fitted values with their intervals.
 
         Parameters
         ----------
@@ -268,8 +266,8 @@ class Fit(Table):
         show
             What was measured, as ``"tip_x"``; left out: what was measured most often.
         against
-            The key that varied; left out: that with most values. Measurements that differ in others, too, have a curve
-            for each of their values.
+            The key that varied; left out: that with most values. Numbers that varied in step with it are interpolated;
+            experiments that differ in others, too, have curves of their own.
 
         Returns
         -------
@@ -280,25 +278,31 @@ class Fit(Table):
         ValueError
             If nothing was varied, as where points on veins alone were measured.
         """
-        rows = self.columns
-        counts = Counter(str(name) for name, at in zip(rows["what"], rows["experiment"]) if self._settings.get(str(at)))
-        if not counts:
+        measured: dict[str, list[Measurement]] = {}
+        said = self.to_dict()
+        settings = {entry["experiment"]: entry["settings"] for entry in said["experiments"]}
+        for row in said["residuals"]:
+            if settings[row["experiment"]]:
+                measured.setdefault(row["what"], []).append((settings[row["experiment"]], row["data"], row["sd"]))
+        if not measured:
             aside = "draw `leafdyn.relax(fit.scenario).plot()`, and the points over it"
             raise ValueError(f"no number of the scenario was varied in the experiments: {aside}")
-        show = max(counts, key=lambda name: counts[name]) if show is None else show
-        if show not in counts:
-            raise ValueError(f"show = {show!r}: must be one of {', '.join(counts)}")
-        varied = {
-            key: len({at.get(key) for at in self._settings.values()}) for at in self._settings.values() for key in at
-        }
-        against = max(varied, key=lambda key: varied[key]) if against is None else against
+        show = max(measured, key=lambda name: len(measured[name])) if show is None else show
+        if show not in measured:
+            raise ValueError(f"show = {show!r}: must be one of {', '.join(measured)}")
+        varied: dict[str, set[float]] = {}
+        for here, _, _ in measured[show]:
+            for key, value in here.items():
+                varied.setdefault(key, set()).add(value)
+        against = max(varied, key=lambda key: len(varied[key])) if against is None else against
         if against not in varied:
             raise ValueError(f"against = {against!r}: must be one of {', '.join(varied)}")
         ax = axes(ax)
-        groups = series(rows, self._settings, show, against)
-        shown = [(group, self.predict({**dict(group.others), against: group.range}, show)) for group in groups]
+        groups = series(measured[show], against)
+        shown = [(group, self.predict(group.conditions, show)) for group in groups]
         draw(ax, shown, (show, against), self._units)
-        ax.legend(title="\n".join(self._interval(one) for one in self.parameters.values()))
+        ax.set_title("\n".join(self._interval(one) for one in self.parameters.values()), fontsize="small")
+        ax.legend()
         return ax
 
     def _interval(self, parameter: Parameter) -> str:

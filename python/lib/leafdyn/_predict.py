@@ -111,49 +111,62 @@ def _band(slopes: Array, spread: Array) -> float:
     return float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else np.inf
 
 
-CURVE = 41
+CURVE = 21
 """Points of a curve of predictions."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """Measurements of one quantity over a number that varies, all others alike."""
+    """Measurements of one quantity over a number that varies."""
 
-    others: tuple[tuple[str, float], ...]
-    """What is set besides, by keys."""
+    others: dict[str, float]
+    """What is set besides, by keys, and sets this series apart."""
     across: Array
     data: Array
     sd: Array
-
-    @property
-    def range(self) -> Array:
-        """Where a curve through it is drawn."""
-        return np.linspace(self.across.min(), self.across.max(), CURVE)
+    conditions: dict[str, Array]
+    """All that is set, by keys, along a curve through it: numbers that vary in step with the first are interpolated."""
 
 
-def series(
-    rows: Mapping[str, Any], settings: Mapping[str, Mapping[str, float]], what: str, against: str
-) -> list[Series]:
-    """Measurements of `what` over `against`, of the rows of a fit, whose experiments have these settings."""
-    groups: dict[tuple[tuple[str, float], ...], list[tuple[float, float, float]]] = {}
-    for experiment, name, datum, sd in zip(rows["experiment"], rows["what"], rows["data"], rows["sd"]):
-        here = settings.get(str(experiment), {})
-        if name == what and against in here:
-            others = tuple((key, value) for key, value in here.items() if key != against)
-            groups.setdefault(others, []).append((here[against], datum, sd))
-    return [Series(others, *np.array(sorted(points)).T) for others, points in groups.items()]
+Measurement = tuple[Mapping[str, float], float, float]
+"""What was set, by keys, a datum, and its standard deviation."""
+
+
+def series(measured: Sequence[Measurement], against: str) -> list[Series]:
+    """Measurements of one quantity as series over `against`, which is set in some of them."""
+    points = [point for point in measured if against in point[0]]
+    points.sort(key=lambda point: point[0][against])
+    values: dict[str, dict[float, set[float]]] = {}
+    for here, _, _ in points:
+        for key, value in here.items():
+            values.setdefault(key, {}).setdefault(here[against], set()).add(value)
+    apart = [key for key, found in values.items() if any(len(several) > 1 for several in found.values())]
+    groups: dict[tuple[tuple[str, float | None], ...], list[Measurement]] = {}
+    for point in points:
+        # Experiments that set other numbers stand apart, too.
+        present = tuple((key, point[0].get(key) if key in apart else float(key in point[0])) for key in values)
+        groups.setdefault(present, []).append(point)
+    return [_series(group, against, apart) for group in groups.values()]
+
+
+def _series(points: Sequence[Measurement], against: str, apart: Sequence[str]) -> Series:
+    across, data, sd = np.array([(here[against], datum, sd) for here, datum, sd in points]).T
+    first = points[0][0]
+    curve = np.linspace(across[0], across[-1], CURVE)
+    conditions = {key: np.interp(curve, across, [here[key] for here, _, _ in points]) for key in first}
+    return Series({key: first[key] for key in apart if key in first}, across, data, sd, conditions)
 
 
 def draw(ax: Any, shown: Sequence[tuple[Series, Prediction]], names: tuple[str, str], units: Mapping[str, str]) -> None:
     """Draw data with their standard deviations, and what is predicted with its band."""
     show, against = names
     for number, (measured, found) in enumerate(shown):
-        others = ", ".join(f"{key} = {value:.4g}" for key, value in measured.others) if len(shown) > 1 else ""
+        others = ", ".join(f"{key} = {value:.4g}" for key, value in measured.others.items())
         color = f"C{number % 10}"
         ax.errorbar(
             *(measured.across, measured.data, measured.sd), fmt="o", color=color, capsize=2, label=others or "measured"
         )
-        across, height = measured.range, found.values[show]
+        across, height = measured.conditions[against], found.values[show]
         band = np.where(np.isfinite(found.bands[show]), found.bands[show], np.nan)
         ax.plot(across, height, color=color, label=None if others else "fitted, with its 95 % band")
         ax.fill_between(across, height - band, height + band, color=color, alpha=0.2, linewidth=0)
