@@ -72,13 +72,35 @@ def test_of_a_scenario_and_of_a_frame(found: leafdyn.Fit) -> None:
     assert len(frame) == 5
 
 
+def test_of_a_factor() -> None:
+    pull = {**{key: PULL[key] for key in (FORCE, "tip_x")}, "sd_tip_x": 0.002}
+    fit = leafdyn.fit(MEASURED / "pull.toml", pull, "scale:stiffness.axial", set=KNOWN, tolerance=1e-8)
+    again = fit.predict({FORCE: PULL[FORCE]})
+    assert fit.values["scale:stiffness.axial"] < 0.7
+    assert np.allclose(again.values["tip_x"], fit.columns["model"], atol=1e-6)
+    # The fit takes derivatives on the grids that its data need.
+    assert np.allclose(again.bands["tip_x"], fit.columns["band"], rtol=5e-3)
+
+
 def test_what_the_data_leave_open_has_no_band() -> None:
-    # Only their quotient matters to a vein in a plane.
+    # A flat blade: only the quotient of its weight and its stiffness matters to its shape.
+    vein: dict[str, Any] = {
+        "name": "vein",
+        "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+        "stiffness": {"torsion": 1, "bending_2": 1, "bending_3": 1, "axial": "inf", "shear_2": "inf", "shear_3": "inf"},
+        "load": {"gravity": [0, 0, -1]},
+    }
+    seen = {"rod": 1, "x": [0.25, 0.5, 0.75], "z": [-0.02, -0.08, -0.15], "sd": 0.01}
     with pytest.warns(leafdyn.LeafWarning):
-        loose = leafdyn.fit(MEASURED / "pull.toml", PULL, ["stiffness.torsion", "load.gravity[1]"], set=KNOWN)
-    errors = loose.standard_errors
-    for key, one in loose.parameters.items():
-        assert one.standard_error == errors[key] > 0
+        fit = leafdyn.fit(vein, seen, ["stiffness.bending_2", "load.gravity[2]"])
+    assert fit.outcome == "undetermined"
+    assert set(fit.standard_errors.values()) == {np.inf}
+    assert fit.predict({"load.tip_force[2]": 0.1}, "tip_z").bands["tip_z"].tolist() == [np.inf]
+    # What is not free in it has no influence: nothing is known of the torsion, and nothing depends on it.
+    with pytest.warns(leafdyn.LeafWarning):
+        fit = leafdyn.fit(vein, seen, ["stiffness.bending_2", "stiffness.torsion"])
+    assert fit.standard_errors["stiffness.torsion"] == np.inf
+    assert np.isfinite(fit.predict({"load.tip_force[2]": 0.1}, "tip_z").bands["tip_z"]).all()
 
 
 def test_refusals(found: leafdyn.Fit) -> None:

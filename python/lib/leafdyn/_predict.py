@@ -104,11 +104,13 @@ def _slope(change: Sensitivity | None, name: str, key: str, value: float) -> flo
 
 
 def _band(slopes: Array, spread: Array) -> float:
-    matter = slopes != 0.0
-    variance = slopes[matter] @ spread[np.ix_(matter, matter)] @ slopes[matter]
     if np.isnan(slopes).any():
         return np.nan
-    return float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else np.inf
+    matter = slopes != 0.0
+    part = spread[np.ix_(matter, matter)]
+    if not np.isfinite(part).all():
+        return np.inf
+    return float(np.sqrt(max(slopes[matter] @ part @ slopes[matter], 0.0)))
 
 
 CURVE = 21
