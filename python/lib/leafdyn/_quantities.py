@@ -15,8 +15,8 @@ Units = Callable[[], Mapping[str, str]]
 
 
 def plain(value: Any, key: str, units: Units) -> Any:
-    """The value of a key, or the column of a result, without its unit, also in lists and tables: a quantity in the unit that it has in a scenario with
-    these names of units. Without pint everything is plain.
+    """The value of a key, or the column of a result, without its unit, also in lists and tables: a quantity in the unit
+    that it has in a scenario with these names of units. Without pint everything is plain.
 
     >>> plain(0.3, "leaf.length", dict)
     0.3

@@ -69,7 +69,8 @@ def sweep(
         keys joined by ``+`` take the same values.
     columns
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"reaction_x"`` and so on (of a
-        held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``, ``"neutral_directions"``,
+        held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``,
+        ``"neutral_directions"``,
         ``"error_estimate"``, ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
         ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time); or a dict of functions
         of an `Equilibrium`.
@@ -81,8 +82,8 @@ def sweep(
     Returns
     -------
     pandas.DataFrame
-        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA), a bound infinite. ``attrs["units"]`` has the
-        units that the scenario names, by columns.
+        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA), a bound infinite.
+        ``attrs["units"]`` has the units that the scenario names, by columns.
 
     Raises
     ------
