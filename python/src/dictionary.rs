@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Write};
 
+use leafdyn::relax::MAX_NODES;
 use leafdyn::scenario::{Entries, Key, Value, schema};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
@@ -11,10 +12,14 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyT
 use crate::errors::entry_error;
 
 static MAPPING: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static SEQUENCE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 static REAL: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// Largest nesting depth of lists and tables; scenarios need less.
 const MAX_DEPTH: usize = 8;
+
+/// Most numbers of a value: as many as a leaf can have nodes. More are refused before any is read.
+const MOST_NUMBERS: usize = MAX_NODES;
 
 /// A key and its value.
 type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
@@ -197,8 +202,9 @@ impl fmt::Display for Path<'_> {
     }
 }
 
-/// Converts a value. Numbers keep every digit. Objects with `tolist`, as numpy arrays and
-/// numbers have, are converted by it, and other real numbers to floats.
+/// Converts a value. Numbers keep every digit. Sequences, as ranges, become lists; objects with
+/// `tolist`, as numpy arrays and numbers have, are converted by it, others with `__array__`, as those of
+/// xarray, by numpy, and other real numbers to floats.
 fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
     if depth > MAX_DEPTH {
         return Err(path.refuse(entry, "lists stand too deep in each other"));
@@ -215,7 +221,8 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
             "inf" if path.is_stiffness() => Value::Float(f64::INFINITY),
             words => Value::String(words.into()),
         })
-    } else if entry.is_instance_of::<PyList>() || entry.is_instance_of::<PyTuple>() {
+    } else if is_sequence(entry)? {
+        check_size(entry.len()?, path, entry)?;
         let items = entry.try_iter()?.enumerate();
         let values = items.map(|(at, item)| value(&item?, Path::Item(&path, at), depth + 1));
         Ok(Value::Array(values.collect::<PyResult<_>>()?))
@@ -226,7 +233,7 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
             Ok((key, value))
         });
         Ok(Value::Table(values.collect::<PyResult<_>>()?))
-    } else if let Some(plain) = plain(entry)? {
+    } else if let Some(plain) = plain(entry, path)? {
         value(&plain, path, depth + 1)
     } else if entry.is_instance(REAL.import(entry.py(), "numbers", "Real")?)? {
         float(entry, path)
@@ -236,13 +243,50 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
     }
 }
 
-/// What `tolist` makes of an object, if that is something else: a long double stays one.
-fn plain<'py>(entry: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
-    if !entry.hasattr("tolist")? {
-        return Ok(None);
+fn is_sequence(entry: &Bound<PyAny>) -> PyResult<bool> {
+    if entry.is_instance_of::<PyList>() || entry.is_instance_of::<PyTuple>() {
+        return Ok(true);
     }
-    let plain = entry.call_method0("tolist")?;
+    entry.is_instance(SEQUENCE.import(entry.py(), "collections.abc", "Sequence")?)
+}
+
+/// Refuses more numbers than any scenario can have.
+fn check_size(size: usize, path: Path, entry: &Bound<PyAny>) -> PyResult<()> {
+    match size <= MOST_NUMBERS {
+        true => Ok(()),
+        false => Err(path.refuse(
+            entry,
+            &format!("has {size} numbers: at most {MOST_NUMBERS} are allowed"),
+        )),
+    }
+}
+
+/// What `tolist` makes of an object, or of the array that it becomes, if that is something else: a long
+/// double stays one.
+fn plain<'py>(entry: &Bound<'py, PyAny>, path: Path) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let array = match entry.hasattr("tolist")? {
+        true => entry.clone(),
+        false if entry.hasattr("__array__")? => {
+            let asarray = entry.py().import("numpy")?.getattr("asarray")?;
+            check_array(entry, path)?;
+            asarray.call1((entry,))?
+        }
+        false => return Ok(None),
+    };
+    check_array(&array, path)?;
+    let plain = array.call_method0("tolist")?;
     Ok(Some(plain).filter(|plain| !plain.get_type().is(entry.get_type())))
+}
+
+/// The same for an array, which knows its size before any number is read.
+fn check_array(array: &Bound<PyAny>, path: Path) -> PyResult<()> {
+    match array
+        .getattr("size")
+        .and_then(|size| size.extract::<usize>())
+    {
+        Ok(size) => check_size(size, path, array),
+        Err(_) => Ok(()),
+    }
 }
 
 /// A whole number, or a float if it is too large for one.

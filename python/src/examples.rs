@@ -1,7 +1,7 @@
 //! The format of scenarios, and scenarios that are compiled in: what `leafdyn new` writes, and those
 //! of the repository.
 
-use leafdyn::scenario;
+use leafdyn::scenario::{self, Key};
 use pyo3::prelude::*;
 
 /// Names, and texts in TOML.
@@ -18,6 +18,17 @@ macro_rules! texts {
 #[pyfunction]
 pub fn schema() -> String {
     scenario::schema().to_string()
+}
+
+/// Exponents of length, force and time of the numbers of all keys, by their paths.
+#[pyfunction]
+pub fn dimensions() -> Vec<(&'static str, (i32, i32, i32))> {
+    let keys = Key::all();
+    let dimension = |key: Key| {
+        let [length, force, time] = key.dimension();
+        (key.path(), (length, force, time))
+    };
+    keys.map(dimension).collect()
 }
 
 /// What `leafdyn new` writes, by the words it knows.

@@ -15,6 +15,7 @@ mod relax;
 mod result;
 mod run;
 mod scenario;
+mod start;
 mod verbs;
 
 /// As in the program: a leaf needs many small arrays for a short time, and a list of scenarios,
@@ -30,7 +31,7 @@ mod _leafdyn {
     #[pymodule_export]
     use super::dictionary::overrides;
     #[pymodule_export]
-    use super::examples::{examples, schema, templates};
+    use super::examples::{dimensions, examples, schema, templates};
     #[pymodule_export]
     use super::fit::fit;
     #[pymodule_export]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use leafdyn::relax::{
-    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, Route, Settings,
+    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, RodShape, Route, Settings,
 };
 use leafdyn::scenario;
 use leafdyn::study::{self, Keys, MarginProgress, SensitivityError};
@@ -17,6 +17,7 @@ use crate::errors::{value_error, vary_error};
 use crate::result::Leaf;
 use crate::run::{Monitor, elapsed, run, run_here};
 use crate::scenario::Scenario;
+use crate::start::Start;
 
 /// Most parts into which stations can divide a vein.
 const MOST_STATIONS: usize = 1_000_000;
@@ -40,6 +41,8 @@ pub struct Asked {
     margin: bool,
     /// Which equilibrium is meant.
     path: String,
+    /// The shape from which it starts; for one leaf only.
+    start: Option<Start>,
 }
 
 /// Refuses a request with a `ValueError`.
@@ -164,7 +167,20 @@ pub fn relax_one(
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
     let input = scenario.checked.clone();
-    let found = if asked.margin {
+    let found = if let Some(start) = &asked.start {
+        let (scenario, stations, rods) = (input.clone(), start.stations.clone(), start.rods());
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let from: (&[f64], &[RodShape]) = (&stations, &rods);
+            relax::relax_from(
+                &scenario,
+                from,
+                &options,
+                &mut reporter(monitor, &scenario.name),
+            )
+        })?;
+        found.map_err(value_error)?
+    } else if asked.margin {
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();

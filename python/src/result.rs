@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::relax::{Equilibrium, GripReaction, Mode, Sensitivity, Stresses};
+use leafdyn::relax::{Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses};
 use leafdyn::scenario::{Scenario, Stress};
 use leafdyn_program::files::{self, Document, FileError, Kind, Written};
 use pyo3::exceptions::{PyKeyError, PyOSError};
@@ -284,6 +284,26 @@ impl Leaf {
         array(py, stations.clone(), &[stations.len()])
     }
 
+    /// What drawings of the veins go through, whatever the stations shown: stations, positions, and
+    /// tangents, the changes of positions with the station.
+    fn veins<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 3]> {
+        let dense = py.detach(|| self.found.clone().at_stations(&self.input, None));
+        let rods = &dense.shape.rods;
+        let tangents: Vec<Vec<_>> = (rods.iter())
+            .map(|rod| {
+                let nodes = rod.nodes.iter();
+                let tangent = |node: &NodeState| rod.length * (node.rotation * node.v);
+                nodes.map(tangent).collect()
+            })
+            .collect();
+        let stations = &dense.shape.stations;
+        Ok([
+            array(py, stations.clone(), &[stations.len()])?,
+            nodes(py, rods, "positions")?,
+            curves(py, &tangents)?,
+        ])
+    }
+
     /// Eigenvalues of the modes that were asked for and found, and bounds on their errors.
     fn eigenvalues<'py>(&self, py: Python<'py>) -> PyResult<Option<[Bound<'py, PyAny>; 2]>> {
         let Some(modes) = &self.found.stability.modes else {
@@ -293,7 +313,7 @@ impl Leaf {
             let numbers = modes.iter().map(of).collect();
             array(py, numbers, &[modes.len()])
         };
-        let errors = numbers(|mode| mode.error.unwrap_or(f64::NAN))?;
+        let errors = numbers(|mode| mode.error.unwrap_or(f64::INFINITY))?;
         Ok(Some([numbers(|mode| mode.eigenvalue)?, errors]))
     }
 

@@ -40,3 +40,22 @@ def test_the_page_holds_the_scenario_and_its_sliders() -> None:
     assert page.scenario == scenario
     assert "http" not in page.html.split("Content-Security-Policy")[1].split(">")[0]
     assert "text/html" in page._repr_mimebundle_() or page._widget is not None
+
+
+@pytest.mark.skipif(not built(), reason="built without the live page")
+def test_a_kernel_shows_it_and_hears_from_it() -> None:
+    formats, client = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("anywidget")
+    show = f"import leafdyn\npage = leafdyn.explore({str(FIG04)!r}, {{'stiffness.torsion': (0.1, 10)}})\npage"
+    # What the page tells the widget when a slider is moved.
+    hear = (
+        "state = {'text': page.scenario.text, 'values': {'stiffness.torsion': 3.0}}\n"
+        "page._widget.set_state({'state': state})\n"
+        "print(page.scenario.overrides)"
+    )
+    cells = [formats.v4.new_code_cell(cell) for cell in (show, hear)]
+    notebook = formats.v4.new_notebook(cells=cells)
+    client.NotebookClient(notebook, timeout=60, kernel_name="python3").execute()
+    shown, heard = (cell.outputs for cell in notebook.cells)
+    assert "application/vnd.jupyter.widget-view+json" in shown[0].data
+    assert heard[0].text == "['stiffness.torsion=3.0']\n"

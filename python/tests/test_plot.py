@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
+import re
+import sys
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -51,3 +54,108 @@ def test_a_motion_shows_what_varies_most() -> None:
     assert ax.get_ylabel().startswith("middle ")
     assert len(ax.lines) == 2
     assert np.ptp(ax.lines[0].get_ydata()) > 0
+
+
+def test_a_leaf_has_one_colour_and_one_entry(pyplot: Any) -> None:
+    ax = pyplot.figure().add_subplot()
+    first = leafdyn.relax(fan(3))
+    first.plot(ax)
+    leafdyn.relax(fan(4, gravity=2.0)).plot(ax=ax, label="heavier", linewidth=2)
+    assert [text.get_text() for text in ax.legend().get_texts()] == ["fan", "heavier"]
+    assert len({line.get_color() for line in ax.lines[:3]}) == 1
+    assert len({line.get_color() for line in ax.lines}) == 2
+
+
+def test_veins_are_smooth_whatever_the_stations(tmp_path: Any) -> None:
+    fine = leafdyn.relax(fan(3, gravity=8.0), stations=512, tolerance=1e-8)
+    coarse = leafdyn.relax(fan(3, gravity=8.0), stations=2, tolerance=1e-8)
+    usual = leafdyn.relax(fan(3, gravity=8.0), tolerance=1e-8)
+    usual.save(tmp_path, "json,csv")
+    for leaf in (coarse, usual, pickle.loads(pickle.dumps(coarse)), leafdyn.load(tmp_path)):
+        ax = leaf.plot()  # type: ignore[attr-defined]
+        for vein, line in zip(fine.positions, ax.lines):
+            drawn = np.array(line.get_data_3d()).T
+            assert len(drawn) > 100
+            away = np.linalg.norm(drawn[:, None] - vein[None], axis=-1).min(axis=1)
+            # Nodes of the fine leaf are 1/512 apart.
+            assert away.max() < 1.1 / 1024
+
+
+def test_a_branch_is_dashed_from_its_critical_point_on() -> None:
+    trace = leafdyn.trace(column(), {"load.tip_force[0]": (-1, -4)}, switch=True)
+    load = -((np.pi / 2) ** 2)
+    straight = trace.branches[0]
+    assert [piece.stable for piece in straight.pieces] == [True, False]
+    solid, dashed = (straight.values[piece.points] for piece in straight.pieces)
+    assert solid[-1] == dashed[0] == pytest.approx(load, rel=1e-6)
+    lines = [line for line in trace.plot(show="z").lines if line.get_linestyle() in ("-", "--")]
+    assert [line.get_linestyle() for line in lines] == ["-", "--", *["-"] * (len(trace.branches) - 1)]
+    assert lines[0].get_xdata()[-1] == lines[1].get_xdata()[0] == solid[-1]
+
+
+def test_pieces_of_branches_of_all_kinds() -> None:
+    def pieces(*points: str) -> list[tuple[bool, int, int]]:
+        kinds = np.array(["fold" if "*" in point else "regular" for point in points])
+        columns = {
+            "stable": np.array(["s" in point for point in points], dtype=bool),
+            "kind": kinds,
+            "value": np.arange(len(points)),
+        }
+        branch = leafdyn.Branch("reached", columns, [])
+        return [(stable, at.start, at.stop) for stable, at in branch.pieces]
+
+    assert pieces("s", "s", "u*", "u") == [(True, 0, 3), (False, 2, 4)]
+    assert pieces("u", "s*", "s") == [(False, 0, 2), (True, 1, 3)]
+    assert pieces("s", "u*", "s") == [(True, 0, 3)]
+    assert pieces("s", "s*", "s*", "s") == [(True, 0, 2), (False, 1, 3), (True, 2, 4)]
+    assert pieces("u", "s*", "s*", "u") == [(False, 0, 2), (True, 1, 3), (False, 2, 4)]
+    assert pieces("u", "u*", "u*", "u") == [(False, 0, 4)]
+    # Without a critical point nobody knows where: not stable as far as that is known.
+    assert pieces("s", "u", "u") == [(False, 0, 3)]
+    assert pieces("s") == [(True, 0, 1)]
+    assert pieces() == []
+
+
+def test_equilibria_say_their_energies() -> None:
+    shapes = leafdyn.equilibria(leafdyn.example("elastica_buckled"), tolerance=1e-4)
+    legend = shapes.plot().get_legend()
+    assert legend.get_title().get_text() == "energy"
+    assert [text.get_text() for text in legend.get_texts()] == [
+        f"{leaf.energy:.5g}, {'stable' if leaf.stable else 'unstable'}" for leaf in shapes
+    ]
+    assert {leaf.stable for leaf in shapes} == {True, False}
+
+
+def test_axes_of_motions_and_traces_have_units() -> None:
+    units = {"units": {"length": "cm", "force": "N"}}
+    motion = leafdyn.simulate({**fan(2), **units}, set={"dynamics.duration": 0.2})
+    ax = motion.plot()
+    assert ax.get_ylabel().endswith(" / cm") and ax.get_xlabel() == "time"
+    assert [text.get_text() for text in ax.legend().get_texts()] == ["fan"]
+    ax = leafdyn.trace({**fan(2), **units}, "load.tip_force[2]=-1..-2:3").plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("load.tip_force[2] / N", "tip z / cm")
+
+
+def test_a_fit_is_drawn_over_what_was_varied() -> None:
+    pull = {"load.tip_force[0]": [4, 8, 12, 16, 20], "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399]}
+    known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
+    fit = leafdyn.fit("scenarios/measured/pull.toml", pull, "stiffness.axial", set=known)
+    ax = fit.plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("load.tip_force[0]", "tip x")
+    data = ax.containers[0].lines[0]
+    assert data.get_xdata().tolist() == pull["load.tip_force[0]"]
+    curve = next(line for line in ax.lines if len(line.get_xdata()) > 10)
+    assert np.interp(12, curve.get_xdata(), curve.get_ydata()) == pytest.approx(fit.columns["model"][2], abs=1e-4)
+    axial = fit.parameters["stiffness.axial"]
+    assert ax.get_title() == f"stiffness.axial = {axial.value:.4g} ({axial.low:.4g} to {axial.high:.4g})"
+    with pytest.raises(ValueError, match="show = 'tip_y': must be one of tip_x"):
+        fit.plot(show="tip_y")
+    with pytest.raises(ValueError, match="against = 'leaf.length': must be one of load.tip_force"):
+        fit.plot(against="leaf.length")
+
+
+def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for result in (leafdyn.relax(fan(2)), leafdyn.trace(fan(2), VARY)):
+        with pytest.raises(ImportError, match=re.escape("pip install './python[plot]'")):
+            result.plot()

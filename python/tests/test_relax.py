@@ -1,13 +1,14 @@
 """A leaf at rest: what it can be asked with, and what it holds."""
 
 import json
+import pickle
 import re
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -28,7 +29,6 @@ def test_shapes_and_kinds() -> None:
         assert array.dtype == np.float64
         assert array.flags.c_contiguous
         assert getattr(leaf, name) is array
-    assert leaf.tip is not None
     assert leaf.tip.shape == (3,)
     assert np.array_equal(leaf.positions[2, -1], leaf.tip)
     assert (leaf.stations[0], leaf.stations[-1]) == (0.0, 1.0)
@@ -59,7 +59,6 @@ def test_a_held_tip_pushes_back() -> None:
     vein = {**fan(1), "tip": {"held": "pinned", "position": [0.9, 0.0, 0.0]}}
     vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}
     leaf = leafdyn.relax(vein)
-    assert leaf.tip is not None
     assert leaf.tip_reaction is not None
     assert np.allclose(leaf.tip, [0.9, 0.0, 0.0], atol=1e-12)
     assert leaf.tip_reaction.tolist() == leaf.to_dict()["tip_reaction"]
@@ -162,11 +161,49 @@ def test_methods_agree() -> None:
 
 def test_one_grid_has_no_error_estimate() -> None:
     leaf = leafdyn.relax(fan(3), segments=10)
-    assert leaf.error_estimate is None
+    assert leaf.error_estimate == np.inf
     assert leaf.segments == [10]
     # Its nodes, and as many between them as make at least 17 stations.
     assert leaf.positions.shape == (3, 21, 3)
     assert leaf.curves.shape == (3, 11, 3)
+
+
+def test_frequencies_are_cycles_per_time() -> None:
+    vein = {**column(), "dynamics": {"density": 1.0, "rotary_inertia": 1e-6}}
+    leaf = leafdyn.modes(vein, 1)
+    # Of a cantilever, 1.8751^2/(2 pi) sqrt(EI/(rho L^4)).
+    assert leaf.frequencies is not None
+    assert leaf.frequencies[0] == pytest.approx(1.8751041**2 / (2 * np.pi), rel=1e-5)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_leaf_stays_where_it_starts(side: int) -> None:
+    buckled = leafdyn.example("elastica_buckled")
+    pushed = leafdyn.relax(buckled, set={"load.gravity": [0, 0.1 * side, 0]}, tolerance=1e-8)
+    for start in (pushed, pickle.loads(pickle.dumps(pushed))):
+        leaf = leafdyn.relax(buckled, start=start, tolerance=1e-8)
+        assert leaf.success and leaf.stable
+        # By elliptic integrals.
+        assert np.allclose(leaf.tip, [0.74101960607633, side * 0.59320764616489, 0], atol=leaf.error_estimate)
+    again = pickle.loads(pickle.dumps(leaf))
+    assert again.figure() == leaf.figure()
+
+
+def test_starts_that_are_refused(tmp_path: Path) -> None:
+    leaf = leafdyn.relax(fan(3))
+    for wrong, why in [
+        ({"scenario": fan(4)}, "start = a leaf of 3 rods: must have as many rods as the scenario, 4"),
+        ({"method": "shooting"}, "method = shooting: only the method semi-implicit begins from a given shape"),
+        ({"margin": True}, "start goes with neither margin nor path"),
+        ({"path": "release"}, "start goes with neither margin nor path"),
+    ]:
+        with pytest.raises(ValueError, match=re.escape(why)):
+            leafdyn.relax(**{"scenario": fan(3), "start": leaf, **wrong})  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="start = dict: must be a leaf at rest"):
+        leafdyn.relax(fan(3), start=fan(3))  # type: ignore[arg-type]
+    leaf.save(tmp_path, "json")
+    with pytest.raises(AttributeError, match="was not kept when it was pickled or written"):
+        leafdyn.relax(fan(3), start=leafdyn.load(tmp_path))  # type: ignore[arg-type]
 
 
 def test_modes() -> None:
@@ -174,6 +211,9 @@ def test_modes() -> None:
     assert leaf.frequencies is not None
     assert leaf.frequencies.shape == (4,)
     assert np.all(np.diff(leaf.frequencies) >= 0)
+    assert leaf.angular_frequencies is not None and leaf.eigenvalues is not None
+    assert np.allclose(leaf.angular_frequencies, 2 * np.pi * leaf.frequencies, rtol=1e-15)
+    assert np.allclose(leaf.angular_frequencies**2, leaf.eigenvalues, rtol=1e-14)
     assert leaf.mode_displacements.shape == (4, *leaf.curves.shape)
     # The base is held.
     assert not leaf.mode_displacements[:, :, 0].any()
@@ -213,13 +253,11 @@ def test_stations_between_nodes_keep_the_tolerance() -> None:
     exact = leafdyn.relax(file, tolerance=1e-11, stations=7)
     leaf = leafdyn.relax(file, tolerance=1e-9, stations=7)
     assert leaf.success
-    assert leaf.error_estimate is not None
     assert np.abs(leaf.positions - exact.positions).max() <= leaf.error_estimate <= 1e-9
 
 
 def test_repr_says_what_matters() -> None:
     leaf = leafdyn.relax(fan(5))
-    assert leaf.tip is not None
     words = repr(leaf)
     assert words.startswith("<Equilibrium fan: stable, tip (")
     assert f"{leaf.error_estimate:.1e}" in words

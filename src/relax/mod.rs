@@ -4,6 +4,7 @@
 pub(crate) mod accuracy;
 mod follow;
 mod follower;
+mod from_shape;
 mod grids;
 mod loading;
 mod nested;
@@ -51,6 +52,7 @@ pub use crate::shooting::Correction;
 pub use crate::words::UnknownWord as UnknownMethod;
 pub(crate) use follow::{Grids, Lost};
 pub use follower::{Followed, Follower};
+pub use from_shape::relax_from;
 pub(crate) use nested::NestedEquilibrium;
 pub use path::{Event, Happening, Path, Route, Stage};
 pub(crate) use rest::relax_on_grids;

@@ -303,7 +303,8 @@ impl Key {
         Key::REPEATED.contains(&self.parts().0)
     }
 
-    pub(crate) fn all() -> impl Iterator<Item = Key> {
+    /// All keys of the format, by tables.
+    pub fn all() -> impl Iterator<Item = Key> {
         FORMAT.iter().map(|row| row.key)
     }
 

@@ -12,6 +12,7 @@ mod error_estimate;
 mod every_tolerance;
 mod explicit_relaxation;
 mod extreme_leaves;
+mod from_shape;
 mod grips;
 mod growth;
 mod held_tips;

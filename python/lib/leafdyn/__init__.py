@@ -11,16 +11,18 @@ A scenario is a path, a text in TOML, or a dict of the same form. All quantities
 in. Every verb of the program ``leafdyn`` is a function here; it returns what the program writes into files.
 """
 
-from ._branches import Boundary, Branch, Curve, Trace
+from ._branches import Boundary, Branch, Curve, Piece, Trace
 from ._errors import LeafWarning, MissingScenarioError, ScenarioError
 from ._explore import Exploration, explore
-from ._fit import Candidate, Fit, Parameter, fit
+from ._fit import Candidate, Fit, Parameter
+from ._fitting import fit
 from ._follow import boundary, trace
 from ._format import Key, example, keys, new, schema
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._load import load
 from ._motion import Frame, Motion
+from ._predict import Prediction
 from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
@@ -28,6 +30,7 @@ from ._sensitivity import Sensitivity
 from ._simulate import frames, simulate
 from ._study import Chart, Check, Equilibria, Map
 from ._sweep import sweep
+from ._typed import ScenarioDict
 from ._verbs import chart, check, equilibria, stability_map
 from ._view import Page
 
@@ -56,8 +59,11 @@ __all__ = [
     "Motion",
     "Page",
     "Parameter",
+    "Piece",
+    "Prediction",
     "Result",
     "Scenario",
+    "ScenarioDict",
     "ScenarioError",
     "Sensitivity",
     "Source",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import operator
 import sys
-from collections.abc import Iterable
-from typing import SupportsIndex
+from collections.abc import Iterable, Sized
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -63,3 +63,15 @@ def texts(name: str, found: str | Iterable[str], example: str) -> list[str]:
     for word in listed:
         text(name, word, example)
     return listed
+
+
+MOST_NUMBERS = 4_000_000
+"""As of the entries of a scenario."""
+
+
+def few(name: str, found: Any) -> None:
+    """Refuse more numbers than anything here takes, before any is read."""
+    size = getattr(found, "size", None)
+    count = size if isinstance(size, int) else len(found) if isinstance(found, Sized) else 0
+    if count > MOST_NUMBERS:
+        raise ValueError(f"{name} has {count} numbers: at most {MOST_NUMBERS} are allowed")

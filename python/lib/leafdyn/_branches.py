@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._attribute import Attribute
-from ._data import column_variables, dataset, table
+from ._data import column_unit, column_variables, dataset, table
+from ._draw import axes, labelled
 from ._leaf import Array
 from ._result import Contents, Table, read_only
 from ._view import Viewed
@@ -27,6 +28,22 @@ def _points(
         thinned = [line[:, :: (line.shape[1] - 1) // least] for line in lines]
         variables["curves"] = (("point", "rod", "node", "component"), np.stack(thinned), (1, 0, 0))
     return dataset(variables, {}, units, {})
+
+
+class Piece(NamedTuple):
+    """A stretch of a branch along which the leaf is stable, or along which it is not.
+
+    Attributes
+    ----------
+    stable
+        Whether it is.
+    points
+        Its points, from one end to the other: ``branch.values[piece.points]``. Where stability changes at a critical
+        point, that belongs to both pieces.
+    """
+
+    stable: bool
+    points: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +120,36 @@ class Branch:
         """Where the folds and branch points are."""
         return np.flatnonzero(self.kinds != "regular")
 
+    @property
+    def pieces(self) -> list[Piece]:
+        """Its stable and unstable stretches, one after the other, parted at the critical points where stability changes.
+
+        Examples
+        --------
+        Euler's column stands straight as far as its critical load:
+
+        >>> import leafdyn
+        >>> column = {
+        ...     "name": "column",
+        ...     "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+        ...     "stiffness": {
+        ...         **{"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0},
+        ...         **{"axial": "inf", "shear_2": "inf", "shear_3": "inf"},
+        ...     },
+        ... }
+        >>> straight = leafdyn.trace(column, {"load.tip_force[0]": (-1, -4)}).branches[0]
+        >>> for piece in straight.pieces:
+        ...     print(piece.stable, straight.values[piece.points][[0, -1]].round(4))
+        True [-1.     -2.4674]
+        False [-2.4674 -4.    ]
+        """
+        steps = _stable_steps(self.stable, self.kinds != "regular")
+        if not len(steps):
+            return [Piece(bool(stable), slice(at, at + 1)) for at, stable in enumerate(self.stable)]
+        begins = np.flatnonzero(np.diff(steps, prepend=~steps[:1]))
+        ends = [*begins[1:], len(steps)]
+        return [Piece(bool(steps[begin]), slice(int(begin), int(end) + 1)) for begin, end in zip(begins, ends)]
+
     def to_pandas(self) -> Any:
         """Its `columns` as a ``pandas.DataFrame``."""
         return table(self.columns, self._units, {}, value=self.key)
@@ -113,6 +160,15 @@ class Branch:
 
     def __repr__(self) -> str:
         return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
+
+
+def _stable_steps(stable: NDArray[np.bool_], critical: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the leaf is stable between a point and the next, shape (P - 1,): as at the ends that are not critical."""
+    steps = (stable | critical)[:-1] & (stable | critical)[1:]
+    # Between two critical points that are neighbours stability is another than before.
+    for step in np.flatnonzero(critical[:-1] & critical[1:]):
+        steps[step] = bool(stable[step] and stable[step + 1] and step > 0 and not steps[step - 1])
+    return steps
 
 
 TIP = {axis: f"tip_{axis}" for axis in "xyz"}
@@ -178,20 +234,17 @@ class Trace(Table, Viewed):
         if show not in shown:
             raise ValueError(f"show = {show!r}: must be one of {', '.join(shown)}")
         column = shown[show]
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure().add_subplot()
-        for branch in self.branches:
+        ax = axes(ax)
+        for number, branch in enumerate(self.branches):
             values, height = branch.values, branch.columns[column]
-            (line,) = ax.plot(values, np.where(branch.stable, height, np.nan), **style)
-            unstable = ~branch.stable
-            # A dashed line begins where the solid one ends.
-            unstable[:-1] |= unstable[1:]
-            unstable[1:] |= ~branch.stable[:-1]
-            ax.plot(values, np.where(unstable, height, np.nan), "--", **{"color": line.get_color(), **style})
-            ax.plot(values[branch.critical], height[branch.critical], "o", color=line.get_color())
-        ax.set(xlabel=self.vary, ylabel=column.replace("_", " "))
+            drawn = style if number == 0 else {**style, "label": None}
+            for piece in branch.pieces:
+                dashes = {} if piece.stable else {"linestyle": "--"}
+                (line,) = ax.plot(values[piece.points], height[piece.points], **{**dashes, **drawn})
+                drawn = {"color": line.get_color(), **drawn, "label": None}
+            ax.plot(values[branch.critical], height[branch.critical], "o", color=drawn.get("color"))
+        across = labelled(self.vary, column_unit(self._units, self.vary))
+        ax.set(xlabel=across, ylabel=labelled(column.replace("_", " "), column_unit(self._units, column)))
         return ax
 
     def __repr__(self) -> str:
@@ -293,16 +346,14 @@ class Boundary(Table):
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the curves with matplotlib, the first number to the right and the second upwards; dots where they are
         cusps or cross."""
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.figure().add_subplot()
+        ax = axes(ax)
         for curve in self.curves:
             first, second = curve.values.T
             (line,) = ax.plot(first, second, **style)
             special = np.isin(curve.kinds, ["cusp", "crossing"])
             ax.plot(first[special], second[special], "o", color=line.get_color())
-        ax.set(xlabel=self.vary[0], ylabel=self.vary[1])
+        across, up = (labelled(key, column_unit(self._units, key)) for key in self.vary)
+        ax.set(xlabel=across, ylabel=up)
         return ax
 
     def __repr__(self) -> str:

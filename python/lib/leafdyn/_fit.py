@@ -1,25 +1,23 @@
-"""From measurements to the numbers of a scenario."""
+"""What measurements say of the numbers of a scenario."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
-from numbers import Integral
-from typing import Any, TypeAlias, Union
+from typing import Any
 
 import numpy as np
 
-from . import _leafdyn
-from ._arguments import numbers, switches, texts
+from ._arguments import texts
 from ._attribute import Attribute, computed
-from ._data import column_variables, dataset, pandas
+from ._data import column_unit, column_variables, dataset, pandas
+from ._draw import axes
 from ._leaf import Array
-from ._measured import Measured, measurements
-from ._progress import Progress, reporter
-from ._relax import warn
+from ._predict import Measurement, Prediction, draw, predicted, series
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
+from ._sweep import quantity
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,8 @@ class Parameter:
         Lower end of its 95 % interval; ``-inf`` where the data give no end.
     high
         Upper end; ``inf`` where the data give no end.
+    standard_error
+        Standard deviation of the value, to first order; ``inf`` where the data say nothing of it.
     determined
         Whether the data determine it.
     profiled
@@ -46,13 +46,14 @@ class Parameter:
     value: float
     low: float
     high: float
+    standard_error: float
     determined: bool
     profiled: bool
 
 
 def _parameter(entry: dict[str, Any]) -> Parameter:
     """As JSON has it, which has no infinity."""
-    open_ = {"low": -math.inf, "high": math.inf}
+    open_ = {"low": -math.inf, "high": math.inf, "standard_error": math.inf}
     return Parameter(**entry | {name: end for name, end in open_.items() if entry[name] is None})
 
 
@@ -78,6 +79,10 @@ class Candidate:
     remark: str | None = None
 
 
+TOLD = 4
+"""Numbers that a fit shows."""
+
+
 class Fit(Table):
     """What measurements say of P numbers of a scenario, and what they do not.
 
@@ -93,6 +98,14 @@ class Fit(Table):
     correlations = Attribute[Array](
         """Correlations of the numbers (of their logarithms where they are positive), shape (P, P), in the order of
     `parameters`; not a number where one is not determined."""
+    )
+    covariance = Attribute[Array](
+        """Covariance of the values, to first order, shape (P, P), in the order of `parameters`: the squares of their
+    standard errors on its diagonal, infinite of what the data say nothing of, and not a number beside these."""
+    )
+    coverage_factor = Attribute[float](
+        """Half the width of a 95 % interval in standard errors: 1.96, or more where the standard deviations are
+    estimated from few data."""
     )
     undetermined = Attribute[list[dict[str, float]]](
         """Combinations of which the data say nothing, or little: by their keys, exponents of positive numbers and
@@ -118,12 +131,28 @@ class Fit(Table):
         self.parameters = {entry["key"]: _parameter(entry) for entry in said["parameters"]}
         count = len(self.parameters)
         self.correlations = read_only(np.array(said["correlations"], dtype=np.float64).reshape(count, count))
-        for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
+        errors = np.array([one.standard_error for one in self.parameters.values()])
+        self.covariance = np.where(np.eye(count, dtype=bool), errors**2, self.correlations * np.outer(errors, errors))
+        read_only(self.covariance)
+        for name in (
+            "coverage_factor",
+            "remarks",
+            "undetermined",
+            "says",
+            "chi_squared",
+            "degrees_of_freedom",
+            "wall_seconds",
+        ):
             setattr(self, name, said[name])
         self.alternatives = said.get("alternatives", [])
         self.tried = said.get("tried", [])
         self.standard_deviation = said.get("standard_deviation")
         self.candidates = [Candidate(**entry) for entry in said.get("candidates", [])]
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """The standard errors of the free numbers by their keys, as in `parameters`."""
+        return {key: parameter.standard_error for key, parameter in self.parameters.items()}
 
     @property
     def values(self) -> dict[str, float]:
@@ -147,7 +176,7 @@ class Fit(Table):
         ----------
         table
             ``"data"``, a row a datum, as ``fit.csv``; ``"parameters"``, a row a free number: ``value``, ``low``,
-            ``high``, ``determined``, ``profiled``; or ``"correlations"``, a square.
+            ``high``, ``standard_error``, ``determined``, ``profiled``; or ``"correlations"``, a square.
         """
         keys = list(self.parameters)
         if table == "data":
@@ -161,15 +190,125 @@ class Fit(Table):
 
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset``: its table along ``datum``; the free numbers along ``parameter``, as ``value``, ``low``,
-        ``high`` and ``determined``, and ``correlations`` along ``parameter`` and ``other_parameter``."""
+        ``high``, ``standard_error`` and ``determined``, and ``correlations`` along ``parameter`` and ``other_parameter``."""
         free = list(self.parameters.values())
         variables = column_variables(self.columns, ("datum",))
-        for name in ("value", "low", "high", "determined"):
+        for name in ("value", "low", "high", "standard_error", "determined"):
             variables[name] = (("parameter",), np.array([getattr(one, name) for one in free]), None)
         variables["correlations"] = (("parameter", "other_parameter"), self.correlations, None)
         keys = list(self.parameters)
         coordinates = {"parameter": keys, "other_parameter": keys}
         return dataset(variables, coordinates, self._units, self._attrs)
+
+    def predict(self, conditions: Source | Mapping[str, Any], what: str | Iterable[str] | None = None) -> Prediction:
+        """What the fitted leaf does under other conditions, with 95 % bands.
+
+        Parameters
+        ----------
+        conditions
+            Columns by keys of the scenario, ``{"load.tip_force[0]": [5, 10, 15]}``, of which one number holds for all
+            rows; of a ``pandas.DataFrame`` also with columns of results, which are left out. Or a scenario, in which the
+            fitted values are put.
+        what
+            Results, as ``"tip_x"``, ``"reaction_z"``, ``"grip_1_y"``, ``"frequency_1"`` (cycles per time); left out: those
+            that were measured.
+
+        Returns
+        -------
+        Prediction
+            With ``values``, ``bands`` and ``leaves``. Leaves are those of `relax`.
+
+        Raises
+        ------
+        ScenarioError
+            If the scenario is refused with these values.
+        ValueError
+            If columns differ in length, or a result is not known.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> pull = {"load.tip_force[0]": [4, 8, 12, 16, 20], "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399]}
+        >>> known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
+        >>> found = leafdyn.fit("scenarios/measured/pull.toml", pull, "stiffness.axial", set=known)
+        >>> further = found.predict({"load.tip_force[0]": [10, 25]})
+        >>> further.values["tip_x"].round(3), further.bands["tip_x"].round(3)
+        (array([0.998, 1.061]), array([0.002, 0.005]))
+        """
+        measured = dict.fromkeys(name for name in self.columns["what"] if name not in ("x", "y", "z"))
+        names = texts("what", list(measured) if what is None else what, "tip_x")
+        if not names:
+            raise ValueError("what: points on veins alone were measured: name results, such as tip_x")
+        for name in names:
+            quantity(name)
+        table: Any = conditions
+        keys = [key for key, _ in table.items() if "." in str(key)] if hasattr(table, "items") else []
+        if keys:
+            columns = [np.asarray(table[key], dtype=np.float64) for key in keys]
+            try:
+                settings = dict(zip(keys, np.broadcast_arrays(*map(np.atleast_1d, columns))))
+            except ValueError:
+                raise ValueError("conditions: give all columns as many rows") from None
+            rows = (dict(zip(keys, row)) for row in zip(*settings.values()))
+            leaves = [Scenario(self.scenario, row) for row in rows]
+        else:
+            settings, leaves = {}, [Scenario(checked(table, None), self.values)]
+        return predicted(leaves, settings, names, self.values, self.coverage_factor**2 * self.covariance)
+
+    def plot(self, ax: Any = None, *, show: str | None = None, against: str | None = None) -> Any:
+        """Draw the measurements over the number that was varied with matplotlib, with their standard deviations, and the
+        fitted leaf with its 95 % band; above them the fitted values with their intervals.
+
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in a new figure.
+        show
+            What was measured, as ``"tip_x"``; left out: what was measured most often.
+        against
+            The key that varied; left out: that with most values. Numbers that varied in step with it are interpolated;
+            experiments that differ in others, too, have curves of their own.
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Raises
+        ------
+        ValueError
+            If nothing was varied, as where points on veins alone were measured.
+        """
+        measured: dict[str, list[Measurement]] = {}
+        said = self.to_dict()
+        settings = {entry["experiment"]: entry["settings"] for entry in said["experiments"]}
+        for row in said["residuals"]:
+            if settings[row["experiment"]]:
+                measured.setdefault(row["what"], []).append((settings[row["experiment"]], row["data"], row["sd"]))
+        if not measured:
+            aside = "draw `leafdyn.relax(fit.scenario).plot()`, and the points over it"
+            raise ValueError(f"no number of the scenario was varied in the experiments: {aside}")
+        show = max(measured, key=lambda name: len(measured[name])) if show is None else show
+        if show not in measured:
+            raise ValueError(f"show = {show!r}: must be one of {', '.join(measured)}")
+        varied: dict[str, set[float]] = {}
+        for here, _, _ in measured[show]:
+            for key, value in here.items():
+                varied.setdefault(key, set()).add(value)
+        against = max(varied, key=lambda key: len(varied[key])) if against is None else against
+        if against not in varied:
+            raise ValueError(f"against = {against!r}: must be one of {', '.join(varied)}")
+        ax = axes(ax)
+        groups = series(measured[show], against)
+        shown = [(group, self.predict(group.conditions, show)) for group in groups]
+        draw(ax, shown, (show, against), self._units)
+        ax.set_title("\n".join(self._interval(one) for one in self.parameters.values()), fontsize="small")
+        ax.legend()
+        return ax
+
+    def _interval(self, parameter: Parameter) -> str:
+        name = column_unit(self._units, parameter.key)
+        unit = "" if name in (None, "1") else f" {name}"
+        return f"{parameter.key} = {parameter.value:.4g}{unit} ({parameter.low:.4g} to {parameter.high:.4g})"
 
     def __repr__(self) -> str:
         known = [
@@ -184,137 +323,3 @@ class Fit(Table):
         if open_:
             words.append(f"{open_} not determined")
         return f"<Fit {self.name}: {', '.join(words)}>"
-
-
-Bounds: TypeAlias = Union[Sequence[float], Array, None]
-"""Of a free number: the lower and the upper one, or none."""
-
-TOLD = 4
-"""Numbers that a fit shows."""
-
-
-def fit(
-    scenario: Source,
-    data: Measured | Iterable[Measured],
-    free: str | Iterable[str] | Mapping[str, Bounds],
-    *,
-    set: Mapping[str, Any] | None = None,
-    robust: bool = False,
-    candidates: Measured | None = None,
-    columns: Mapping[str, str] | None = None,
-    every: int = 1,
-    tolerance: float | None = None,
-    progress: Progress = None,
-) -> Fit:
-    """Fit numbers of a scenario to measurements, and say what these determine and what they do not.
-
-    Parameters
-    ----------
-    scenario
-        Its numbers are where the fit starts.
-    data
-        Tables of measurements, one or a list: each the path of a CSV file, a dict of columns, or a
-        ``pandas.DataFrame``. Either experiments, a row each: columns are keys of the scenario
-        (``"load.tip_force[0]"``), results (``"tip_x"``, ``"reaction_z"``, ``"frequency_1"``), and ``"sd_"`` before a
-        result, its standard deviation. Or points on veins: ``"rod"``, counted from 1, ``"x"``, ``"y"``, ``"z"``, and
-        if they are known ``"sigma"``, ``"sd"`` and ``"experiment"``. One number is a column of it; none, and what is
-        not a number, is what was not measured.
-    free
-        Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
-        dict of a pair ``(low, high)``, or none, for each key.
-    robust
-        Whether data far off the others count less.
-    candidates
-        Experiments that could be made, as a table like the data: which would say most?
-    columns
-        What columns of the data are, by the names that these have there: a key, a result or another column of the
-        data, with a factor and an offset, as in ``{"Extension": "tip.position[0]:1e-3+0.12"}``. Other columns of
-        such a table are left out.
-    every
-        The first row of each table of data is read, and then every so many.
-
-    The others are those of `relax`.
-
-    Returns
-    -------
-    Fit
-        Whatever came out; its ``outcome`` says whether the data determine every number.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is refused.
-    FileNotFoundError
-        If the path of a table, or of the scenario, is not there.
-    ValueError
-        If the data or the free numbers cannot be used: it says what to change. The first row of columns is line 2.
-
-    Warns
-    -----
-    LeafWarning
-        If it is not at a minimum, the data do not determine every number, or something else is to be known.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> pull = {
-    ...     "load.tip_force[0]": [4, 8, 12, 16, 20],
-    ...     "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399],
-    ...     "sd_tip_x": 0.0005,
-    ... }
-    >>> known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
-    >>> found = leafdyn.fit(
-    ...     "scenarios/measured/pull.toml", pull, ["stiffness.axial", "stiffness.bending_2"], set=known
-    ... )
-    >>> found.outcome
-    'converged'
-    >>> axial = found.parameters["stiffness.axial"]
-    >>> print(f"{axial.value:.1f}, with 95 % from {axial.low:.1f} to {axial.high:.1f}")
-    58.1, with 95 % from 57.3 to 58.9
-    >>> leafdyn.relax(found.scenario).stable
-    True
-    """
-    switches(robust=robust)
-    numbers(tolerance=tolerance)
-    maps = _columns(columns)
-    if isinstance(every, bool) or not isinstance(every, Integral) or not 1 <= every < 2**63:
-        raise ValueError(f"every = {every!r}: must be a whole number from 1")
-    keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
-    leaf = checked(scenario, set)
-    tables = measurements(data, "data")
-    others = None if candidates is None else measurements(candidates, "candidates")[0]
-    with reporter(progress) as heard:
-        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), tolerance, heard))
-    for remark in found.remarks:
-        warn(found.name, remark)
-    if found.undetermined:
-        open_ = (" and ".join(combination) for combination in found.undetermined)
-        warn(found.name, f"the data do not determine {'; '.join(open_)}: see says, free fewer numbers or measure more")
-    return found
-
-
-def _columns(columns: Mapping[str, str] | None) -> list[str]:
-    """Names of columns as the program reads them."""
-    given: Any = {} if columns is None else columns
-    if not isinstance(given, Mapping) or not all(isinstance(text, str) for pair in given.items() for text in pair):
-        raise TypeError("columns: must be a dict of texts, as in {'Force': 'load.tip_force[0]'}")
-    return [f"{name}={quantity}" for name, quantity in given.items()]
-
-
-def _free(number: str, free: str | Iterable[str] | Mapping[str, Bounds]) -> str:
-    """A free number as the program reads it: its key, and its bounds if it has any."""
-    if isinstance(free, Mapping):
-        bounds: Any = free[number]
-        given = f"free: {number} = {bounds!r}"
-    else:
-        bounds = number.partition("=")[2].split("..") if "=" in number else None
-        given = f"free: {number}"
-    if bounds is None:
-        return number
-    try:
-        low, high = map(float, bounds)
-    except (TypeError, ValueError):
-        raise ValueError(f"{given}: bounds are two numbers, as in (1, 1e4) or stiffness.axial=1..1e4") from None
-    if low >= high:
-        raise ValueError(f"{given}: the first bound must be less than the second")
-    return f"{number}={low!r}..{high!r}" if isinstance(free, Mapping) else number

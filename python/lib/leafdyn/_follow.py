@@ -114,7 +114,7 @@ def trace(
     >>> trace.complete, bool(trace.branches[0].stable.all())
     (True, True)
     """
-    given = ranges(vary)
+    given = ranges(vary, lambda: checked(scenario, set).units)
     if not isinstance(vary, str) and len(given) != 2 and not (isinstance(vary, Mapping) and len(given) == 1):
         raise ValueError(f"vary has {len(given)} numbers: give one as a text, or a list of two")
     found: Trace | Boundary
@@ -187,7 +187,7 @@ def boundary(
     >>> bool(abs(force / bending / (-np.pi**2 / 4) - 1).max() < 1e-5)
     True
     """
-    both = ranges(vary)
+    both = ranges(vary, lambda: checked(scenario, set).units)
     if isinstance(vary, str) or len(both) != 2:
         raise ValueError(f"vary has {len(both)} number{'s' * (len(both) != 1)}: give two, in a dict or a list")
     found = _boundary(scenario, both[0], both[1], set, switch, keep_unstable, segments, tolerance, points, progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import NDArray
 
 from . import _leafdyn
 from ._attribute import Attribute, computed
-from ._data import ENERGY, QUANTITIES, dataset, node_table, node_variables
-from ._result import Kept, keep
+from ._data import ENERGY, QUANTITIES, column_unit, dataset, node_table, node_variables
+from ._draw import axes, curves, labelled, smooth, tangents
+from ._pickled import Drawn
+from ._result import keep
 from ._sensitivity import Sensitivity
 from ._view import Viewed
 
@@ -76,14 +79,15 @@ class Equilibrium(Viewed):
         return None if self.negative_eigenvalues is None else self.negative_eigenvalues == 0
 
     @property
-    def tip(self) -> Array | None:
+    def tip(self) -> Array | Any:
         """The joint tip, or the only rod's: shape (3,), lengths; none if there are several."""
         return self.tips[0] if len(self.tips) == 1 else None
 
     @computed
-    def error_estimate(self) -> float | None:
-        """Bound on the error of `positions`, in units of length; none on a single grid."""
-        return self._core.error_estimate
+    def error_estimate(self) -> float:
+        """Bound on the error of `positions`, in units of length; infinite on a single grid."""
+        bound = self._core.error_estimate
+        return math.inf if bound is None else bound
 
     @computed
     def tips(self) -> Array:
@@ -174,6 +178,11 @@ class Equilibrium(Viewed):
         return self._core.curve_stations()
 
     @computed
+    def _veins(self) -> tuple[Array, Array, Array]:
+        """Stations, positions and tangents through which its veins are drawn."""
+        return self._core.veins()
+
+    @computed
     def _modes(self) -> tuple[Array, Array] | None:
         return self._core.eigenvalues()
 
@@ -184,12 +193,18 @@ class Equilibrium(Viewed):
 
     @property
     def eigenvalue_errors(self) -> Array | None:
-        """Bounds on their errors, shape (modes,), not a number on a single grid."""
+        """Bounds on their errors, shape (modes,), infinite on a single grid."""
         return None if self._modes is None else self._modes[1]
 
     @property
     def frequencies(self) -> Array | None:
-        """Angular frequencies omega, shape (modes,), radians per time (over 2 pi: cycles); not a number of unstable modes."""
+        """Frequencies, shape (modes,), cycles per time; not a number of unstable modes, none if not known."""
+        angular = self.angular_frequencies
+        return None if angular is None else angular / (2.0 * np.pi)
+
+    @property
+    def angular_frequencies(self) -> Array | None:
+        """Angular frequencies omega, 2 pi times `frequencies`, shape (modes,), radians per time."""
         if self.eigenvalues is None:
             return None
         with np.errstate(invalid="ignore"):
@@ -211,9 +226,8 @@ class Equilibrium(Viewed):
 
     @computed
     def sensitivities(self) -> dict[str, Sensitivity]:
-        """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`.
-
-        There are none of a leaf that is not at rest, and of a number in which the leaf is not smooth."""
+        """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`. There
+        are none of a leaf that is not at rest, and of a number in which the leaf is not smooth."""
         if self._request is None or not self._request[1]["sensitivity"]:
             return {}
         places = {found[0]: found[1:] for found in self._core.position_changes()}
@@ -303,39 +317,46 @@ class Equilibrium(Viewed):
         Parameters
         ----------
         ax
-            Where; left out: axes in space, in a new figure.
+            Where, as on the axes of another leaf; left out: axes in space, in a new figure.
         style
-            What ``Axes.plot`` takes.
+            What ``Axes.plot`` takes. All veins have one colour, and one entry in a legend: the ``label``, which is the
+            name of the leaf if it is left out.
 
         Returns
         -------
         matplotlib Axes
-        """
-        if ax is None:
-            from matplotlib import pyplot
 
-            ax = pyplot.figure().add_subplot(projection="3d")
+        Raises
+        ------
+        ImportError
+            Without matplotlib: ``pip install './python[plot]'``.
+        """
+        ax = axes(ax, solid=True)
         solid = hasattr(ax, "get_zlim")
-        for curve in self.curves:
-            ax.plot(*(curve.T if solid else curve.T[[0, 2]]), **style)
-        unit = self.to_dict()["input"].get("units", {}).get("length")
-        x, y, z = (axis if unit is None else f"{axis} / {unit}" for axis in "xyz")
-        if solid:
-            ax.set(xlabel=x, ylabel=y, zlabel=z)
-        else:
-            ax.set(xlabel=x, ylabel=z)
+        shown = (0, 1, 2) if solid else (0, 2)
+        curves(ax, (vein.T[list(shown)] for vein in self._drawn()), self.name, style)
+        labels = [labelled("xyz"[axis], column_unit(self._units, "xyz"[axis])) for axis in shown]
+        ax.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels)))
         ax.set_aspect("equal")
         return ax
+
+    def _drawn(self) -> Array:
+        """Its veins as they are drawn: smooth, where their directors are known, shape (N, points, 3)."""
+        if isinstance(self._files, _leafdyn.Leaf) or "_veins" in self.__dict__:
+            return smooth(*self._veins)
+        if "rotations" in self.__dict__:
+            return smooth(self.stations, self.positions, tangents(self.lengths, self.rotations, self.strains))
+        return self.positions
 
     def __repr__(self) -> str:
         index = self.negative_eigenvalues
         stable = {None: "stability unknown", 0: "stable"}.get(index, f"unstable ({index} negative eigenvalues)")
         words = [stable if self.success else f"{self.outcome}, {stable}"]
+        within = f" within {self.error_estimate:.1e}" if math.isfinite(self.error_estimate) else ""
         if self.tip is not None:
-            within = "" if self.error_estimate is None else f" within {self.error_estimate:.1e}"
             words.append(f"tip ({', '.join(f'{x:.5g}' for x in self.tip)}){within}")
-        elif self.error_estimate is not None:
-            words.append(f"{self.rods} rods within {self.error_estimate:.1e}")
+        elif within:
+            words.append(f"{self.rods} rods{within}")
         return f"<Equilibrium {self.name}: {', '.join(words)}>"
 
     def __getstate__(self) -> dict[str, Any]:
@@ -348,33 +369,6 @@ class Equilibrium(Viewed):
         elif isinstance(self._files, _leafdyn.Leaf):
             state["_files"] = Drawn(self._files.contents("summary.json"), self._files.names(), self)
         return state
-
-
-class Drawn(Kept):
-    """The files of a leaf that has been pickled and knows what was asked: they are drawn again when they are asked
-    for, of the same numbers."""
-
-    def __init__(self, summary: bytes, names: list[str], leaf: Equilibrium) -> None:
-        super().__init__({"summary.json": summary})
-        self._names = names
-        self._leaf = leaf
-
-    def names(self) -> list[str]:
-        return self._names
-
-    def contents(self, name: str) -> bytes:
-        if name not in self.files:
-            self.files[name] = self._again().contents(name)
-        return self.files[name]
-
-    def _again(self) -> _leafdyn.Leaf:
-        leaf = self._leaf
-        assert leaf._request is not None
-        scenario, asked = leaf._request
-        again = _leafdyn.relax(scenario._core, asked, None)
-        if not np.array_equal(again.nodes("positions"), leaf.positions):
-            raise RuntimeError("this version of leafdyn finds other numbers than the pickled leaf has: solve it again")
-        return again
 
 
 _LATER = (
@@ -392,6 +386,7 @@ _LATER = (
     "stresses",
     "curves",
     "curve_stations",
+    "_veins",
     "_reaction",
     "_modes",
     "_mode_shapes",

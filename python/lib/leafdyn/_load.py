@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -135,11 +136,12 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
     """A leaf of its summary, and of a table of its nodes."""
     stations, positions = _array(said["stations"]), _array(said["positions"])
     state: Said = {name: said[name] for name in _SCALARS if name in said}
+    state["error_estimate"] = math.inf if said.get("error_estimate") is None else said["error_estimate"]
     if nodes is not None:
         state |= _quantities(nodes, positions.shape[:2])
         state.setdefault("stresses", None)
     eigenvalues = said.get("lowest_eigenvalues")
-    errors = said.get("eigenvalue_errors") or []
+    errors = [math.inf if bound is None else bound for bound in said.get("eigenvalue_errors") or []]
     tips = [said["tip"]] if said["tip"] is not None else said["tips"]
     entries = said.get("sensitivities") or []
     nowhere = np.empty((0, 0, 3))
@@ -181,7 +183,6 @@ _SCALARS = (
     "tolerance",
     "residual",
     "energy",
-    "error_estimate",
     "negative_eigenvalues",
     "neutral_directions",
     "wall_seconds",

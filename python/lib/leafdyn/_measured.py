@@ -11,6 +11,9 @@ from typing import Any, Protocol, TypeAlias, Union
 
 import numpy as np
 
+from ._arguments import few
+from ._quantities import plain
+
 
 class Columns(Protocol):
     """What has columns by their names, as a ``pandas.DataFrame``."""
@@ -26,15 +29,18 @@ Measured: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Columns]
 """What a table of measurements can be given as."""
 
 
-def measurements(data: Measured | Iterable[Measured], name: str) -> list[tuple[str, str] | str]:
-    """Tables as the program reads them: paths, and texts with what messages call them."""
+def measurements(
+    data: Measured | Iterable[Measured], name: str, units: Mapping[str, str]
+) -> list[tuple[str, str] | str]:
+    """Tables as the program reads them: paths, and texts with what messages call them; of a scenario with these names
+    of units."""
     one: Any = data
     if isinstance(one, (str, os.PathLike)) or hasattr(one, "items") or not isinstance(one, Iterable):
-        return [_table(one, name)]
-    return [_table(table, f"{name}[{number}]") for number, table in enumerate(one)]
+        return [_table(one, name, units)]
+    return [_table(table, f"{name}[{number}]", units) for number, table in enumerate(one)]
 
 
-def _table(table: Any, name: str) -> tuple[str, str] | str:
+def _table(table: Any, name: str, units: Mapping[str, str]) -> tuple[str, str] | str:
     if isinstance(table, (str, os.PathLike)):
         path = os.fspath(table)
         if not os.path.lexists(path):
@@ -43,12 +49,14 @@ def _table(table: Any, name: str) -> tuple[str, str] | str:
     if not hasattr(table, "items"):
         found = type(table).__name__
         raise TypeError(f"{name}: allowed are a path, a dict of columns and a pandas.DataFrame, not {found}")
-    return name, _text(table, name)
+    return name, _text(table, name, units)
 
 
-def _text(table: Columns, name: str) -> str:
+def _text(table: Columns, name: str, units: Mapping[str, str]) -> str:
     """It as CSV."""
-    columns = {str(key): _column(column, f"{name}: {key}") for key, column in _named(table)}
+    columns = {
+        str(key): _column(plain(column, str(key), lambda: units), f"{name}: {key}") for key, column in _named(table)
+    }
     rows = max((len(column) for column in columns.values() if len(column) != 1), default=1)
     for key, column in columns.items():
         if len(column) not in (1, rows):
@@ -71,6 +79,7 @@ def _named(table: Columns) -> list[tuple[Any, Any]]:
 
 def _column(column: Any, place: str) -> list[str]:
     """Its cells; of one number, that one."""
+    few(place, column)
     try:
         values = np.asarray(column, dtype=object)
     except ValueError:

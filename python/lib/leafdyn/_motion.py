@@ -11,7 +11,8 @@ import numpy as np
 
 from . import _leafdyn
 from ._attribute import Attribute
-from ._data import ENERGY, QUANTITIES, dataset, node_table, node_variables
+from ._data import ENERGY, QUANTITIES, column_unit, dataset, node_table, node_variables, unit
+from ._draw import axes, curves, labelled
 from ._leaf import Array
 from ._result import KINDS, chosen, kind
 from ._view import Viewed
@@ -134,17 +135,28 @@ class Motion(Viewed):
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the coordinate of the tip that varies most in time with matplotlib; of a held tip, that of the middle of
-        the veins."""
-        if ax is None:
-            from matplotlib import pyplot
+        the veins. Axes have the units that the scenario names.
 
-            ax = pyplot.figure().add_subplot()
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in a new figure.
+        style
+            What ``Axes.plot`` takes; the ``label`` is the name of the leaf if it is left out.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes(ax)
         held = "tip" in self.to_dict()["input"]
         points = self.positions[:, :, self.positions.shape[2] // 2] if held else self.tips
         changes = np.ptp(points, axis=0).max(axis=0)
-        most = max((2, 1, 0), key=lambda axis: float(changes[axis]))
-        ax.plot(self.times, points[..., most], **style)
-        ax.set(xlabel="time", ylabel=f"{'middle' if held else 'tip'} {'xyz'[most]}")
+        most = "xyz"[max((2, 1, 0), key=lambda axis: float(changes[axis]))]
+        lines = ((self.times, height) for height in points[..., "xyz".index(most)].T)
+        curves(ax, lines, self.name, style)
+        height = labelled(f"{'middle' if held else 'tip'} {most}", column_unit(self._units, most))
+        ax.set(xlabel=labelled("time", unit(self._units, (0, 0, 1))), ylabel=height)
         return ax
 
     def __repr__(self) -> str:

@@ -10,7 +10,8 @@ from typing import Any, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arguments import texts
+from ._arguments import few, texts
+from ._quantities import Units, plain
 
 Range: TypeAlias = Union[
     tuple[float, float], tuple[float, float, str], tuple[float, float, int], tuple[float, float, int, str], ArrayLike
@@ -26,14 +27,14 @@ Given: TypeAlias = Union[str, tuple[str, list[float], bool]]
 FORMS = '(low, high), (low, high, "log"), (low, high, count) and an array that ascends or descends'
 
 
-def ranges(vary: Vary) -> list[Given]:
-    """Numbers that vary, as the program takes them.
+def ranges(vary: Vary, units: Units = dict) -> list[Given]:
+    """Numbers that vary, as the program takes them, in a scenario with these names of units.
 
     >>> ranges({"load.gravity[2]": (-1, -4, 3)})
     ['load.gravity[2]=-1.0..-4.0:3']
     """
     if isinstance(vary, Mapping):
-        return [_given(key, span) for key, span in vary.items()]
+        return [_given(key, plain(span, key, units)) for key, span in vary.items()]
     return list(texts("vary", vary, "load.gravity[2]=-1..-2"))
 
 
@@ -51,6 +52,7 @@ def _given(key: str, span: Range) -> Given:
 
 def values(key: str, span: Any) -> list[Any]:
     """What a number takes one after the other: those of a range, or of any list."""
+    few(key, span)
     ends = _ends(span)
     if ends is None:
         if isinstance(span, (str, Mapping)) or not isinstance(span, Iterable):
@@ -85,6 +87,7 @@ def _ends(span: Any) -> tuple[float, float, int | None, bool] | None:
 
 
 def _array(key: str, span: Any) -> NDArray[np.float64]:
+    few(key, span)
     try:
         values = np.asarray(span, dtype=np.float64)
     except (TypeError, ValueError):

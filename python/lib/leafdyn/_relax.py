@@ -28,14 +28,25 @@ def asked_for(
     sensitivity: Iterable[str] = (),
     margin: bool = False,
     path: str = "loading",
+    start: Equilibrium | None = None,
 ) -> dict[str, Any]:
-    asked = {**locals(), "sensitivity": list(sensitivity)}
+    asked = {**locals(), "sensitivity": list(sensitivity), "start": None if start is None else _shape(start)}
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
     numbers(tolerance=tolerance)
     switches(keep_unstable=keep_unstable, full_model=full_model, mode_shapes=mode_shapes, margin=margin)
     text("method", method, "semi-implicit")
     text("path", path, "loading")
+    if start is not None and (margin or path != "loading"):
+        raise ValueError(f"start goes with neither margin nor path = {path!r}: it is where the leaf begins")
     return asked
+
+
+def _shape(start: Equilibrium) -> dict[str, list[float]]:
+    """A leaf as the program takes it, one number after the other."""
+    if not isinstance(start, Equilibrium):
+        raise TypeError(f"start = {type(start).__name__}: must be a leaf at rest, as relax returns it")
+    names = ("stations", "lengths", "positions", "rotations", "forces")
+    return {name: getattr(start, name).ravel().tolist() for name in names}
 
 
 def warn(name: str, *remarks: str | None) -> None:
@@ -52,6 +63,7 @@ def relax(
     segments: SupportsIndex | None = None,
     intervals: SupportsIndex | None = None,
     path: str = "loading",
+    start: Equilibrium | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: SupportsIndex = 0,
@@ -78,6 +90,9 @@ def relax(
     path
         Which equilibrium, where there are several: ``"loading"``, that of a leaf which is loaded slowly, or
         ``"release"``, that of one released from arcs under all of its loads.
+    start
+        A leaf at rest with as many rods, from which this one moves on by the method ``"semi-implicit"``: it stays in
+        the valley in which it is, where there are several equilibria. Left out: it is loaded as `path` says.
     keep_unstable
         Stop at a saddle instead of leaving it.
     full_model
@@ -116,9 +131,29 @@ def relax(
     ('converged', True)
     >>> leaf.tip.round(6)
     array([ 0.956663,  0.047746, -0.147358])
+
+    A column that buckled to the right stays there when what pushed it is gone:
+
+    >>> column = leafdyn.example("elastica_buckled")
+    >>> pushed = leafdyn.relax(column, set={"load.gravity": [0, -0.1, 0]})
+    >>> alone = leafdyn.relax(column, start=pushed)
+    >>> alone.tip.round(5), alone.stable
+    (array([ 0.74102, -0.59321,  0.     ]), True)
     """
     asked = asked_for(
-        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, (), margin, path
+        method,
+        tolerance,
+        segments,
+        intervals,
+        keep_unstable,
+        full_model,
+        modes,
+        False,
+        stations,
+        (),
+        margin,
+        path,
+        start,
     )
     leaf = checked(scenario, set)
     with reporter(progress) as heard:

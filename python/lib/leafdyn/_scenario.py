@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from typing import Any, TypeAlias, Union
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from . import _leafdyn
 from ._errors import MissingScenarioError, ScenarioError
+from ._quantities import plain
 
 
 class Scenario:
@@ -19,7 +21,8 @@ class Scenario:
     Parameters
     ----------
     source
-        A path; a text in TOML or JSON; a dict of the same form, in which lists may be arrays; or another scenario. A
+        A path; a text in TOML or JSON; a dict of the same form, in which lists may be arrays, ranges and series, and
+        numbers quantities of pint (in the units that the scenario names); or another scenario. A
         string with a line break is a text, and so is one that contains an equals sign or begins with a brace, unless it
         ends in ``.toml`` or ``.json``.
     set
@@ -48,6 +51,8 @@ class Scenario:
     def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
         if set is not None and not isinstance(set, Mapping):
             raise TypeError(f'set = {set!r}: a dict is wanted, such as {{"leaf.rods": 5}}')
+        if "pint" in sys.modules:
+            source, set = _without_units(source, set or {})
         entries = _leafdyn.overrides(set) if set else []
         if isinstance(source, Scenario):
             self._core = source._core.replaced(entries) if entries else source._core
@@ -121,6 +126,18 @@ class Scenario:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return restored, self._key()
+
+
+def _without_units(source: Any, set: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
+    """Both, with quantities of pint as numbers."""
+
+    def units() -> dict[str, str]:
+        found = source.get("units", {}) if isinstance(source, Mapping) else Scenario(source).units
+        replaced = {key: name for key, name in set.items() if key.startswith("units.")}
+        return {**found, **{key.removeprefix("units."): name for key, name in replaced.items()}}
+
+    entries = {key: plain(value, key, units) for key, value in set.items()}
+    return (plain(source, "", units) if isinstance(source, Mapping) else source), entries
 
 
 Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]

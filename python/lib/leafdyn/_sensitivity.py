@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,21 +17,20 @@ Array = NDArray[np.float64]
 class Sensitivity:
     """Changes of the results of a leaf with N rods at rest: by one unit of the number, in the units of the scenario.
 
-    Numbers are those of ``summary.json``. What is not known is none, or not a number in an array. See
-    `leafdyn.sensitivities`.
+    Numbers are those of ``summary.json``. What is not known is none, or not a number in an array, and a bound that is
+    not known is infinite. See `leafdyn.sensitivities`.
     """
 
     key = Attribute[str]("The key of the number.")
     value = Attribute[float]("Its value.")
     tips = Attribute[Array]("Change of the joint tip alone, shape (1, 3), or of every tip, shape (N, 3).")
-    tip_error = Attribute[float | None]("Bound on its error; none on a single grid, as of the others.")
+    tip_error = Attribute[float]("Bound on its error; infinite on a single grid, as of the others.")
     energy = Attribute[float | None]("Change of the energy.")
-    energy_error = Attribute[float | None]("Bound on its error.")
+    energy_error = Attribute[float]("Bound on its error.")
     lowest_eigenvalue = Attribute[float | None]("Change of the lowest eigenvalue: of the squared angular frequency.")
-    lowest_eigenvalue_error = Attribute[float | None]("Bound on its error.")
+    lowest_eigenvalue_error = Attribute[float]("Bound on its error.")
     frequencies = Attribute[Array](
-        """Changes of the frequencies, cycles per time (`Equilibrium.frequencies` are angular), shape (modes,); without a
-    bound on their errors."""
+        """Changes of the frequencies, cycles per time, shape (modes,); without a bound on their errors."""
     )
     tip_reaction = Attribute[Array | None](
         """Change of the force that the holder of the tip feels, shape (3,); none if the tip is free."""
@@ -38,11 +38,11 @@ class Sensitivity:
     tip_reaction_moments = Attribute[Array | None](
         """Change of the moments that the holder of a clamped tip feels, shape (N, 3); none of another."""
     )
-    tip_reaction_error = Attribute[float | None]("Bound on the error of the force.")
+    tip_reaction_error = Attribute[float]("Bound on the error of the force.")
     grip_reactions = Attribute[list[tuple[Array, Array | None]]](
         """Of every grip the change of the force that its holder feels, shape (3,), and of the moment if it is clamped."""
     )
-    grip_reactions_error = Attribute[float | None]("Bound on the error of these forces.")
+    grip_reactions_error = Attribute[float]("Bound on the error of these forces.")
     stations = Attribute[Array](
         """Fractions of the length at which `positions` are, shape (K + 1,): nodes that all grids have."""
     )
@@ -50,41 +50,37 @@ class Sensitivity:
         """Changes of the centerlines, shape (N, K + 1, 3); with more than 100 numbers there may be none, shape (0, 0,
         3)."""
     )
-    positions_error = Attribute[float | None]("Bound on their error.")
+    positions_error = Attribute[float]("Bound on their error.")
 
     def __init__(self, entry: dict[str, Any], stations: Array, positions: Array, positions_error: float | None) -> None:
-        self.__dict__.update({name: entry.get(name) for name in _NUMBERS})
+        self.__dict__.update({name: entry.get(name) for name in ("key", "value", "energy", "lowest_eigenvalue")})
+        self.__dict__.update({name: _bound(entry.get(name)) for name in _BOUNDS})
         self.tips = np.array(entry.get("tips") or [entry["tip"]], dtype=np.float64)
         self.frequencies = np.array(entry.get("frequencies", []), dtype=np.float64)
         self.tip_reaction = _vectors(entry.get("tip_reaction"))
         self.tip_reaction_moments = _vectors(entry.get("tip_reaction_moments"))
         grips = entry.get("grip_reactions", [])
         self.grip_reactions = [(np.array(grip["force"], dtype=float), _vectors(grip.get("moment"))) for grip in grips]
-        self.stations, self.positions, self.positions_error = stations, positions, positions_error
+        self.stations, self.positions, self.positions_error = stations, positions, _bound(positions_error)
         read_only(self.__dict__)
 
     @property
-    def tip(self) -> Array | None:
+    def tip(self) -> Array | Any:
         """Change of the joint tip, or of the only rod's, shape (3,); none if there are several."""
         return self.tips[0] if len(self.tips) == 1 else None
 
     def __repr__(self) -> str:
         tip = "" if self.tip is None else f", tip ({', '.join(f'{x:.5g}' for x in self.tip)})"
-        within = "" if self.tip_error is None else f" within {self.tip_error:.1e}"
+        within = f" within {self.tip_error:.1e}" if math.isfinite(self.tip_error) else ""
         return f"<Sensitivity by {self.key} = {self.value:.6g}{tip}{within}>"
 
 
-_NUMBERS = (
-    "key",
-    "value",
-    "tip_error",
-    "energy",
-    "energy_error",
-    "lowest_eigenvalue",
-    "lowest_eigenvalue_error",
-    "tip_reaction_error",
-    "grip_reactions_error",
-)
+_BOUNDS = ("tip_error", "energy_error", "lowest_eigenvalue_error", "tip_reaction_error", "grip_reactions_error")
+
+
+def _bound(error: float | None) -> float:
+    """That of JSON, which has no infinity."""
+    return math.inf if error is None else error
 
 
 def _vectors(numbers: list[Any] | None) -> Array | None:

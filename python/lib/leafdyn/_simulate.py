@@ -97,7 +97,8 @@ def frames(
     step: float | None = None,
     tolerance: float | None = None,
 ) -> Iterator[Frame]:
-    """Follow a leaf as it moves, an output at a time, so that memory does not grow. Parameters are those of `simulate`.
+    """Follow a leaf as it moves, an output at a time, so that memory does not grow. Parameters are those of `simulate`;
+    what cannot be done is refused at once, not with the first output.
 
     Returns
     -------
@@ -126,6 +127,10 @@ def frames(
     True
     """
     leaf, core = _motion(scenario, set, method, segments, step, tolerance)
+    return _outputs(leaf, core)
+
+
+def _outputs(leaf: Scenario, core: _leafdyn.Motion) -> Iterator[Frame]:
     warn(leaf.name, *core.doubts)
     outputs: dict[str, Any] | None = core.frame()
     while outputs is not None:

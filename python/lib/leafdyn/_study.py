@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._attribute import Attribute
-from ._data import column_variables, dataset, pandas, table, xarray
+from ._data import ENERGY, column_variables, dataset, pandas, table, unit, xarray
+from ._draw import axes, labelled
 from ._leaf import Array, Equilibrium
 from ._result import Contents, Result, Table
 from ._view import Viewed
@@ -102,6 +103,20 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
         return found.assign_coords(equilibrium=range(len(leaves))).assign(
             starts=("equilibrium", self.starts), plain=("equilibrium", self.plain)
         )
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw all of them with matplotlib, each in a colour: solid if it is stable, dashed if not; with their energies
+        in a legend. The parameters are those of `Equilibrium.plot`."""
+        ax = axes(ax, solid=True)
+        energies = labelled("energy", unit(self._units, ENERGY))
+        for number, leaf in enumerate(self):
+            kind = {} if leaf.stable else {"linestyle": "--"}
+            stable = {None: "stability unknown", True: "stable", False: "unstable"}[leaf.stable]
+            energy = "not known" if leaf.energy is None else f"{leaf.energy:.5g}"
+            leaf.plot(ax, **{"color": f"C{number % 10}", "label": f"{energy}, {stable}", **kind, **style})
+        if len(self):
+            ax.legend(title=energies)
+        return ax
 
     def __repr__(self) -> str:
         stable = sum(leaf.stable is True for leaf in self)

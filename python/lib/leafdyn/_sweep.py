@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import product
-from math import nan, pi
+from math import nan
 from typing import Any, SupportsIndex
 
 import numpy as np
@@ -15,6 +15,7 @@ from . import _leafdyn
 from ._data import column_unit, pandas
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
+from ._quantities import plain
 from ._range import Range, values
 from ._relax import asked_for, relaxed, warn
 from ._scenario import Scenario, Source, checked
@@ -68,7 +69,8 @@ def sweep(
         keys joined by ``+`` take the same values.
     columns
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"reaction_x"`` and so on (of a
-        held tip), ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``, ``"neutral_directions"``,
+        held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``,
+        ``"neutral_directions"``,
         ``"error_estimate"``, ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
         ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time); or a dict of functions
         of an `Equilibrium`.
@@ -80,8 +82,8 @@ def sweep(
     Returns
     -------
     pandas.DataFrame
-        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA). ``attrs["units"]`` has the
-        units that the scenario names, by columns.
+        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA), a bound infinite.
+        ``attrs["units"]`` has the units that the scenario names, by columns.
 
     Raises
     ------
@@ -112,7 +114,7 @@ def sweep(
     wanted, modes = _wanted(columns)
     asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, None, path=path)
     base = checked(scenario, set)
-    axes = {key: values(key, span) for key, span in vary.items()}
+    axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point))) for point in grid]
     if client is None:
@@ -174,22 +176,23 @@ def _wanted(columns: str | Iterable[str] | Mapping[str, Of]) -> tuple[dict[str, 
     if isinstance(columns, Mapping):
         return dict(columns), 0
     names = [columns] if isinstance(columns, str) else list(columns)
-    found = {name: _known(name) for name in names}
+    found = {name: quantity(name) for name in names}
     modes = [int(name.rpartition("_")[2]) for name in names if name.startswith("frequency_")]
     return found, max([*modes, int("lowest_eigenvalue" in names)], default=0)
 
 
-def _known(name: str) -> Of:
+def quantity(name: str) -> Of:
+    """What a name of a result means."""
     if name in _PLAIN:
         return partial(_attribute, name=name)
     if name == "lowest_eigenvalue":
-        return partial(_mode, number=0, scale=None)
-    place = re.fullmatch(r"(tip|reaction)_([xyz])", name)
+        return partial(_mode, number=0, of="eigenvalues")
+    place = re.fullmatch(r"(tip|reaction|grip_[1-9]\d{0,5})_([xyz])", name)
     if place:
         return partial(_component, vector=place[1], axis="xyz".index(place[2]))
     mode = re.fullmatch(r"frequency_([1-9]\d{0,5})", name)
     if mode:
-        return partial(_mode, number=int(mode[1]) - 1, scale=2 * pi)
+        return partial(_mode, number=int(mode[1]) - 1, of="frequencies")
     others = "tip_x, reaction_x, lowest_eigenvalue, frequency_1"
     raise ValueError(
         f"columns: {name!r} is not known: must be {others} or the like, {', '.join(_PLAIN)}, or a function"
@@ -201,13 +204,18 @@ def _attribute(leaf: Equilibrium, name: str) -> Any:
 
 
 def _component(leaf: Equilibrium, vector: str, axis: int) -> float:
-    found = leaf.tips[0] if vector == "tip" else leaf.tip_reaction
+    found: Any
+    if vector.startswith("grip_"):
+        grip = int(vector.removeprefix("grip_")) - 1
+        found = leaf.grip_reactions[grip][0] if grip < len(leaf.grip_reactions) else None
+    else:
+        found = leaf.tips[0] if vector == "tip" else leaf.tip_reaction
     return nan if found is None else float(found[axis])
 
 
-def _mode(leaf: Equilibrium, number: int, scale: float | None) -> float:
-    found = leaf.eigenvalues if scale is None else leaf.frequencies
-    return nan if found is None or number >= len(found) else float(found[number] / (scale or 1.0))
+def _mode(leaf: Equilibrium, number: int, of: str) -> float:
+    found = getattr(leaf, of)
+    return nan if found is None or number >= len(found) else float(found[number])
 
 
 def _varied(column: list[Any]) -> Any:
@@ -224,6 +232,6 @@ def _column(package: Any, name: str, column: list[Any]) -> Any:
     kinds = {"stable": "boolean", "negative_eigenvalues": "Int64"}
     if name in kinds:
         return package.array(column, dtype=kinds[name])
-    if name in ("energy", "error_estimate", "residual"):
+    if name in ("energy", "residual"):
         return np.array([nan if value is None else value for value in column], dtype=np.float64)
     return _varied(column)

@@ -157,7 +157,7 @@ def stability_map(
     """
     numbers(tolerance=tolerance, cell_seconds=cell_seconds)
     text("show", show, "outcomes")
-    axes = ranges(vary)
+    axes = ranges(vary, lambda: checked(scenario, set).units)
     words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
     with reporter(progress) as heard:

@@ -9,7 +9,7 @@ use super::experiments::Observed;
 use super::least_squares::End;
 use super::model::Model;
 use super::quantity::Kind;
-use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
+use super::result::{Fit, FitExperiment, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
 use super::statistics::{OPEN, Statistics};
 use super::words::{self, Undetermined};
 use crate::relax::Lost;
@@ -73,8 +73,10 @@ pub(super) fn fit(
             false => stats.residuals.norm_squared() / stats.spread.powi(2).max(f64::MIN_POSITIVE),
         },
         degrees_of_freedom: stats.freedom,
+        coverage_factor: stats.quantile,
         standard_deviation: (!stats.known).then_some(stats.spread * stats.weighting.assumed),
         files: Vec::new(),
+        experiments: experiments(stats),
         residuals: compared(stats),
         candidates,
         work: FitWork {
@@ -218,14 +220,31 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
     open
 }
 
+/// The experiments in the order of the data, which that of the leaves need not be.
+fn observed<'s>(stats: &'s Statistics) -> Vec<&'s Observed> {
+    let cases = stats.model.cases.iter();
+    let mut observed: Vec<_> = cases.flat_map(|case| &case.observed).collect();
+    observed.sort_by_key(|it| it.number);
+    observed
+}
+
+fn experiments(stats: &Statistics) -> Vec<FitExperiment> {
+    let experiment = |observed: &Observed| {
+        let settings = observed.experiment.settings.iter();
+        FitExperiment {
+            experiment: observed.experiment.name.clone(),
+            settings: settings
+                .map(|(keys, value)| (keys.to_string(), *value))
+                .collect(),
+        }
+    };
+    observed(stats).into_iter().map(experiment).collect()
+}
+
 fn compared(stats: &Statistics) -> Vec<FitResidual> {
     let mut all: Vec<_> = stats.point.components().zip(stats.bands()).collect();
-    // In the order of the data, which that of the leaves need not be.
     all.sort_by_key(|(component, _)| component.experiment);
-    let mut observed: Vec<&Observed> = (stats.model.cases.iter())
-        .flat_map(|case| &case.observed)
-        .collect();
-    observed.sort_by_key(|it| it.number);
+    let observed = observed(stats);
     let of = |number: usize| {
         let found = observed.binary_search_by_key(&number, |it| it.number);
         found.map_or_else(|_| String::new(), |at| observed[at].experiment.name.clone())

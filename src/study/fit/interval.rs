@@ -45,6 +45,7 @@ fn unknown(stats: &Statistics, k: usize) -> FitParameter {
         value: free.value(stats.point.theta[k]),
         low,
         high,
+        standard_error: None,
         determined: false,
         profiled: false,
         lost: [None; 2],
@@ -64,7 +65,9 @@ fn parameter(
         return Ok(parameter);
     }
     let (low, high) = (parameter.low, parameter.high);
-    let half = stats.quantile * stats.deviation(k).0;
+    let own = stats.deviation(k).0;
+    parameter.standard_error = Some(own * free.slope(theta));
+    let half = stats.quantile * own;
     let mut sides = [Reach::End(half); 2];
     let (deviation, along) = shape.deviation(k);
     let first = shape.quantile * deviation;

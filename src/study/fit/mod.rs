@@ -39,8 +39,8 @@ pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
 pub use free::Free;
 pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{
-    Fit, FitAlternative, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitStep,
-    FitWork,
+    Fit, FitAlternative, FitCandidate, FitExperiment, FitLeaf, FitOutcome, FitParameter,
+    FitResidual, FitStep, FitWork,
 };
 
 use crate::clock::Instant;

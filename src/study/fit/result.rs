@@ -34,6 +34,8 @@ pub struct FitParameter {
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
+    /// Standard deviation of the value, to first order; `None` if the data are insensitive to it.
+    pub standard_error: Option<f64>,
     /// Whether the data determine it within a factor of ten.
     pub determined: bool,
     /// Whether the interval is that of the profile likelihood, since the quadratic approximation at
@@ -43,6 +45,15 @@ pub struct FitParameter {
     /// there is not known.
     #[serde(skip)]
     pub lost: [Option<f64>; 2],
+}
+
+/// An experiment with data.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitExperiment {
+    /// Its name.
+    pub experiment: String,
+    /// What was set, by keys.
+    pub settings: BTreeMap<String, f64>,
 }
 
 /// One scalar datum.
@@ -149,12 +160,17 @@ pub struct Fit {
     pub chi_squared: f64,
     /// Degrees of freedom: data minus determined combinations.
     pub degrees_of_freedom: usize,
+    /// Half the width of a 95 % interval in standard errors: of the normal distribution, or of
+    /// Student's if the deviations of the data are estimated.
+    pub coverage_factor: f64,
     /// Standard deviation of all data, if none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
     /// The files of data.
     #[serde(skip)]
     pub files: Vec<DataFile>,
+    /// The experiments in the order of the data.
+    pub experiments: Vec<FitExperiment>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
     /// Candidate experiments, the most informative first.

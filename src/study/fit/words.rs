@@ -161,6 +161,7 @@ mod tests {
             value: 1.0,
             low: None,
             high: None,
+            standard_error: None,
             determined: false,
             profiled: false,
             lost: [None; 2],

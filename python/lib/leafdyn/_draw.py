@@ -1,0 +1,72 @@
+"""What drawings with matplotlib have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+PARTS = 8
+"""Straight parts of which a vein is drawn between two of its stations."""
+
+
+def pyplot() -> Any:
+    """The package, if it is there."""
+    try:
+        from matplotlib import pyplot
+    except ImportError as missing:
+        raise ImportError("plot() needs matplotlib: pip install './python[plot]'") from missing
+    return pyplot
+
+
+def axes(ax: Any, solid: bool = False) -> Any:
+    """The given axes, or new ones in a new figure, in space if they are to be `solid`."""
+    if ax is not None:
+        return ax
+    return pyplot().figure().add_subplot(projection="3d" if solid else None)
+
+
+def labelled(text: str, unit: str | None) -> str:
+    """The label of an axis: what is along it, and its unit if that has a name."""
+    return text if unit in (None, "1") else f"{text} / {unit}"
+
+
+def smooth(
+    stations: NDArray[np.float64], positions: NDArray[np.float64], tangents: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Curves through positions (N, K + 1, 3) at stations (K + 1,), with these tangents (changes with the station): cubic
+    Hermite polynomials, at PARTS K + 1 points.
+
+    >>> import numpy as np
+    >>> at = np.array([0.0, 1.0])
+    >>> parabola = smooth(at, np.array([[[0.0], [1.0]]]), np.array([[[0.0], [2.0]]]))
+    >>> bool(np.allclose(parabola[0, :, 0], np.linspace(0, 1, PARTS + 1) ** 2))
+    True
+    """
+    t = np.linspace(0.0, 1.0, PARTS, endpoint=False)[:, None]
+    width = np.diff(stations)[None, :, None, None]
+    begin, end = positions[:, :-1, None], positions[:, 1:, None]
+    out, into = width * tangents[:, :-1, None], width * tangents[:, 1:, None]
+    step = end - begin
+    curve = begin + t * (out + t * (3.0 * step - 2.0 * out - into + t * (out + into - 2.0 * step)))
+    inside = curve.reshape(len(positions), -1, positions.shape[-1])
+    return np.concatenate([inside, positions[:, -1:]], axis=1)
+
+
+def tangents(
+    lengths: NDArray[np.float64], rotations: NDArray[np.float64], strains: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Changes of positions with the station: of rods of these lengths, strains v along the directors."""
+    w, turn = rotations[..., :1], rotations[..., 1:]
+    across = 2.0 * np.cross(turn, strains)
+    return lengths[:, None, None] * (strains + w * across + np.cross(turn, across))
+
+
+def curves(ax: Any, lines: Iterable[Any], label: str, style: dict[str, Any]) -> None:
+    """Draw curves, each a list of coordinates, in one colour and with one entry in a legend."""
+    style = {"label": label, **style}
+    for line in lines:
+        (drawn,) = ax.plot(*line, **style)
+        style = {**style, "color": drawn.get_color(), "label": None}
