@@ -146,9 +146,9 @@ impl Scenario {
     }
 
     #[getter]
-    fn units(&self) -> (Option<&str>, Option<&str>) {
+    fn units(&self) -> [Option<&str>; 3] {
         let units = &self.checked.units;
-        (units.length.as_deref(), units.force.as_deref())
+        [&units.length, &units.force, &units.time].map(Option::as_deref)
     }
 
     #[getter]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ._dimensions import Dimension, dimension_of_key
 
 Units = Mapping[str, str]
-"""Names of the units of length and force, as far as a scenario gives them."""
+"""Names of the units of length, force and time, as far as a scenario gives them."""
 
 LABELS = {
     "component": ("x", "y", "z"),
@@ -66,12 +66,11 @@ def unit(units: Units, dimension: Dimension) -> str | None:
     >>> unit({"length": "cm", "force": "N"}, (-2, 1, 0))
     'N cm^-2'
     """
-    names = (units.get("length"), units.get("force"), None)
-    if not units or any(power and name is None for name, power in zip(names, dimension)):
+    length, force, time = dimension
+    named = ((units.get("force"), force), (units.get("length"), length), (units.get("time"), time))
+    if not units or any(power and name is None for name, power in named):
         return None
-    length, force, _ = dimension
-    parts = [f"{name}^{power}" if power != 1 else f"{name}" for name, power in zip(names, (length, force)) if power]
-    return " ".join(reversed(parts)) or "1"
+    return " ".join(f"{name}^{power}" if power != 1 else f"{name}" for name, power in named if power) or "1"
 
 
 def column_unit(units: Units, column: str) -> str | None:

@@ -53,11 +53,7 @@ def _unit(dimension: Dimension, key: str, units: Mapping[str, str]) -> str:
     parts = []
     for name, power in zip(("length", "force", "time"), dimension):
         if power and name not in units:
-            remedy = (
-                f"name the unit of {name}: add [units] {name}"
-                if name != "time"
-                else "write a number: scenarios do not name their unit of time"
-            )
+            remedy = f"name the unit of {name}: add [units] {name}"
             raise ScenarioError(f"{key}: a quantity with a unit: {remedy}", key=key, remedy=remedy)
         if power:
             parts.append(f"({units[name]}) ** {power}")

@@ -108,8 +108,8 @@ class Scenario:
 
     @property
     def units(self) -> dict[str, str]:
-        """The names of the units of length and force, if the scenario gives any."""
-        names = zip(("length", "force"), self._core.units)
+        """The names of the units of length, force and time, as far as the scenario gives them."""
+        names = zip(("length", "force", "time"), self._core.units)
         return {quantity: unit for quantity, unit in names if unit is not None}
 
     def __repr__(self) -> str:

@@ -105,6 +105,20 @@ class LoadTable(TypedDict, total=False):
     tip_moment: Numbers
 
 
+class PhotoTable(TypedDict, total=False):
+    """``[photo]``"""
+
+    right: str
+    rotation: float
+    ruler_from: Numbers
+    ruler_length: float
+    ruler_to: Numbers
+    scale: float
+    up: str
+    x: float
+    y: float
+
+
 class RestTable(TypedDict, total=False):
     """``[rest]``"""
 
@@ -169,6 +183,7 @@ class UnitsTable(TypedDict, total=False):
 
     force: str
     length: str
+    time: str
 
 
 class WindTable(TypedDict, total=False):
@@ -203,6 +218,7 @@ class ScenarioDict(TypedDict, total=False):
     leaf: LeafTable
     load: LoadTable
     name: str
+    photo: PhotoTable
     rest: RestTable
     section: SectionTable
     solve: SolveTable
