@@ -87,7 +87,7 @@ fn panels_are_those_of_the_data() {
 fn intervals_are_those_of_the_numbers() {
     let (svg, out) = figure(PULLS, PHOTOGRAPH);
     let (_, told) = out.split_once("stiffness.bending_2 = ").unwrap();
-    let (value, rest) = told.split_once(" (95 %: ").unwrap();
+    let (value, rest) = told.split_once(" N cm² (95 %: ").unwrap();
     let interval = rest.split(')').next().unwrap();
     let [numbers] = groups(&svg, "numbers")[..] else {
         panic!("one panel of numbers");
