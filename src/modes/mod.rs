@@ -44,7 +44,8 @@ const NEXT_SHIFT: f64 = 8.0;
 
 /// Eigenvalues are counted below the last one minus this part of its distance from
 /// the lower shift, or minus so many times the error of an eigenvalue; the first of these at
-/// which the matrix is not singular.
+/// which the matrix is not singular, and the next where one that is missing is not found: in a
+/// stiff matrix rounding moves eigenvalues by as much.
 const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
 const ERRORS_BELOW: f64 = 40.0;
 
@@ -249,11 +250,17 @@ impl Vibration<'_> {
         // are counted.
         let count = (others + wanted + found.len()).min(self.pattern.size() - below);
         let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count - found.len());
+        let under = |found: &[Mode], limit| found.iter().filter(|f| f.eigenvalue < limit).count();
+        let mut part = 0;
         for search in 0..SEARCHES + count {
             if self.wanted.time.reached() {
                 return None;
             }
+            let before = under(&found, limit);
             let bound = self.search(shift, &mut factor, sought, limit, search, &mut found);
+            if limit.is_finite() && under(&found, limit) == before {
+                part = (part + 1).min(BELOW.len() - 1);
+            }
             if found.len() < count {
                 sought = count - found.len();
                 if let Some(bound) = bound
@@ -263,12 +270,13 @@ impl Vibration<'_> {
                 }
                 continue;
             }
-            let (missing, under) = self.missing(system, &found, count, (lowest, below))?;
+            let beyond = (lowest, below);
+            let (missing, next) = self.missing(system, &found, count, beyond, &BELOW[part..])?;
             if missing == 0 {
                 let wanted = found.into_iter().take(count).skip(others).take(wanted);
                 return Some(wanted.collect());
             }
-            (sought, limit) = (missing.min(count), under);
+            (sought, limit) = (missing.min(count), next);
             if shift != lowest {
                 (shift, factor) = (lowest, self.factorize(system, lowest)?);
             }
@@ -277,19 +285,20 @@ impl Vibration<'_> {
     }
 
     /// Number of missing eigenvalues, and the value below which they are: just below the
-    /// `count`-th of those found, which may have further equal ones. So many others are below
-    /// the lowest shift.
+    /// `count`-th of those found, by one of these `parts`, as it may have further equal ones. So
+    /// many others are below the lowest shift.
     fn missing(
         &self,
         system: &mut System,
         found: &[Mode],
         count: usize,
         (lowest, others): (f64, usize),
+        parts: &[f64],
     ) -> Option<(usize, f64)> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.rounding();
         let least = ERRORS_BELOW * self.wanted.accuracy.powi(2);
-        for part in BELOW {
+        for &part in parts {
             let part = part.max(least * part / BELOW[0]);
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
             let here = found.iter().filter(|f| f.eigenvalue < below).count();

@@ -4,6 +4,7 @@ use super::entries::Entries;
 use super::error::ScenarioError;
 use super::form::{Form, LeftOut};
 use super::key::Key;
+use toml::Value;
 
 /// Most mistakes that are told at once.
 const MOST: usize = 8;
@@ -47,7 +48,7 @@ impl Entries {
     /// Replaces the entry that is refused by one that is allowed; false if none is known, or if others
     /// are right or wrong by what it says.
     fn mend(&mut self, error: &ScenarioError) -> bool {
-        let Some(key) = error.key.filter(|key| !decides(*key)) else {
+        let Some(key) = error.key.filter(|key| !self.decides(*key)) else {
             return false;
         };
         let value = match key.left_out() {
@@ -57,11 +58,35 @@ impl Entries {
         self.replace(key, value);
         true
     }
+
+    /// Whether other entries are right or wrong by what this one says: lists are as long as
+    /// `leaf.rods`, if there are any.
+    fn decides(&self, key: Key) -> bool {
+        match key.form() {
+            Form::Whole if key == Key::Rods => Key::all().any(|key| self.is_list_of_rods(key)),
+            Form::Text | Form::Whole => key.parts().0 != "units",
+            _ => false,
+        }
+    }
+
+    /// Whether a list is given, with as many entries as there are rods or gaps between them.
+    fn is_list_of_rods(&self, key: Key) -> bool {
+        let counted = !matches!(key.form(), Form::Vector | Form::Stretch | Form::Pixel);
+        counted && self.given(key).is_some_and(|item| has_list(item.value))
+    }
 }
 
-/// Whether other entries are right or wrong by what this one says.
-fn decides(key: Key) -> bool {
-    matches!(key.form(), Form::Text | Form::Whole) && key.parts().0 != "units"
+/// Whether a value is a list, or a profile of several.
+fn has_list(value: &Value) -> bool {
+    match value {
+        Value::Array(_) => true,
+        Value::Table(profile) => profile.get("value").is_some_and(|value| {
+            value
+                .as_array()
+                .is_some_and(|list| list.iter().any(Value::is_array))
+        }),
+        _ => false,
+    }
 }
 
 /// Whether an error may follow from the value that replaced that of another: a wall is compared with
@@ -118,6 +143,27 @@ mod tests {
             error.others.is_empty(),
             "lists are as long as rods says: {error}"
         );
+    }
+
+    /// A number of rods that is refused hides nothing where no list is as long as it says.
+    #[test]
+    fn a_wrong_number_of_rods_hides_only_lists() {
+        let text = |width: &str| {
+            format!(
+                "leaf = {{ rods = 7.5 }}\nblade = {{ length = -30, width = {width}, thickness = \"0,025\", \
+                 young = 6e4 }}\nload = {{ g = -981 }}"
+            )
+        };
+        let error = Scenario::from_toml(&text("1.0")).unwrap_err();
+        let told = lines(&error);
+        for key in ["leaf.rods", "blade.length", "load.g"] {
+            assert!(
+                told.iter().any(|line| line.contains(key)),
+                "{key}: {told:?}"
+            );
+        }
+        let listed = Scenario::from_toml(&text("[1.0, 2.0]")).unwrap_err();
+        assert!(listed.others.is_empty(), "{listed}");
     }
 
     /// A name that is none does not hide wrong values, and is not called missing as well.

@@ -39,7 +39,9 @@ const DEGREES: f64 = 15.0;
 /// What is probably not what was intended, one short sentence each.
 pub fn slips(scenario: &Scenario) -> Vec<String> {
     let heavy = two_weights(scenario).or_else(|| too_long(scenario));
-    let heavy = heavy.or_else(|| weight_of_another_mass(scenario));
+    let heavy = heavy
+        .or_else(|| weight_of_another_mass(scenario))
+        .or_else(|| gravity_of_another_unit(scenario));
     let lengths = [thicker_than_long(scenario), heavy, out_of_reach(scenario)];
     let angles = [in_degrees(scenario), held_in_degrees(scenario)];
     angles.into_iter().chain(lengths).flatten().collect()
@@ -199,6 +201,24 @@ fn weight_of_another_mass(scenario: &Scenario) -> Option<String> {
     })
 }
 
+/// The acceleration of gravity as it is in another unit of length.
+fn gravity_of_another_unit(scenario: &Scenario) -> Option<String> {
+    let units = &scenario.units;
+    if units.time.is_some() && !units.is_in_seconds() {
+        return None;
+    }
+    let own = units.length.as_deref()?;
+    let (_, known) = ACCELERATIONS.iter().find(|(name, _)| *name == own)?;
+    let given = DVec3::from_array(scenario.g).length();
+    let is = |acceleration: f64| (given / acceleration - 1.0).abs() < ROUNDED;
+    let of_other = |(name, acceleration): &&(&str, f64)| *name != own && is(*acceleration);
+    let (other, _) = ACCELERATIONS.iter().find(of_other)?;
+    Some(format!(
+        "load.g is {}, the acceleration of gravity in {other}/s², and lengths are in {own}: there it is {known}",
+        four_digits(given)
+    ))
+}
+
 /// A leaf that is too long for its weight and stiffness, if only its base is held.
 fn too_long(scenario: &Scenario) -> Option<String> {
     if scenario.held_tip.is_some() {
@@ -246,6 +266,27 @@ fn too_long(scenario: &Scenario) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Metres and centimetres are told apart by the acceleration of gravity, where units have names.
+    #[test]
+    fn gravity_in_another_unit_is_doubted() {
+        let doubts = |length: &str, g: f64| {
+            let text = format!(
+                r#"
+                units = {{ length = "{length}", force = "N", time = "s" }}
+                leaf = {{ rods = 1, length = 3.0, fan = [0.0] }}
+                section = {{ shape = "circle", diameter = 0.2, young = 1e5, mass_density = 1e-5 }}
+                load = {{ g = [0.0, 0.0, -{g}] }}"#
+            );
+            slips(&Scenario::from_toml(&text).unwrap())
+        };
+        assert!(doubts("cm", 9.81)[0].contains("there it is 981"));
+        assert!(doubts("cm", 9.8)[0].contains("in m/s²"));
+        assert!(doubts("m", 981.0)[0].contains("there it is 9.81"));
+        for (length, g) in [("cm", 981.0), ("m", 9.81), ("cm", 160.0), ("ell", 9.81)] {
+            assert_eq!(doubts(length, g), Vec::<String>::new());
+        }
+    }
 
     /// A weight of another mass may keep a leaf from coming to rest.
     #[test]

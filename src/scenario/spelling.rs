@@ -7,7 +7,9 @@ use super::key::Key;
 /// another table, or the nearest spelling.
 pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
-    if let Some(key) = Key::all().find(|key| key.parts().1 == name) {
+    // The name of a unit is none of a number.
+    let of_numbers = |key: &Key| key.parts().1 == name && !path.starts_with("units.");
+    if let Some(key) = Key::all().find(of_numbers) {
         return Some(key.path());
     }
     // No key is longer than this.
@@ -68,6 +70,8 @@ mod tests {
             ("gravity", Some("load.gravity")),
             ("dynamics.gravty", Some("dynamics.gravity")),
             ("leaf.rod", Some("leaf.rods")),
+            ("units.lenght", Some("units.length")),
+            ("units.mass", None),
             ("monsoon", None),
         ] {
             assert_eq!(nearest(misspelt), key);

@@ -89,7 +89,11 @@ fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end:
             .collect(),
     };
     let curves = [0, 1, 2].map(coordinate);
-    let across = Axis::linear("time, in the scenario's unit", 0.0, end);
+    let across = match units.time.as_deref() {
+        None => "time, in the scenario's unit".into(),
+        unit => with_unit("time", unit),
+    };
+    let across = Axis::linear(&across, 0.0, end);
     let name = with_unit("tip", units.length.as_deref());
     let up = Axis::holding(&name, curves.iter().flat_map(Curve::values).chain([0.0]));
     let what = match record.joined {

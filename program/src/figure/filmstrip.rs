@@ -9,9 +9,10 @@ use crate::figure::setting::Setting;
 use crate::figure::small::{SIDE, SmallPanels, THINNER};
 use crate::figure::space::OBLIQUE;
 use crate::figure::veins::Veins;
-use crate::report::numbers::short;
+use crate::report::numbers::{in_unit, short};
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
+use leafdyn::scenario::units::TIME;
 use leafdyn::simulate::Record;
 
 /// Below the notes.
@@ -58,7 +59,7 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
         since = still.moment;
         drawing.group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let when = format!("t = {}", short(time));
+            let when = format!("t = {}", in_unit(short(time), &scenario.units, TIME));
             let caption = (letter.as_str(), when.as_str(), NOTE);
             let scene = panels.begin(page, (index, time), OBLIQUE, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {

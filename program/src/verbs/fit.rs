@@ -28,7 +28,7 @@ pub struct Fit {
     data: Vec<PathBuf>,
 
     /// What a column of the data is: its name in the file, and a key, a result or another column of the data, with a factor and an offset, as in 'Extension=tip.position[0]:1e-3+0.12'; other columns of that file are left out; may repeat
-    #[arg(long, value_name = "NAME=QUANTITY[:FACTOR][+OFFSET]")]
+    #[arg(long, value_name = "NAME=QUANTITY[:FACTOR[+OFFSET]]")]
     column: Vec<MeasuredColumn>,
 
     /// Read the first row of each file of data, and then every K-th

@@ -21,7 +21,7 @@ use std::process::{self, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
 
 use crate::files::{self, Checkpointer};
@@ -159,7 +159,10 @@ fn show_refused(error: &str, exit_status: i32) {
 /// How to get a scenario, if none is named.
 fn suggestion(error: &clap::Error) -> &'static str {
     let missing = error.kind() == ErrorKind::MissingRequiredArgument;
-    match missing && error.to_string().contains("<SCENARIO>") {
+    let which = error.get(ContextKind::InvalidArg);
+    // The usage, which names it as well, is another part of the message.
+    let scenario = which.is_some_and(|which| which.to_string().contains("<SCENARIO>"));
+    match missing && scenario {
         false => "",
         true => {
             "\nA scenario says what the leaf is made of. To begin with one of your own:\n  \

@@ -77,6 +77,10 @@ fn without_a_scenario_one_is_offered() {
         let run = Workplace::empty().run(verb).ends(2);
         contains(&run.err, &["<SCENARIO>", "leafdyn new leaf"]);
     }
+    // Not where another argument is missing, though the usage names the scenario.
+    let run = Workplace::empty().run("fit leaf.toml --data a.csv").ends(2);
+    contains(&run.err, &["--free"]);
+    assert!(!run.err.contains("leafdyn new leaf"), "{}", run.err);
 }
 
 #[test]

@@ -57,6 +57,7 @@ _COLUMNS: dict[str, Dimension] = {
     **dict.fromkeys(("s", "tip", "tip_x", "tip_y", "tip_z"), (1, 0, 0)),
     **dict.fromkeys(("reaction", "reaction_x", "reaction_y", "reaction_z"), (0, 1, 0)),
     "energy": ENERGY,
+    "lowest_eigenvalue": (0, 0, -2),
 }
 
 
@@ -75,6 +76,8 @@ def unit(units: Units, dimension: Dimension) -> str | None:
 
 def column_unit(units: Units, column: str) -> str | None:
     """That of a column; none of one that has no name or no dimension here."""
+    if re.fullmatch(r"frequency_\d+", column) and units.get("time") == "s":
+        return "Hz"
     dimension = dimension_of(column)
     return None if dimension is None else unit(units, dimension)
 
@@ -176,4 +179,6 @@ def dimension_of(column: str) -> Dimension | None:
     """That of a column, if it is known by its name, also as a key."""
     if re.match(r"grip_\d", column):
         return (0, 1, 0)
+    if re.fullmatch(r"frequency_\d+", column):
+        return (0, 0, -1)
     return _COLUMNS.get(column) or dimension_of_key(column)

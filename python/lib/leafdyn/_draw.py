@@ -12,6 +12,12 @@ PARTS = 8
 """Straight parts of which a vein is drawn between two of its stations."""
 
 
+TICKS = 7
+"""Of the longest axis in space."""
+
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def pyplot() -> Any:
     """The package, if it is there."""
     try:
@@ -29,8 +35,41 @@ def axes(ax: Any, solid: bool = False) -> Any:
 
 
 def labelled(text: str, unit: str | None) -> str:
-    """The label of an axis: what is along it, and its unit if that has a name."""
-    return text if unit in (None, "1") else f"{text} / {unit}"
+    """The label of an axis: what is along it, and its unit if that has a name.
+
+    >>> labelled("tissue", "N cm^-2")
+    'tissue / (N/cm²)'
+    """
+    if unit in (None, "1"):
+        return text
+    name = written(unit)
+    return f"{text} / ({name})" if "/" in name else f"{text} / {name}"
+
+
+def written(unit: str) -> str:
+    """A unit as the program's reports and figures have it.
+
+    >>> written("N cm^-2"), written("N cm^2"), written("s^-2")
+    ('N/cm²', 'N cm²', '1/s²')
+    """
+    above, below = [], []
+    for factor in unit.split():
+        name, _, power = factor.partition("^")
+        side = below if power.startswith("-") else above
+        size = power.removeprefix("-")
+        side.append(name if size in ("", "1") else name + size.translate(RAISED))
+    over = " ".join(above) or "1"
+    under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
+    return f"{over}/{under}" if under else over
+
+
+def ticks_by_length(ax: Any) -> None:
+    """Give every axis in space as many ticks as its length has room for: those of a narrow leaf would overlap."""
+    from matplotlib.ticker import MaxNLocator
+
+    spans = [np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
+    for axis, span in zip((ax.xaxis, ax.yaxis, ax.zaxis), spans):
+        axis.set_major_locator(MaxNLocator(nbins=max(1, round(TICKS * span / max(spans)))))
 
 
 def smooth(

@@ -276,7 +276,10 @@ class Fit(Table):
         Raises
         ------
         ValueError
-            If nothing was varied, as where points on veins alone were measured.
+            If what is to be shown was not measured, or did not vary.
+
+        Where points on veins alone were measured, they are drawn over the fitted veins: in pixels as in their photograph,
+        else from the side, from above or from the front, whichever they show.
         """
         measured: dict[str, list[Measurement]] = {}
         said = self.to_dict()
@@ -284,9 +287,12 @@ class Fit(Table):
         for row in said["residuals"]:
             if settings[row["experiment"]]:
                 measured.setdefault(row["what"], []).append((settings[row["experiment"]], row["data"], row["sd"]))
+        if not measured and show is None and against is None:
+            ax = axes(ax)
+            draw_points(ax, said["residuals"], self._units)
+            return self._titled(ax)
         if not measured:
-            aside = "draw `leafdyn.relax(fit.scenario).plot()`, and the points over it"
-            raise ValueError(f"no number of the scenario was varied in the experiments: {aside}")
+            raise ValueError("show and against: no number of the scenario was varied in the experiments")
         show = max(measured, key=lambda name: len(measured[name])) if show is None else show
         if show not in measured:
             raise ValueError(f"show = {show!r}: must be one of {', '.join(measured)}")
@@ -301,13 +307,16 @@ class Fit(Table):
         groups = series(measured[show], against)
         shown = [(group, self.predict(group.conditions, show)) for group in groups]
         draw(ax, shown, (show, against), self._units)
+        return self._titled(ax)
+
+    def _titled(self, ax: Any) -> Any:
         ax.set_title("\n".join(self._interval(one) for one in self.parameters.values()), fontsize="small")
         ax.legend()
         return ax
 
     def _interval(self, parameter: Parameter) -> str:
         name = column_unit(self._units, parameter.key)
-        unit = "" if name in (None, "1") else f" {name}"
+        unit = "" if name is None or name == "1" else f" {written(name)}"
         return f"{parameter.key} = {parameter.value:.4g}{unit} ({parameter.low:.4g} to {parameter.high:.4g})"
 
     def __repr__(self) -> str:

@@ -338,6 +338,8 @@ class Equilibrium(Viewed):
         labels = [labelled("xyz"[axis], column_unit(self._units, "xyz"[axis])) for axis in shown]
         ax.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels)))
         ax.set_aspect("equal")
+        if solid:
+            ticks_by_length(ax)
         return ax
 
     def _drawn(self) -> Array:
@@ -354,7 +356,10 @@ class Equilibrium(Viewed):
         words = [stable if self.success else f"{self.outcome}, {stable}"]
         within = f" within {self.error_estimate:.1e}" if math.isfinite(self.error_estimate) else ""
         if self.tip is not None:
-            words.append(f"tip ({', '.join(f'{x:.5g}' for x in self.tip)}){within}")
+            # Coordinates that the error exceeds are zero, as in the program's report.
+            known = (x if abs(x) > self.error_estimate or not within else 0.0 for x in self.tip)
+            unit = column_unit(self._units, "tip")
+            words.append(f"tip ({', '.join(f'{x:.5g}' for x in known)}){f' {unit}' if unit else ''}{within}")
         elif within:
             words.append(f"{self.rods} rods{within}")
         return f"<Equilibrium {self.name}: {', '.join(words)}>"

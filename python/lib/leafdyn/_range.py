@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias, Union
 
@@ -36,6 +37,26 @@ def ranges(vary: Vary, units: Units = dict) -> list[Given]:
     if isinstance(vary, Mapping):
         return [_given(key, plain(span, key, units)) for key, span in vary.items()]
     return list(texts("vary", vary, "load.gravity[2]=-1..-2"))
+
+
+def spans(vary: str | Iterable[str]) -> dict[str, Range]:
+    """Ranges in the program's words, by their keys.
+
+    >>> spans("leaf.length=1..2:3log")
+    {'leaf.length': (1.0, 2.0, 3, 'log')}
+    """
+    found: dict[str, Range] = {}
+    for text in texts("vary", vary, "load.gravity[2]=-1..-2"):
+        parts = re.fullmatch(r"([^=]+)=(.+?)\.\.(.+?)(?::(\d+))?(log)?", text)
+        try:
+            if parts is None:
+                raise ValueError
+            ends = float(parts[2]), float(parts[3])
+        except ValueError:
+            raise ValueError(f"vary: {text!r}: must be KEY=FROM..TO[:COUNT][log], or a dict of keys and values") from None
+        span: Any = (*ends, *([int(parts[4])] if parts[4] else []), *(["log"] if parts[5] else []))
+        found[parts[1].strip()] = span
+    return found
 
 
 def _given(key: str, span: Range) -> Given:

@@ -16,7 +16,7 @@ from ._data import column_unit, pandas
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
 from ._quantities import plain
-from ._range import Range, values
+from ._range import Range, spans, values
 from ._relax import asked_for, relaxed, warn
 from ._scenario import Scenario, Source, checked
 
@@ -46,7 +46,7 @@ _PLAIN = (
 
 def sweep(
     scenario: Source,
-    vary: Mapping[str, Range | Iterable[Any]],
+    vary: str | Iterable[str] | Mapping[str, Range | Iterable[Any]],
     columns: str | Iterable[str] | Mapping[str, Of] = COLUMNS,
     *,
     set: Mapping[str, Any] | None = None,
@@ -66,7 +66,8 @@ def sweep(
     vary
         Keys with their values, ``{"load.gravity[2]": np.linspace(-1, -4, 20), "leaf.rods": [3, 5]}``: arrays, lists, or
         ranges ``(low, high)``, ``(low, high, "log")``, ``(low, high, count)``. The last key changes fastest. Several
-        keys joined by ``+`` take the same values.
+        keys joined by ``+`` take the same values. Or the program's words, ``"load.gravity[2]=-1..-4:20"``, or a list of
+        such texts.
     columns
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"reaction_x"`` and so on (of a
         held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``,
@@ -114,6 +115,7 @@ def sweep(
     wanted, modes = _wanted(columns)
     asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, None, path=path)
     base = checked(scenario, set)
+    vary = vary if isinstance(vary, Mapping) else spans(vary)
     axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point))) for point in grid]
