@@ -159,3 +159,28 @@ def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
     for result in (leafdyn.relax(fan(2)), leafdyn.trace(fan(2), VARY)):
         with pytest.raises(ImportError, match=re.escape("pip install './python[plot]'")):
             result.plot()
+
+
+def test_points_of_a_photograph_are_drawn_in_its_pixels() -> None:
+    rod = {**column(), "load": {"tip_force": [0.0, 0.0, -0.5]}}
+    leaf = leafdyn.relax(rod)
+    photo = {"photo.x": 100.0, "photo.y": 200.0, "photo.scale": 0.001}
+    at = leaf.positions[0, 4::4]
+    points = {"pixel_x": 100 + 1000 * at[:, 0], "pixel_y": 200 - 1000 * at[:, 2], "sd": 1.0}
+    fit = leafdyn.fit(rod, points, "stiffness.bending_2", set=photo)
+    ax = fit.plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("pixel x", "pixel y")
+    data, model = ax.lines
+    assert data.get_xdata() == pytest.approx(points["pixel_x"])
+    assert model.get_ydata() == pytest.approx(points["pixel_y"], abs=0.01)
+    assert ax.yaxis_inverted()
+    with pytest.raises(ValueError, match="no number of the scenario was varied"):
+        fit.plot(show="pixel_x")
+
+
+def test_a_narrow_leaf_has_few_ticks_across() -> None:
+    ax = leafdyn.relax(leafdyn.new("blade")).plot()
+    ax.figure.canvas.draw()
+    low, high = ax.get_ylim()
+    assert sum(low <= tick <= high for tick in ax.get_yticks()) <= 2 < len(ax.get_zticks())
+    assert ax.get_zlabel() == "z / cm"

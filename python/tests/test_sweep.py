@@ -62,6 +62,16 @@ def test_keys_that_go_together_and_ranges() -> None:
     alone = leafdyn.relax(fan(2), set={"stiffness.bending_2": 10.0, "stiffness.bending_3": 10.0})
     assert alone.tip is not None and both["tip_z"].iloc[-1] == pytest.approx(alone.tip[2])
     assert len(leafdyn.sweep(fan(2), {"scale:stiffness.bending_2": (1, 2)}, "tip_z")) == 11
+    words = leafdyn.sweep(fan(2), "stiffness.bending_2+stiffness.bending_3=0.1..10:3log", "tip_z")
+    assert words.equals(both)
+    with pytest.raises(ValueError, match="must be KEY=FROM..TO"):
+        leafdyn.sweep(fan(2), "stiffness.bending_2=1")
+
+
+def test_frequencies_have_units() -> None:
+    names = ["frequency_1", "lowest_eigenvalue"]
+    table = leafdyn.sweep(leafdyn.new("blade"), {"leaf.rods": [3]}, names)
+    assert table.attrs["units"] == {"frequency_1": "Hz", "lowest_eigenvalue": "s^-2"}
 
 
 def test_leaves_that_do_not_come_to_rest_are_counted() -> None:

@@ -71,21 +71,24 @@ impl Entries {
 
     /// Whether a list is given, with as many entries as there are rods or gaps between them.
     fn is_list_of_rods(&self, key: Key) -> bool {
-        let counted = !matches!(key.form(), Form::Vector | Form::Stretch | Form::Pixel);
-        counted && self.given(key).is_some_and(|item| has_list(item.value))
+        let single = match key.form() {
+            Form::PerRod(_) | Form::Quantity(_) | Form::PerGap(_) | Form::Fan => 0,
+            Form::VectorPerRod | Form::VectorQuantity => 1,
+            _ => return false,
+        };
+        self.given(key)
+            .is_some_and(|item| depth(item.value) > single)
     }
 }
 
-/// Whether a value is a list, or a profile of several.
-fn has_list(value: &Value) -> bool {
+/// How deep lists stand within each other; of a profile in those at each knot.
+fn depth(value: &Value) -> usize {
     match value {
-        Value::Array(_) => true,
-        Value::Table(profile) => profile.get("value").is_some_and(|value| {
-            value
-                .as_array()
-                .is_some_and(|list| list.iter().any(Value::is_array))
-        }),
-        _ => false,
+        Value::Array(list) => 1 + list.first().map_or(0, depth),
+        Value::Table(profile) => profile
+            .get("value")
+            .map_or(0, |value| depth(value).saturating_sub(1)),
+        _ => 0,
     }
 }
 
@@ -148,13 +151,9 @@ mod tests {
     /// A number of rods that is refused hides nothing where no list is as long as it says.
     #[test]
     fn a_wrong_number_of_rods_hides_only_lists() {
-        let text = |width: &str| {
-            format!(
-                "leaf = {{ rods = 7.5 }}\nblade = {{ length = -30, width = {width}, thickness = \"0,025\", \
-                 young = 6e4 }}\nload = {{ g = -981 }}"
-            )
-        };
-        let error = Scenario::from_toml(&text("1.0")).unwrap_err();
+        let text = "leaf = { rods = 7.5 }\nblade = { length = -30, width = [0.8, 1.0], thickness = \"0,025\", \
+                    young = 6e4 }\nload = { g = -981 }";
+        let error = Scenario::from_toml(text).unwrap_err();
         let told = lines(&error);
         for key in ["leaf.rods", "blade.length", "load.g"] {
             assert!(
@@ -162,7 +161,8 @@ mod tests {
                 "{key}: {told:?}"
             );
         }
-        let listed = Scenario::from_toml(&text("[1.0, 2.0]")).unwrap_err();
+        let listed = text.replace("\"0,025\"", "[0.1, 0.2]");
+        let listed = Scenario::from_toml(&listed).unwrap_err();
         assert!(listed.others.is_empty(), "{listed}");
     }
 

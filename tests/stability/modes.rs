@@ -383,3 +383,26 @@ fn frequencies_are_in_the_units_of_the_scenario() {
         close("eigenvalue", 4.0 * b.eigenvalue / a.eigenvalue, 1.0, 1e-9);
     }
 }
+
+/// In a blade's stiff matrix rounding moves the second eigenvalue by more than the gap below it in
+/// which eigenvalues are counted: it is found nevertheless, as if three were requested.
+#[test]
+fn the_last_mode_of_a_stiff_blade_is_found() {
+    let blade = r#"
+        leaf = { rods = 7, elevation = 1.05 }
+        load = { g = [0, 0, -981] }
+        [blade]
+        length = 30
+        width = { at = [0, 0.1, 0.3, 0.6, 0.85, 1.0], value = [0.8, 1.0, 1.2, 0.9, 0.4, 0.0] }
+        thickness = 0.03
+        young = 1e5
+        mass_density = 7.5e-6"#;
+    let scenario = Scenario::from_toml(blade).unwrap();
+    let [two, three] =
+        [2, 3].map(|count| settled(&scenario, &with_modes(count, Options::default())));
+    assert_eq!(modes_of(&two).len(), 2);
+    for (a, b) in modes_of(&two).iter().zip(modes_of(&three)) {
+        let bound = a.error.unwrap() + b.error.unwrap();
+        assert!((a.eigenvalue - b.eigenvalue).abs() <= bound, "{a:?} {b:?}");
+    }
+}

@@ -144,12 +144,13 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
     )
 }
 
-/// The number that varies at a point: as it was prescribed, or with the digits that its error
-/// leaves.
+/// The number that varies at a point: as it was prescribed, with the digits that its error
+/// leaves, or, at a point of no meaning of its own, where it is about.
 fn value_of(trace: &Trace, point: &TracePoint) -> String {
     let value = match point.value_error {
         Some(error) => known(point.value, error),
-        None => trace.keys.text(point.value),
+        None if trace.range.contains(&point.value) => trace.keys.text(point.value),
+        None => brief(point.value),
     };
     in_unit(value, &trace.units, trace.keys.dimension())
 }

@@ -69,7 +69,7 @@ def ticks_by_length(ax: Any) -> None:
 
     spans = [np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
     for axis, span in zip((ax.xaxis, ax.yaxis, ax.zaxis), spans):
-        axis.set_major_locator(MaxNLocator(nbins=max(1, round(TICKS * span / max(spans)))))
+        axis.set_major_locator(MaxNLocator(nbins=max(1, round(TICKS * span / max(spans))), min_n_ticks=1))
 
 
 def smooth(

@@ -12,12 +12,13 @@ import numpy as np
 from ._arguments import texts
 from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
-from ._draw import axes
+from ._draw import axes, written
 from ._leaf import Array
 from ._predict import Measurement, Prediction, draw, predicted, series
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 from ._sweep import quantity
+from ._traced import draw_points
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from . import _leafdyn
 from ._attribute import Attribute, computed
 from ._data import ENERGY, QUANTITIES, column_unit, dataset, node_table, node_variables
-from ._draw import axes, curves, labelled, smooth, tangents
+from ._draw import axes, curves, labelled, smooth, tangents, ticks_by_length
 from ._pickled import Drawn
 from ._result import keep
 from ._sensitivity import Sensitivity
