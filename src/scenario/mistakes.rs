@@ -95,8 +95,8 @@ fn depth(value: &Value) -> usize {
 /// Whether an error may follow from the value that replaced that of another: a wall is compared with
 /// its diameter.
 fn depends(error: &ScenarioError, on: &ScenarioError) -> bool {
-    let table = |error: &ScenarioError| error.key.map(|key| key.parts().0);
-    matches!(table(error), Some("section" | "blade")) && table(error) == table(on)
+    let in_section = on.key.is_some_and(|key| key.parts().0 == "section");
+    in_section && matches!(error.key, Some(Key::Wall | Key::InnerDiameter))
 }
 
 #[cfg(test)]
@@ -155,7 +155,15 @@ mod tests {
                     young = 6e4 }\nload = { g = -981 }";
         let error = Scenario::from_toml(text).unwrap_err();
         let told = lines(&error);
-        for key in ["leaf.rods", "blade.length", "load.g"] {
+        let keys = [
+            "leaf.rods",
+            "blade.length",
+            "blade.width",
+            "blade.thickness",
+            "load.g",
+        ];
+        assert_eq!(told.len(), keys.len(), "{told:?}");
+        for key in keys {
             assert!(
                 told.iter().any(|line| line.contains(key)),
                 "{key}: {told:?}"
