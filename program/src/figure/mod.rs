@@ -106,6 +106,7 @@ mod tests {
         let mut scenario = scenario();
         scenario.units.length = Some("cm".into());
         scenario.units.force = Some("N".into());
+        scenario.units.time = Some("s".into());
         scenario
     }
 
@@ -131,11 +132,13 @@ mod tests {
         assert!(rest.contains("L = 1 cm") && rest.contains("cm</text>"));
         assert!(strip.contains(" cm wide") && strip.contains(">x<"));
         assert!(energies.contains(">tip / cm<") && energies.contains(">energy / N cm<"));
+        assert!(energies.contains(">time / s<") && strip.contains("t = 0 s<"));
         let [rest, _, strip, energies] = drawn(&scenario());
         assert_eq!(rest.matches(">ξ = x/L<").count(), 2);
         assert_eq!(rest.matches(">ξ<").count(), 1);
         assert!(strip.contains(" L wide") && strip.contains(">ξ<"));
         assert!(energies.contains(">tip<") && energies.contains(">energy<"));
+        assert!(energies.contains(">time, in the scenario's unit<") && !strip.contains("t = 0 s"));
     }
 
     #[test]

@@ -52,7 +52,8 @@ def written(unit: str) -> str:
     >>> written("N cm^-2"), written("N cm^2"), written("s^-2")
     ('N/cm²', 'N cm²', '1/s²')
     """
-    above, below = [], []
+    above: list[str] = []
+    below: list[str] = []
     for factor in unit.split():
         name, _, power = factor.partition("^")
         side = below if power.startswith("-") else above
