@@ -219,7 +219,8 @@ fn spread<T>(all: Vec<T>) -> Vec<T> {
     let count = all.len();
     // Steps of the golden section, which leave no gap for long.
     let golden = (0.618 * count as f64).round().max(1.0) as usize;
-    let coprime = |step: &usize| (2..=*step).all(|k| step % k != 0 || count % k != 0);
+    let shared = |step: usize, k: usize| step.is_multiple_of(k) && count.is_multiple_of(k);
+    let coprime = |step: &usize| (2..=*step).all(|k| !shared(*step, k));
     let step = (golden..).find(coprime).unwrap_or(1);
     let mut all: Vec<Option<T>> = all.into_iter().map(Some).collect();
     let order = (0..count).map(|k| (k * step) % count);
