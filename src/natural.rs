@@ -4,7 +4,7 @@
 //!
 //! integrated by the explicit Runge-Kutta method of order 8 of Dormand and Prince in equal steps.
 
-use crate::scenario::{Rod, Scenario};
+use crate::scenario::{Profile, Rod, Scenario};
 use crate::tableau::{A, B, C, STAGES};
 use glam::{DQuat, DVec3};
 
@@ -100,7 +100,7 @@ fn step(rod: &Rod, grown: bool, sigma: f64, width: f64, (x, q): Vein) -> Vein {
     for i in 0..STAGES {
         let (_, q) = combine(&slopes, A[i]);
         let at = sigma + C[i] * width;
-        let u = DVec3::from_array(rod.rest_curvature.each_ref().map(|p| p.at(at)));
+        let u = DVec3::from_array(Profile::all(&rod.rest_curvature, at));
         let q = q.normalize();
         let spin = 0.5 * rod.length * u;
         slopes[i] = (

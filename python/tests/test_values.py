@@ -95,7 +95,7 @@ def test_quantities_in_ranges_sweeps_and_data(pint: Any) -> None:
     "key, unit, why",
     [
         ("leaf.length", "kg", "leaf.length = 3 kilogram: Cannot convert"),
-        ("dynamics.duration", "s", "dynamics.duration: a quantity with a unit: write a number"),
+        ("dynamics.duration", "s", "dynamics.duration: a quantity with a unit: name the unit of time"),
         ("leaf.rods", "m", "leaf.rods = 3 meter: Cannot convert"),
     ],
 )

@@ -277,7 +277,7 @@ impl Leaf {
     /// `width` of the rod.
     pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
         let rod = self.rod(j);
-        let at = |p: &[Profile; 3]| DVec3::from_array(p.each_ref().map(|p| p.at(sigma)));
+        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::all(p, sigma));
         let share = self.share(j);
         Section {
             ds: self.length(j) * width,

@@ -64,7 +64,12 @@ pub struct Follower {
     at: NestedEquilibrium,
     /// Segments of the coarsest grid away from folds.
     usual: usize,
+    /// Those that are tried instead, once, where it takes more than [`ENOUGH`] grids.
+    other: Option<usize>,
 }
+
+/// Grids that a leaf needs on the right coarsest one: the next would cost more than all of these.
+const ENOUGH: usize = 3;
 
 /// Where a leaf is that was to follow.
 pub enum Followed {
@@ -90,13 +95,19 @@ impl Follower {
     ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
         let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
         let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
-        let follower = Follower {
-            scenario: Arc::new(scenario.clone()),
-            options: options.clone(),
-            usual: at.levels.first().map_or(0, |level| level.leaf.segments()),
-            at,
-        };
+        let follower = Follower::new(Arc::new(scenario.clone()), options, at);
         Ok((leaf, rests.then_some(follower)))
+    }
+
+    fn new(scenario: Arc<Scenario>, options: &Options, at: NestedEquilibrium) -> Follower {
+        let usual = (at.levels.first()).map_or(0, |level| level.leaf.segments());
+        Follower {
+            scenario,
+            options: options.clone(),
+            at,
+            usual,
+            other: Some(usual + usual / 4),
+        }
     }
 
     /// Begins with the stable equilibrium that lies near this shape of the leaf, which `begin` need not
@@ -142,16 +153,10 @@ impl Follower {
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut effort = Effort::new(ignored);
         let begun = NestedEquilibrium::begun(&problem);
-        let usual = grid.segments();
         match grids::follow(&problem, begun, vec![(grid, state)], &mut effort) {
             Ok(found) if found.is_stable() => {
                 let (at, result) = decide(&problem, found, clock, &mut effort);
-                let follower = Follower {
-                    scenario: Arc::clone(&scenario),
-                    options: options.clone(),
-                    at,
-                    usual,
-                };
+                let follower = Follower::new(Arc::clone(&scenario), options, at);
                 Ok((result, Some(follower)))
             }
             _ => Follower::begin(&scenario, options),
@@ -187,6 +192,7 @@ impl Follower {
                     (self.at, self.scenario) = (found, scenario);
                     if last {
                         self.coarsen();
+                        self.economise();
                         return Ok(Followed::There(Box::new(self.equilibrium(clock))));
                     }
                     way.advance(2.0 * way.length());
@@ -218,9 +224,11 @@ impl Follower {
         let Ok(found) = self.near(&leaf, grid) else {
             return false;
         };
-        let finest = |at: &NestedEquilibrium| at.levels.last().map(|level| level.state.clone());
-        let apart = finest(&self.at).zip(finest(&found));
-        let same = apart.is_some_and(|(a, b)| a.shift_to(&b) < SAME) && found.is_stable();
+        let (Some(own), Some(other)) = (self.at.levels.last(), found.levels.last()) else {
+            return false;
+        };
+        let there = transfer(&own.leaf, &own.state, &other.leaf.grid);
+        let same = there.shift_to(&other.state) < SAME && found.is_stable();
         if same {
             self.at = found;
         }
@@ -233,6 +241,20 @@ impl Follower {
         if coarsest.segments() > self.usual {
             let grid = Grid::new(self.usual, coarsest.leaf.kinks());
             self.goes_on(coarsest.leaf.clone(), grid);
+        }
+    }
+
+    /// Goes on from a coarsest grid that is a little finer, if that saves the finest of too many.
+    fn economise(&mut self) {
+        let first = &self.at.levels[0].leaf;
+        let too_many = self.at.levels.len() > ENOUGH && first.segments() == self.usual;
+        if let Some(segments) = self.other.take_if(|_| too_many) {
+            let (leaf, before) = (first.leaf.clone(), self.at.grids());
+            let grid = Grid::new(segments, leaf.kinks());
+            match self.goes_on(leaf, grid) && self.at.levels.len() <= ENOUGH {
+                true => self.usual = segments,
+                false => self.at = before,
+            }
         }
     }
 
@@ -256,8 +278,12 @@ impl Follower {
         let (result, follower) = Follower::begin_from(scenario, &self.options, guess)?;
         if let Some(follower) = follower {
             // What it is brought to on a finer grid need not stay there.
-            let usual = self.usual.min(follower.usual);
-            *self = Follower { usual, ..follower };
+            let (usual, other) = (self.usual.min(follower.usual), self.other);
+            *self = Follower {
+                usual,
+                other,
+                ..follower
+            };
         }
         Ok(result)
     }

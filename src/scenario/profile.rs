@@ -70,6 +70,35 @@ impl Profile {
         }
     }
 
+    /// The values of three at once: what they have in common is computed once.
+    pub fn all(profiles: &[Profile; 3], sigma: f64) -> [f64; 3] {
+        if let [
+            Profile::Blade {
+                part,
+                property: first,
+                factor,
+            },
+            others @ ..,
+        ] = profiles
+        {
+            let alike = |other: &Profile| match other {
+                Profile::Blade {
+                    part: its,
+                    property,
+                    factor,
+                } if Arc::ptr_eq(part, its) => Some((*property, *factor)),
+                _ => None,
+            };
+            if let [Some(second), Some(third)] = others.each_ref().map(alike)
+                && let Some(values) = part.three([*first, second.0, third.0], sigma)
+            {
+                let factors = [*factor, second.1, third.1];
+                return [0, 1, 2].map(|k| factors[k] * values[k]);
+            }
+        }
+        profiles.each_ref().map(|profile| profile.at(sigma))
+    }
+
     /// The integral over fractions from 0 to `sigma` in [0, 1].
     pub fn integral(&self, sigma: f64) -> f64 {
         match self {

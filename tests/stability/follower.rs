@@ -124,7 +124,8 @@ fn leaves_of_all_kinds_follow_to_where_they_rest() {
                 found = Some(there(follower.follow(&along).unwrap()));
             }
             let found = found.unwrap();
-            let off = Difference::between(&found.shape.rods, &relaxed.shape.rods).position;
+            // Their grids may differ.
+            let off = distance(&found, &relaxed);
             let bars = [&found, &relaxed].map(|leaf| leaf.accuracy.error_estimate.unwrap());
             println!(
                 "{name} {key} in {steps}: {off:.1e} of {:.1e}",

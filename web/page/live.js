@@ -237,7 +237,7 @@ async function travel(damped, released) {
     return land({ ask: "settle" });
   }
   const begun = performance.now();
-  const named = now.known.view.units[0] !== null;
+  const named = now.known.view.units[2] === "s";
   now.playing = true;
   let last = begun;
   let due = 0;
@@ -245,7 +245,7 @@ async function travel(damped, released) {
     stage.moving(answer.leaf);
     find("now").textContent = damped ? "on its way to the next equilibrium" : `t = ${stage.short(answer.time)}`;
     const time = await nextFrame();
-    // A named unit of length comes with seconds; without one a natural period takes about as long.
+    // Elsewhere a natural period takes about a second.
     const speed = (damped ? 2.5 : 1) / 2 ** (damped ? 0 : Number(find("slower").value));
     due += (Math.min(time - last, 100) / 1000) * speed * (named && !damped ? 1 : answer.unit);
     last = time;

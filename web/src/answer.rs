@@ -35,7 +35,7 @@ pub enum Answer {
     #[serde(serialize_with = "list")]
     Sensitivity(Vec<Told>),
     Unloaded(Known),
-    /// Where the leaf is, as [`place`](crate::place) writes it.
+    /// Where the leaf is, as [`place`](mod@crate::place) writes it.
     Place {
         at: String,
     },

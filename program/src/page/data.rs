@@ -24,8 +24,8 @@ pub struct View {
     pub success: bool,
     /// Names and texts of its numbers.
     pub summary: Vec<(&'static str, String)>,
-    /// Names of the units of length and force, if there are any.
-    pub units: [Option<String>; 2],
+    /// Names of the units of length, force and time, if there are any.
+    pub units: [Option<String>; 3],
     /// Gravity per length of vein.
     pub gravity: [f64; 3],
     /// What grips hold.

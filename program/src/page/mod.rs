@@ -127,7 +127,12 @@ pub fn bare(scenario: &Scenario) -> View {
         verdict: String::new(),
         success: true,
         summary: Vec::new(),
-        units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
+        units: [
+            &scenario.units.length,
+            &scenario.units.force,
+            &scenario.units.time,
+        ]
+        .map(Clone::clone),
         gravity: scenario.gravity,
         grips: (scenario.grips.iter())
             .map(|grip| Gripped {
@@ -229,7 +234,7 @@ mod tests {
         assert_eq!(outside.matches("</script>").count(), 3);
         let data = data(&page);
         assert_eq!(data["title"], "a < b </script>");
-        assert_eq!(data["units"], serde_json::json!(["cm", null]));
+        assert_eq!(data["units"], serde_json::json!(["cm", null, null]));
         assert_eq!(data["leaves"][0]["nodes"], leaf.shape.stations.len());
     }
 

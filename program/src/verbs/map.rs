@@ -182,6 +182,7 @@ impl Map {
         if todo.is_empty() {
             return Ok(Vec::new());
         }
+        let todo = spread(todo);
         let open = || Journal::open(&job.folder, &self.file_name(), request, known);
         let mut journal = keeps_rows.then(open).transpose()?;
         if journal.is_some() {
@@ -210,6 +211,20 @@ impl Map {
         });
         failed.map_or(Ok(rows), |error| Err(error.into()))
     }
+}
+
+/// The same, so that those before any of them are a fair sample of all: hard cells stand side by side,
+/// and the time that is left is estimated from the cells that are finished.
+fn spread<T>(all: Vec<T>) -> Vec<T> {
+    let count = all.len();
+    // Steps of the golden section, which leave no gap for long.
+    let golden = (0.618 * count as f64).round().max(1.0) as usize;
+    let shared = |step: usize, k: usize| step.is_multiple_of(k) && count.is_multiple_of(k);
+    let coprime = |step: &usize| (2..=*step).all(|k| !shared(*step, k));
+    let step = (golden..).find(coprime).unwrap_or(1);
+    let mut all: Vec<Option<T>> = all.into_iter().map(Some).collect();
+    let order = (0..count).map(|k| (k * step) % count);
+    order.filter_map(|at| all[at].take()).collect()
 }
 
 /// Writes unless something before could not be written, which is kept.
@@ -241,6 +256,22 @@ fn shards(folder: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Each comes once, and the first of them are from everywhere.
+    #[test]
+    fn cells_come_from_all_over_the_map() {
+        for count in [0, 1, 2, 3, 6, 7, 48, 117, 1024] {
+            let mut order = spread((0..count).collect::<Vec<usize>>());
+            let first: Vec<usize> = order.iter().copied().take(count / 4).collect();
+            for quarter in 0..4 {
+                let within = |cell: &&usize| **cell * 4 / count == quarter;
+                let found = first.iter().filter(within).count();
+                assert!(4 * found + 8 >= first.len(), "{count}: {first:?}");
+            }
+            order.sort();
+            assert_eq!(order, (0..count).collect::<Vec<_>>());
+        }
+    }
 
     /// A cell that is written after one that could not be does not hide that.
     #[test]

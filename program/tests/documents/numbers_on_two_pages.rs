@@ -39,6 +39,9 @@ docs/speed.md: 5.5e-6 | 198 ms | `tolerance=1e-4` | 5.0e-6 | 0.09 ms | {} |
 README.md: N = 35 | 1.3e-6 | 13.3 s | 0.60 ms | {} |
 docs/speed.md: 1.3e-6 | 13.3 s | `tolerance=1e-5` | 2.9e-7 | 0.60 ms | {} |
 
+README.md: a leaf of 10,000 veins {} s
+docs/speed.md: | 10,000 | {} |
+
 src/motion/explicit/mod.rs: PARALLEL_SEGMENTS: usize = {};
 docs/command-line.md: in leaves of {} segments and more
 

@@ -33,7 +33,7 @@ fn a_leaf_at_rest() {
     place.holds("out/leaf", "leaf.glb leaf.vtp view.html");
     let page = place.read("out/leaf/view.html");
     assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
-    contains(&page, &["\"units\": [\"cm\",\"N\"]"]);
+    contains(&page, &["\"units\": [\"cm\",\"N\",null]"]);
     let tubes = document(&place.path("out/leaf/leaf.glb"));
     assert!(tubes.get("animations").is_none());
     contains(&place.read("out/leaf/leaf.vtp"), &["NumberOfLines=\"9\""]);

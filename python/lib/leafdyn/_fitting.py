@@ -34,6 +34,8 @@ def fit(
 ) -> Fit:
     """Fit numbers of a scenario to measurements, and say what these determine and what they do not.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     scenario
@@ -58,8 +60,6 @@ def fit(
         such a table are left out.
     every
         The first row of each table of data is read, and then every so many.
-
-    The others are those of `relax`.
 
     Returns
     -------

@@ -74,6 +74,8 @@ def trace(
     """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way. With
     two numbers: follow the points at which its stability changes through both, as curves.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     vary
@@ -84,8 +86,6 @@ def trace(
         Also follow the branches that cross.
     points
         Most points of a branch, or of a curve to either side.
-
-    The others are those of `relax`.
 
     Returns
     -------
@@ -144,12 +144,12 @@ def boundary(
 ) -> Boundary:
     """Follow the points at which the stability of a leaf changes through two numbers of its scenario, as curves.
 
+    Parameters that are not listed are those of `trace`.
+
     Parameters
     ----------
     vary
         Both numbers, ``{"KEY": (low, high), ...}`` or a list of texts, with ranges as of `trace`.
-
-    The others are those of `trace`.
 
     Returns
     -------

@@ -274,6 +274,8 @@ def sensitivities(
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and how that changes with numbers of its scenario: derivatives, with errors.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     keys
@@ -281,8 +283,6 @@ def sensitivities(
         ``"scale:stiffness.bending_2"``, all numbers of that key times a factor.
     modes
         How many frequencies to differentiate; none, and no lowest eigenvalue either, is faster.
-
-    The others are those of `relax`.
 
     Returns
     -------

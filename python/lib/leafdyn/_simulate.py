@@ -25,6 +25,8 @@ def simulate(
 ) -> Motion:
     """Follow a leaf as it moves, and keep all outputs.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     method
@@ -36,8 +38,6 @@ def simulate(
         The longest time step; left out: as the method needs.
     tolerance
         Of the semi-implicit method: the local error of a step, relative to the longest rod.
-
-    The others are those of `relax`.
 
     Returns
     -------

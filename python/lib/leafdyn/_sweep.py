@@ -61,6 +61,8 @@ def sweep(
 ) -> Any:
     """Find how a leaf comes to rest over all combinations of some numbers of its scenario, on all cores.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     vary
@@ -77,8 +79,6 @@ def sweep(
         of an `Equilibrium`.
     client
         A ``dask.distributed.Client``, whose workers then solve the leaves.
-
-    The others are those of `relax`.
 
     Returns
     -------

@@ -118,6 +118,8 @@ def stability_map(
 ) -> Map:
     """Solve a leaf by several methods over one or two numbers, and tell where each method fails.
 
+    Parameters that are not listed are those of `relax`. A map shared among machines: ``leafdyn map --shard``.
+
     Parameters
     ----------
     vary
@@ -129,8 +131,6 @@ def stability_map(
         Time allowed for each method in each cell.
     show
         What the figure shows: ``"outcomes"`` or ``"waves"``.
-
-    The others are those of `relax`. A map shared among machines: ``leafdyn map --shard``.
 
     Returns
     -------
@@ -175,6 +175,8 @@ def chart(
 ) -> Chart:
     """Measure every method over its own accuracy: time against true error.
 
+    Parameters that are not listed are those of `relax`.
+
     Parameters
     ----------
     seconds
@@ -183,8 +185,6 @@ def chart(
         One or more; left out: all.
     rods
         Also measure time against the number of rods, at the tolerance: ``[5, 15, 35]``.
-
-    The others are those of `relax`.
 
     Returns
     -------

@@ -105,6 +105,11 @@ pub struct Vein {
     seams: Vec<f64>,
 }
 
+/// 1/cos(phi) of the angle with this tangent.
+fn secant(slope: f64) -> f64 {
+    (1.0 + slope * slope).sqrt()
+}
+
 impl Vein {
     pub fn new(outline: &Arc<Outline>, eta: f64, count: usize, material: Material) -> Vein {
         let (outline, count) = (outline.clone(), count as f64);
@@ -137,7 +142,7 @@ impl Vein {
 
     /// Arc length over the fraction `x` of the blade's length.
     fn stretch(&self, x: f64) -> f64 {
-        self.outline.length * self.slopes(x)[0].hypot(1.0)
+        self.outline.length * secant(self.slopes(x)[0])
     }
 
     /// The arc length between two fractions, between which the outline is smooth.
@@ -173,7 +178,7 @@ impl Vein {
             }
             let [slope, second] = self.slopes(x);
             // dx/ds = (1 + y'^2)^(-1/2) and its derivative, by sigma.
-            let speed = self.length / (self.outline.length * slope.hypot(1.0));
+            let speed = self.length / (self.outline.length * secant(slope));
             let change = -slope * second / (1.0 + slope * slope) * self.outline.length;
             [x, speed, speed * speed * change]
         };
@@ -203,22 +208,16 @@ impl Vein {
         // On a cylinder at the angle phi, tan(phi) = y', to its principal direction.
         let curvature = self.outline.curvature.as_ref();
         let curvature = curvature.map_or(0.0, |of| of.at(x)[0]) / (1.0 + slope * slope);
-        let sideways = second / slope.hypot(1.0).powi(3);
+        let sideways = second / secant(slope).powi(3);
         [curvature * slope, curvature, sideways]
     }
 
-    /// The properties of a vein at a fraction of its length, by their numbers.
-    fn properties(&self, sigma: f64) -> [f64; MOST] {
-        let x = self.place(sigma);
-        let h = self.outline.bearing_width(x) / self.count;
-        // The mass is that of the blade as it is.
-        let heavy = self.outline.width.at(x)[0].max(0.0) / self.count;
+    /// A1, A2, A3, H1, H2 and H3 at a fraction of its length, where this material is.
+    fn stiffnesses(&self, sigma: f64, material: &Local) -> [f64; 6] {
+        let h = self.outline.bearing_width(self.place(sigma)) / self.count;
         let Local {
             t, young, shear, ..
-        } = self.material.at(sigma);
-        let mass_density = self.material.mass_density.as_ref();
-        let density = mass_density.map_or(0.0, |it| it.at(sigma));
-        let [twist, bend, sideways] = self.rest_curvature(x);
+        } = *material;
         let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
         let across = SHEAR_FACTOR * shear * h * t;
         [
@@ -228,12 +227,40 @@ impl Vein {
             young * h * t,
             across,
             across,
-            twist,
-            bend,
-            sideways,
-            density * heavy * t,
-            0.5 * density * heavy * t * (heavy * heavy + t * t) / 12.0,
         ]
+    }
+
+    /// The mass and the moment of inertia per length, those of the blade as it is.
+    fn masses(&self, sigma: f64, material: &Local) -> [f64; 2] {
+        let width = self.outline.width.at(self.place(sigma))[0].max(0.0) / self.count;
+        let density = self.material.mass_density.as_ref();
+        let density = density.map_or(0.0, |it| it.at(sigma));
+        let (t, mass) = (material.t, density * width * material.t);
+        [mass, 0.5 * mass * (width * width + t * t) / 12.0]
+    }
+
+    /// A property at a fraction of its length, without the others.
+    fn property(&self, property: BladeProperty, sigma: f64) -> f64 {
+        match property {
+            BladeProperty::Couple(_) | BladeProperty::Force(_) => {
+                self.stiffnesses(sigma, &self.material.at(sigma))[property.number()]
+            }
+            // Natural leaves are integrated with these.
+            BladeProperty::Rest(axis) => self.rest_curvature(self.place(sigma))[axis],
+            BladeProperty::Density => self.masses(sigma, &self.material.at(sigma))[0],
+            BladeProperty::RotaryInertia => self.masses(sigma, &self.material.at(sigma))[1],
+            BladeProperty::Tissue(_) => 0.0,
+        }
+    }
+
+    /// All properties at a fraction of its length, by their numbers.
+    fn properties(&self, sigma: f64) -> [f64; MOST] {
+        let material = self.material.at(sigma);
+        let mut all = [0.0; MOST];
+        all[..6].copy_from_slice(&self.stiffnesses(sigma, &material));
+        all[6..9].copy_from_slice(&self.rest_curvature(self.place(sigma)));
+        all[9..].copy_from_slice(&self.masses(sigma, &material));
+        all
     }
 }
 
@@ -314,12 +341,32 @@ impl BladePart {
 
     /// A property at a fraction of the length.
     pub fn at(&self, property: BladeProperty, sigma: f64) -> f64 {
-        match (&self.source, property) {
-            // Natural leaves are integrated with these.
-            (Source::Vein(vein), BladeProperty::Rest(axis)) => {
-                vein.rest_curvature(vein.place(sigma))[axis]
+        match &self.source {
+            Source::Vein(vein) => vein.property(property, sigma),
+            Source::Gap(..) => self.properties(sigma)[property.number()],
+        }
+    }
+
+    /// Three properties of a vein at a fraction of its length, if they are of one kind.
+    pub fn three(&self, properties: [BladeProperty; 3], sigma: f64) -> Option<[f64; 3]> {
+        use BladeProperty::{Couple, Force, Rest};
+        let Source::Vein(vein) = &self.source else {
+            return None;
+        };
+        match properties {
+            [
+                Couple(_) | Force(_),
+                Couple(_) | Force(_),
+                Couple(_) | Force(_),
+            ] => {
+                let all = vein.stiffnesses(sigma, &vein.material.at(sigma));
+                Some(properties.map(|property| all[property.number()]))
             }
-            _ => self.properties(sigma)[property.number()],
+            [Rest(a), Rest(b), Rest(c)] => {
+                let all = vein.rest_curvature(vein.place(sigma));
+                Some([all[a], all[b], all[c]])
+            }
+            _ => None,
         }
     }
 
