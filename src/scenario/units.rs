@@ -84,6 +84,19 @@ impl Units {
         }
     }
 
+    /// How many grams the unit of mass is, if it follows from a known unit of length, newtons and
+    /// seconds.
+    pub fn grams(&self) -> Option<f64> {
+        let newtons = self.force.as_deref() == Some("N");
+        let metre = match self.length.as_deref()? {
+            "m" => 1.0,
+            "cm" => 1e2,
+            "mm" => 1e3,
+            _ => return None,
+        };
+        (newtons && self.is_in_seconds()).then_some(1e3 * metre)
+    }
+
     /// Whether the unit of time is called that of a second.
     pub fn is_in_seconds(&self) -> bool {
         self.time.as_deref() == Some("s")
@@ -116,6 +129,7 @@ mod tests {
         assert_eq!(units.of(PURE), None);
         assert_eq!(units.of([-1, -1, 0]).unwrap(), "1/(N cm)");
         assert_eq!(units.frequency().unwrap(), "Hz");
+        assert_eq!(units.grams(), Some(1e5));
         let without = Units {
             time: None,
             ..units
@@ -124,5 +138,6 @@ mod tests {
             (without.of(MASS), without.of(FORCE)),
             (None, Some("N".into()))
         );
+        assert_eq!(without.grams(), None);
     }
 }

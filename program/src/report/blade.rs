@@ -9,7 +9,10 @@ use leafdyn::scenario::units::{COUPLE_STIFFNESS, FORCE, FORCE_PER_AREA, LENGTH, 
 pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
     let length = |it: f64| in_unit(brief(it), units, LENGTH);
     let stiffness = |it: f64| in_unit(brief(it), units, COUPLE_STIFFNESS);
-    let mass = |it: f64| format!("; its mass is {}", in_unit(brief(it), units, MASS));
+    let mass = |it: f64| match units.grams() {
+        Some(grams) => format!("; its mass is {} g", brief(grams * it)),
+        None => format!("; its mass is {}", in_unit(brief(it), units, MASS)),
+    };
     let mut lines = vec![format!(
         "at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
         length(blade.width),
