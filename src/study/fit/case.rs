@@ -366,17 +366,6 @@ impl CaseAt {
         };
         (0..coordinates.len()).map(row).collect()
     }
-
-    /// How its photograph changes with each of these numbers.
-    pub fn photo_rates(&self, numbers: &[Parameter]) -> Vec<PhotoRate> {
-        let rate = |number: &Parameter| {
-            let terms = self.photo().and_then(|_| number.rate()).unwrap_or_default();
-            let photos = terms.iter();
-            let photos = photos.filter_map(|(weight, it)| Some((*weight, it.photo.as_ref()?)));
-            PhotoRate::of(photos)
-        };
-        numbers.iter().map(rate).collect()
-    }
 }
 
 /// A vector of length one, or zero.

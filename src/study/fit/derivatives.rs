@@ -10,6 +10,7 @@ use super::quantity::Quantity;
 use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Parameter};
+use crate::scenario::PhotoRate;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
@@ -46,14 +47,14 @@ impl Model<'_> {
         let leaf = &found.at.levels[0].leaf.leaf;
         let own: Vec<Change>;
         let own_rates: Vec<LeafRate>;
-        let rates: &[LeafRate] = if self.linear && of.loaded_only {
+        let (changes, rates): (&[Change], &[LeafRate]) = if self.linear && of.loaded_only {
             let changes = self.changes.get_or_init(changes).as_ref();
             let changes = changes.ok_or_else(at_limit)?;
-            shared.get_or_init(|| rates(leaf, changes))
+            (changes, shared.get_or_init(|| rates(leaf, changes)))
         } else {
             own = changes().ok_or_else(at_limit)?;
             own_rates = rates(leaf, &own);
-            &own_rates
+            (&own, &own_rates)
         };
         let tolerance = match self.grids {
             Grids::AsNeeded => self.base.scenario().tolerance.min(self.tolerance()),
@@ -68,7 +69,7 @@ impl Model<'_> {
             return Ok(());
         }
         responses.solve_each(&found.at.levels)?;
-        found.gradients = found.rates(&responses, (&numbers, rates), &slopes);
+        found.gradients = found.rates(&responses, (&numbers, changes, rates), &slopes);
         found.responses = Some(responses);
         Ok(())
     }
@@ -79,16 +80,26 @@ fn rates<'c>(leaf: &Leaf, changes: &'c [Change]) -> Vec<LeafRate<'c>> {
     rates.collect()
 }
 
+/// How a photograph changes with each number.
+fn photo_rates(changes: &[Change]) -> Vec<PhotoRate> {
+    let rate = |change: &Change| {
+        let photos = change.iter();
+        let photos = photos.filter_map(|(weight, it)| Some((*weight, it.photo.as_ref()?)));
+        PhotoRate::of(photos)
+    };
+    changes.iter().map(rate).collect()
+}
+
 impl CaseAt {
     /// Derivatives of its components with respect to the coordinates, whose `slopes` are given.
     fn rates(
         &self,
         responses: &Responses,
-        (numbers, rates): (&[Parameter], &[LeafRate]),
+        (numbers, changes, rates): (&[Parameter], &[Change], &[LeafRate]),
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();
-        let photos = self.photo_rates(numbers);
+        let photos = photo_rates(changes);
         // Measured more than once, a result has the same derivatives.
         let mut known: Vec<(Quantity, Vec<f64>)> = Vec::new();
         let mut index = 0;
