@@ -117,6 +117,16 @@ mod tests {
         text.lines().filter_map(begin).collect()
     }
 
+    /// Asserts that there is one line about each of these keys, and no other.
+    #[track_caller]
+    fn are_about(told: &[String], keys: &[&str]) {
+        assert_eq!(told.len(), keys.len(), "{told:?}");
+        for key in keys {
+            let found = told.iter().any(|line| line.contains(key));
+            assert!(found, "{key}: {told:?}");
+        }
+    }
+
     /// Every mistake is told once, and what a wrong entry decides is not judged.
     #[test]
     fn all_mistakes_are_told_at_once() {
@@ -130,13 +140,7 @@ mod tests {
             "leaf.joined",
             "solve.tolerance",
         ];
-        assert_eq!(told.len(), keys.len(), "{told:?}");
-        for key in keys {
-            assert!(
-                told.iter().any(|line| line.contains(key)),
-                "{key}: {told:?}"
-            );
-        }
+        are_about(&told, &keys);
         let rods = refused("length = [1, 1, 1]\nfan = [0, 0, 0]", "torsion = 1");
         let rods = rods.to_string().lines().count();
         assert_eq!(rods, 1, "only the tolerance is wrong");
@@ -162,13 +166,7 @@ mod tests {
             "blade.thickness",
             "load.g",
         ];
-        assert_eq!(told.len(), keys.len(), "{told:?}");
-        for key in keys {
-            assert!(
-                told.iter().any(|line| line.contains(key)),
-                "{key}: {told:?}"
-            );
-        }
+        are_about(&told, &keys);
         let listed = text.replace("\"0,025\"", "[0.1, 0.2]");
         let listed = Scenario::from_toml(&listed).unwrap_err();
         assert!(listed.others.is_empty(), "{listed}");
@@ -187,13 +185,7 @@ mod tests {
             "stiffness.torsion",
             "solve.tolerance",
         ];
-        assert_eq!(told.len(), keys.len(), "{told:?}");
-        for key in keys {
-            assert!(
-                told.iter().any(|line| line.contains(key)),
-                "{key}: {told:?}"
-            );
-        }
+        are_about(&told, &keys);
     }
 
     /// What follows from a wrong entry alone is not told.
