@@ -279,11 +279,8 @@ impl Follower {
         if let Some(follower) = follower {
             // What it is brought to on a finer grid need not stay there.
             let (usual, other) = (self.usual.min(follower.usual), self.other);
-            *self = Follower {
-                usual,
-                other,
-                ..follower
-            };
+            *self = follower;
+            (self.usual, self.other) = (usual, other);
         }
         Ok(result)
     }

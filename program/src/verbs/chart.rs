@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
+use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job};
 use super::progress::fraction_of;
-use super::request::{FOR_EXPERTS, Request, VerbTraits, words};
+use super::request::{Request, VerbTraits, words};
 use super::{Refusal, Status};
 use crate::files;
 use crate::report::words::contender;

@@ -11,6 +11,9 @@ use super::{Cli, Refusal, Status, show, show_report};
 use crate::files;
 use leafdyn::scenario::schema;
 
+/// The heading in the help of options that few need.
+pub const FOR_EXPERTS: &str = "Options for experts";
+
 /// Print the JSON schema of scenarios, by which editors complete and check them.
 #[derive(Debug, Args)]
 pub struct Schema {}

@@ -6,9 +6,10 @@ use std::str::FromStr;
 use std::sync::Mutex;
 use std::time::Instant;
 
+use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job};
 use super::progress::fraction_of;
-use super::request::{FOR_EXPERTS, Request, VerbTraits};
+use super::request::{Request, VerbTraits};
 use super::{OnInterrupt, Refusal, Status, on_interrupt};
 use crate::files::{self, Journal, Kind};
 use crate::report::{self, FileError};

@@ -1,8 +1,9 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
+use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
-use super::request::{FOR_EXPERTS, Request, VerbTraits, words};
+use super::request::{Request, VerbTraits, words};
 use super::{Refusal, Status};
 use crate::files::{Kind, LIVE};
 use crate::report::numbers::brief;

@@ -17,9 +17,9 @@ use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
 use leafdyn::memory;
 use leafdyn::scenario::{Entries, Place, ScenarioError, printable};
-use leafdyn::study::Base;
-use leafdyn::study::UnknownWord;
+use leafdyn::study::{Base, UnknownWord};
 
+use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job, attempt};
 use super::progress::{ProgressLine, fraction_of};
 use super::{Refusal, Status, cause, name_options, note, refuse, show, show_report};
@@ -63,9 +63,6 @@ pub struct Request {
     #[arg(long, short)]
     verbose: bool,
 }
-
-/// The heading in the help of options that few need.
-pub const FOR_EXPERTS: &str = "Options for experts";
 
 /// Most stations that can be requested.
 const MOST_STATIONS: i64 = 1_000_000;

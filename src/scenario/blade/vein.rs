@@ -148,10 +148,8 @@ impl Vein {
     /// The arc length between two fractions, between which the outline is smooth.
     fn arc(&self, from: f64, to: f64) -> f64 {
         let width = to - from;
-        GAUSS
-            .iter()
-            .map(|(x, weight)| width * weight * self.stretch(from + x * width))
-            .sum()
+        let part = |(x, weight): &(f64, f64)| width * weight * self.stretch(from + x * width);
+        GAUSS.iter().map(part).sum()
     }
 
     /// Finds its length, and x at equal distances along it.
@@ -215,19 +213,15 @@ impl Vein {
     /// A1, A2, A3, H1, H2 and H3 at a fraction of its length, where this material is.
     fn stiffnesses(&self, sigma: f64, material: &Local) -> [f64; 6] {
         let h = self.outline.bearing_width(self.place(sigma)) / self.count;
-        let Local {
-            t, young, shear, ..
-        } = *material;
+        let (t, young, shear) = (material.t, material.young, material.shear);
         let [flat, upright] = [h * t.powi(3), t * h.powi(3)];
-        let across = SHEAR_FACTOR * shear * h * t;
-        [
+        let [a1, a2, a3] = [
             shear * flat / 3.0,
             young * flat / 12.0,
             young * upright / 12.0,
-            young * h * t,
-            across,
-            across,
-        ]
+        ];
+        let across = SHEAR_FACTOR * shear * h * t;
+        [a1, a2, a3, young * h * t, across, across]
     }
 
     /// The mass and the moment of inertia per length, those of the blade as it is.
