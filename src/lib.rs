@@ -99,6 +99,7 @@
 mod branch;
 pub mod clock;
 mod homotopy;
+mod krylov;
 mod lanes;
 pub mod largest;
 mod leaf;

@@ -3,14 +3,16 @@
 
 mod convergence;
 mod following;
+mod force_progress;
 
 use convergence::{BALANCED, NEUTRAL_STEP, ROUNDING};
 pub use convergence::{Contraction, Stalled, at_saddle, converged, satisfies_lengths};
 pub use following::Following;
+pub use force_progress::ForceProgress;
 
 use crate::largest::larger;
 use crate::leaf::{
-    DirectError, DirectSolver, DiscreteLeaf, Field, Increment, Solved, State, System,
+    DirectError, DirectSolver, DiscreteLeaf, Factors, Field, Increment, Solved, State, System,
 };
 use crate::rod::RESOLVED_TURN;
 use serde::Serialize;
@@ -26,6 +28,9 @@ const LARGEST_SHIFT: f64 = 1e6;
 
 /// Relative accuracy of the conjugate gradients for a proximal step.
 const PROXIMAL_ACCURACY: f64 = 1e-6;
+
+/// Relative accuracy of the conjugate gradients for further right-hand sides.
+const AGAIN: f64 = 1e-10;
 
 /// Work done by a solver; deterministic, so that tests can check it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -110,9 +115,19 @@ pub struct Definite {
     /// The observed convergence of Newton's method so far.
     pub contraction: Contraction,
     pub direct: Option<DirectSolver>,
+    /// The factors of the last direct solution.
+    factors: Option<Factors>,
 }
 
 impl Definite {
+    /// With the convergence of Newton's method observed before.
+    pub fn after(contraction: Contraction) -> Self {
+        Definite {
+            contraction,
+            ..Definite::default()
+        }
+    }
+
     /// Factorises K + `shift` M and solves for the assembled right-hand side plus
     /// `inertia`.
     pub fn solve(
@@ -124,6 +139,7 @@ impl Definite {
         work: &mut Work,
     ) -> Result<(), Unsolved> {
         work.factorizations += 1;
+        self.factors = None;
         if self.direct.is_none() && !system.tied() {
             if !system.factorize(shift) {
                 return Err(Unsolved::Indefinite);
@@ -145,7 +161,20 @@ impl Definite {
             return Err(Unsolved::Indefinite);
         };
         factor.solve(system, inertia);
+        self.factors = Some(factor);
         Ok(())
+    }
+
+    /// Solves for other forces on the nodes with the matrix of the last solution.
+    pub fn solve_again(&mut self, system: &mut System, forces: &Field) -> Option<Field> {
+        match &mut self.factors {
+            Some(factors) => Some(factors.solve_bordered(forces, &[]).increments),
+            None => {
+                system.set_rhs(forces);
+                let solved = system.solve(None, AGAIN);
+                matches!(solved, Solved::Yes(_)).then(|| system.solution())
+            }
+        }
     }
 }
 
@@ -212,6 +241,8 @@ pub struct Newton<'a> {
 struct Linear<'s> {
     equations: Equations<'s>,
     pattern: Option<DirectSolver>,
+    /// The factors of the last direct solution.
+    factors: Option<Factors>,
     /// The shift that keeps neutral modes from moving.
     neutral: f64,
     /// The additional shift that makes the matrix positive definite.
@@ -235,10 +266,12 @@ impl Newton<'_> {
         let mut linear = Linear {
             equations,
             pattern: None,
+            factors: None,
             neutral: leaf.neutral_shift(),
             shift: 0.0,
             back: Field::new(),
         };
+        let mut forces = ForceProgress::new(leaf);
         let mut next = state.clone();
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         for step in 0..self.iterations {
@@ -254,16 +287,28 @@ impl Newton<'_> {
                 return Err(Stop::Unresolved);
             }
             let tolerance = linear.solve(state, previous, system, self.work)?;
-            let (turn, shift) = system.largest();
-            let size = larger(turn, shift);
+            let mut size = largest_increment(system);
             if !size.is_finite() || size > refused {
                 return Err(Stop::Stuck);
             }
             leaf.advance(state, system, (longest / size).min(1.0), &mut next);
+            if forces.lag(leaf, state, &next) {
+                let again = &mut |system: &mut System, forces: &Field| {
+                    linear.solve_again(state, system, forces)
+                };
+                system.complete_law(leaf, state, again);
+                size = largest_increment(system);
+                if !size.is_finite() || size > refused {
+                    return Err(Stop::Stuck);
+                }
+                leaf.advance(state, system, (longest / size).min(1.0), &mut next);
+            }
+            forces.observe(size, state, &next);
             std::mem::swap(state, &mut next);
             self.work.steps += 1;
             (self.progress)(step, size);
-            if any_sign && size < NEUTRAL_STEP && leaf.residual(state) < BALANCED {
+            let at_rest = forces.at_rest(self.accuracy);
+            if any_sign && size < NEUTRAL_STEP && at_rest && leaf.residual(state) < BALANCED {
                 return Ok(size.min(self.accuracy));
             }
             if linear.shift > 0.0 {
@@ -283,6 +328,7 @@ impl Newton<'_> {
                 let accuracy = (self.accuracy, ROUNDING);
                 let remaining = converged(size, previous, tolerances, accuracy, first);
                 if let Some(remaining) = remaining
+                    && at_rest
                     && satisfies_lengths(leaf, state, self.accuracy)
                 {
                     return Ok(remaining);
@@ -306,7 +352,34 @@ impl Newton<'_> {
     }
 }
 
+/// The largest rotation or displacement of the last solution.
+fn largest_increment(system: &System) -> f64 {
+    let (turn, shift) = system.largest();
+    larger(turn, shift)
+}
+
 impl Linear<'_> {
+    /// Solves for other forces on the nodes with the matrix of the last solution.
+    fn solve_again(&mut self, state: &State, system: &mut System, forces: &Field) -> Option<Field> {
+        match &mut self.equations {
+            Equations::Proximal { solver, .. } | Equations::Definite { solver, .. } => {
+                solver.solve_again(system, forces)
+            }
+            Equations::Unsymmetric => {
+                system.set_rhs(forces);
+                let solved = system.solve(None, 0.0);
+                matches!(solved, Solved::Yes(_)).then(|| system.solution())
+            }
+            Equations::AnySign { .. } => {
+                let factors = self.factors.as_mut()?;
+                Some(factors.solve_bordered(forces, &[]).increments)
+            }
+            Equations::Following { forces: follow, .. } => {
+                following::solve(self.factors.as_mut()?, forces, (*follow, state))
+            }
+        }
+    }
+
     /// Whether springs hold the nodes, so that a step depends on where it starts.
     fn moves(&self) -> bool {
         matches!(self.equations, Equations::Proximal { rate, .. } if rate > 0.0)
@@ -329,6 +402,7 @@ impl Linear<'_> {
                 let pattern = self.pattern.insert(pattern);
                 let mut factor = pattern.factorize(system, self.neutral)?;
                 factor.solve(system, None);
+                self.factors = Some(factor);
                 work.factorizations += 1;
                 Ok(0.0)
             }
@@ -339,7 +413,11 @@ impl Linear<'_> {
                 };
                 work.factorizations += 1;
                 let pattern = self.pattern.insert(pattern);
-                following::solve(system, pattern, self.neutral, (*forces, state))?;
+                let mut factors = pattern.factorize(system, self.neutral)?;
+                let rhs = system.rhs();
+                let found = following::solve(&mut factors, &rhs, (*forces, state));
+                system.set_solution(&found.ok_or(Stop::Stuck)?);
+                self.factors = Some(factors);
                 Ok(0.0)
             }
             Equations::Unsymmetric => {

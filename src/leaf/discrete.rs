@@ -169,9 +169,7 @@ impl DiscreteLeaf {
         let n = self.segments();
         let open = |j: usize| -> f64 {
             let gap = |i: usize| {
-                let section = self.section(j, i);
-                let nearly_rigid =
-                    (section.compliance * section.condensing).cmplt(DVec3::splat(0.5));
+                let nearly_rigid = self.missing_part(j, i).cmpgt(DVec3::ZERO);
                 if !nearly_rigid.any() {
                     return 0.0;
                 }

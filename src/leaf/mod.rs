@@ -11,6 +11,7 @@ mod factorised;
 mod flow;
 mod grid;
 mod holds;
+mod law;
 mod loads;
 mod mirror;
 mod moments;

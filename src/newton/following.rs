@@ -2,12 +2,12 @@
 //! matrix unsymmetric.
 //!
 //! With the symmetric matrix K without them and the derivative W of them, (1 - K^-1 W) d = K^-1 r
-//! is solved by GMRES (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986). K is
+//! is solved by GMRES ([`minimal_residual`]). K is
 //! factorised once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
-use crate::leaf::{DirectSolver, Field, State, System};
-use crate::newton::Stop;
+use crate::krylov::minimal_residual;
+use crate::leaf::{Factors, Field, Increment, State, System};
 
 /// Relative accuracy of the solution, and the largest number of directions.
 const ACCURACY: f64 = 1e-10;
@@ -22,93 +22,36 @@ pub trait Following {
     fn add_change(&self, state: &State, increments: &Field, forces: &mut Field);
 }
 
-/// Solves for the increments under the assembled right-hand side; they are stored in `system`.
+/// Solves for the increments under these forces with the factors of K; `None` if too many
+/// directions would be needed.
 pub fn solve(
-    system: &mut System,
-    pattern: &DirectSolver,
-    shift: f64,
+    factors: &mut Factors,
+    forces: &Field,
     (following, state): (&dyn Following, &State),
-) -> Result<(), Stop> {
-    let mut factors = pattern.factorize(system, shift)?;
-    let rhs = system.rhs();
-    let zero: Field = rhs.iter().map(|rod| vec![[0.0; 6]; rod.len()]).collect();
+) -> Option<Field> {
     let mut solved = |forces: &Field| factors.solve_bordered(forces, &[]).increments;
-    let start = solved(&rhs);
-    let length = norm(&start);
-    let mut solution = zero.clone();
-    if length == 0.0 {
-        system.set_solution(&solution);
-        return Ok(());
-    }
-    // Orthonormal directions, and the triangular factor of what the matrix makes of them.
-    let mut directions = vec![scaled(&start, 1.0 / length)];
-    let (mut triangle, mut turns): (Vec<Vec<f64>>, Vec<[f64; 2]>) = (Vec::new(), Vec::new());
-    let mut remaining = vec![length];
-    while remaining[turns.len()].abs() > ACCURACY * length {
-        let k = turns.len();
-        if k == DIRECTIONS || !remaining[k].is_finite() {
-            return Err(Stop::Stuck);
-        }
+    let start = solved(forces);
+    let (nodes, first) = (start[0].len(), flat(&start));
+    let zero: Field = vec![vec![[0.0; 6]; nodes]; start.len()];
+    let product = &mut |direction: &[f64]| {
         let mut change = zero.clone();
-        following.add_change(state, &directions[k], &mut change);
-        let mut next = directions[k].clone();
-        add(&mut next, -1.0, &solved(&change));
-        let mut column = Vec::with_capacity(k + 2);
-        for direction in &directions {
-            let part = product(direction, &next);
-            add(&mut next, -part, direction);
-            column.push(part);
-        }
-        let left = norm(&next);
-        for (i, [cos, sin]) in turns.iter().enumerate() {
-            let [a, b] = [column[i], column[i + 1]];
-            (column[i], column[i + 1]) = (cos * a + sin * b, cos * b - sin * a);
-        }
-        let hypotenuse = column[k].hypot(left);
-        let [cos, sin] = [column[k] / hypotenuse, left / hypotenuse];
-        column[k] = hypotenuse;
-        remaining.push(-sin * remaining[k]);
-        remaining[k] *= cos;
-        turns.push([cos, sin]);
-        triangle.push(column);
-        directions.push(scaled(&next, 1.0 / left.max(f64::MIN_POSITIVE)));
-    }
-    for k in (0..turns.len()).rev() {
-        let part = remaining[k] / triangle[k][k];
-        for i in 0..k {
-            remaining[i] -= part * triangle[k][i];
-        }
-        add(&mut solution, part, &directions[k]);
-    }
-    system.set_solution(&solution);
-    Ok(())
+        following.add_change(state, &field(direction, nodes), &mut change);
+        let image = flat(&solved(&change));
+        Some(direction.iter().zip(image).map(|(v, w)| v - w).collect())
+    };
+    let found = minimal_residual(&first, (ACCURACY, DIRECTIONS), product)?;
+    let solved = found.residual <= ACCURACY;
+    solved.then(|| found.sum().map_or(zero, |sum| field(&sum, nodes)))
 }
 
-fn product(a: &Field, b: &Field) -> f64 {
-    let pairs = a
-        .iter()
-        .flatten()
-        .flatten()
-        .zip(b.iter().flatten().flatten());
-    pairs.map(|(a, b)| a * b).sum()
+fn flat(field: &Field) -> Vec<f64> {
+    field.iter().flatten().flatten().copied().collect()
 }
 
-fn norm(a: &Field) -> f64 {
-    product(a, a).sqrt()
-}
-
-fn add(sum: &mut Field, factor: f64, other: &Field) {
-    let pairs = sum.iter_mut().flatten().flatten();
-    for (sum, other) in pairs.zip(other.iter().flatten().flatten()) {
-        *sum += factor * other;
-    }
-}
-
-fn scaled(field: &Field, factor: f64) -> Field {
-    let mut all = field.clone();
-    all.iter_mut()
-        .flatten()
-        .flatten()
-        .for_each(|x| *x *= factor);
-    all
+/// Increments of rods of so many nodes.
+fn field(numbers: &[f64], nodes: usize) -> Field {
+    let increments: Vec<Increment> = (numbers.chunks_exact(6))
+        .map(|six| std::array::from_fn(|c| six[c]))
+        .collect();
+    increments.chunks(nodes).map(<[Increment]>::to_vec).collect()
 }

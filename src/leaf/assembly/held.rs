@@ -5,6 +5,7 @@ use super::component;
 use crate::lanes::Four;
 use crate::leaf::chain::{Chain, Increments, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::Field;
 use crate::leaf::system::System;
 use crate::rod::UNKNOWNS;
 use glam::DVec3;
@@ -61,6 +62,15 @@ impl DiscreteLeaf {
             let rhs = &mut rhs[i - self.first_node()];
             for &c in self.held_components(j, i) {
                 rhs[c].0[group_and_lane(j).1] = 0.0;
+            }
+        }
+    }
+
+    /// Sets the held components of forces on the nodes to zero.
+    pub(in crate::leaf) fn clear_held_forces(&self, forces: &mut Field) {
+        for (j, i) in self.each(self.first_held()..self.segments() + 1) {
+            for &c in self.held_components(j, i) {
+                forces[j][i - self.first_node()][c] = 0.0;
             }
         }
     }

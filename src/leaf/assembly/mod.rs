@@ -30,6 +30,7 @@ impl DiscreteLeaf {
 
     fn assemble_with<const MATRIX: bool>(&self, state: &State, system: &mut System) -> Sums {
         let arch = system.arch;
+        system.law_forces.clear();
         each_group(system.parallel, &mut system.groups, |g, group| {
             let rods = Rods::new(self, state, g);
             run(arch, &mut Assemble::<MATRIX> { rods, group });
@@ -131,6 +132,9 @@ impl DiscreteLeaf {
                 .zip(next.n.chunks_mut(forces))
                 .enumerate()
                 .for_each(advance),
+        }
+        for (force, more) in next.n.iter_mut().zip(&solution.law_forces) {
+            *force += step * *more;
         }
     }
 

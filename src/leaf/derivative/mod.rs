@@ -35,10 +35,6 @@ pub struct LeafRate<'s> {
     leaves: Vec<(f64, Leaf)>,
 }
 
-/// A remaining gap below this part of the initial one counts as zero: the segment's force is
-/// condensed out with its own stiffness.
-const CLOSED: f64 = 1e-12;
-
 /// The derivative of a rod, in the leaf's units.
 struct RodRate<'s> {
     length: f64,
@@ -311,17 +307,7 @@ impl DiscreteLeaf {
             add(&mut nodes[j][i + 1 - first], -g_b, -g_x);
         }
         // Held components have no equations.
-        let only_tips = self.grips.is_empty() && !self.leaf.hinged();
-        let held = if only_tips { n } else { first };
-        for (j, i) in self.each(held..n + 1) {
-            let [turns, shifts] = self.moves(j, i);
-            let moves = [turns, turns, turns, shifts, shifts, shifts];
-            for (force, moves) in nodes[j][i - first].iter_mut().zip(moves) {
-                if !moves {
-                    *force = 0.0;
-                }
-            }
-        }
+        self.clear_held_forces(nodes);
     }
 
     /// The changes of the forces of all segments for increments of the nodes and changes of
@@ -346,9 +332,7 @@ impl DiscreteLeaf {
                 let segment = &segments[k];
                 let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
                 carried[k] += segment.frame * (section.condensing * gap / section.ds);
-                let left = DVec3::ONE - section.compliance * section.condensing;
-                let none = left.cmplt(DVec3::splat(CLOSED));
-                gaps[k] = gap * DVec3::select(none, DVec3::ZERO, left);
+                gaps[k] = gap * self.missing_part(j, i);
                 (a, dx0) = (b, dx1);
             }
         }

@@ -89,6 +89,9 @@ pub struct System {
     across: Vec<NodeBlock>,
     /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
     held: Vec<(usize, usize, Range<usize>)>,
+    /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
+    /// rigid ones; empty without any.
+    pub(super) law_forces: Vec<DVec3>,
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
 }
@@ -150,6 +153,7 @@ impl System {
                         .map(move |(i, parts)| (j, i - first, parts))
                 })
                 .collect(),
+            law_forces: Vec::new(),
             moments: DeadMoments::default(),
         }
     }
@@ -291,6 +295,7 @@ impl System {
 
     /// Replaces the last solution.
     pub fn set_solution(&mut self, increments: &Field) {
+        self.law_forces.clear();
         self.scatter(increments, |group| &mut group.solution);
     }
 

@@ -1,6 +1,5 @@
 //! The linear response of a settled leaf to forces, and to changes of its parameters.
 
-use crate::largest::largest;
 use crate::leaf::{
     DirectSolver, DiscreteLeaf, Factors, Field, Forces, LeafRate, Response, Solved, State, System,
 };
@@ -13,11 +12,6 @@ use glam::DVec3;
 /// limit.
 const SOLUTION: f64 = 3e-3;
 const BEST_SOLUTION: f64 = 1e-11;
-
-/// Iterations where the forces of a stiff rod are condensed out with less than its stiffness,
-/// each of which gains many digits, and the relative size of the last correction.
-const CORRECTIONS: usize = 3;
-const CORRECTED: f64 = 1e-10;
 
 /// A settled leaf (all rods, in space) with its equations linearised and factorised once for
 /// all right-hand sides.
@@ -125,26 +119,10 @@ fn response(
         nodes: Field::new(),
         carried: vec![DVec3::ZERO; gaps.len()],
     };
-    let mut first = f64::INFINITY;
-    for correction in 0..CORRECTIONS {
-        leaf.condense_gaps(segments, &gaps, &mut rhs);
-        let increments = solve(&rhs)?;
-        leaf.carried(segments, &increments, &mut gaps, &mut response.carried);
-        let all = increments.iter().flatten().flatten();
-        let largest = largest(all.map(|increment| increment.abs()));
-        if correction == 0 {
-            first = largest;
-            response.nodes = increments;
-        } else {
-            let sums = response.nodes.iter_mut().flatten().flatten();
-            (sums.zip(increments.iter().flatten().flatten())).for_each(|(sum, more)| *sum += more);
-        }
-        let settled = gaps.iter().all(|gap| *gap == DVec3::ZERO);
-        if !largest.is_finite() || settled || largest < CORRECTED * first {
-            break;
-        }
-        rhs.iter_mut().flatten().for_each(|force| *force = [0.0; 6]);
-    }
+    leaf.condense_gaps(segments, &gaps, &mut rhs);
+    response.nodes = solve(&rhs)?;
+    leaf.carried(segments, &response.nodes, &mut gaps, &mut response.carried);
+    leaf.complete_law(segments, &mut response, &mut gaps, solve);
     // Held nodes move with their holders.
     for (rod, moved) in response.nodes.iter_mut().zip(&load.moved) {
         let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());

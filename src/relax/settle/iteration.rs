@@ -218,10 +218,7 @@ fn settle_semi_implicit(
     let mut relaxation = Relaxation {
         near_rest,
         cg_tolerance,
-        solver: Definite {
-            contraction: history.contraction,
-            direct: None,
-        },
+        solver: Definite::after(history.contraction),
         most_evaluations,
         convex_only,
         ..Relaxation::new(state, accuracy, out, &problem.options.limit)

@@ -11,9 +11,9 @@
 //! the step may be as long as the energy allows; where it is not, the motion decides which
 //! equilibrium is reached, and the step is kept short enough to resolve it.
 
-use crate::leaf::{DiscreteLeaf, Leaf, State, Sums, System};
+use crate::leaf::{DiscreteLeaf, Field, Leaf, State, Sums, System};
 use crate::newton::{
-    Equations, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance, converged,
+    Equations, ForceProgress, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance, converged,
     satisfies_lengths,
 };
 use crate::relax::settle::methods::Relaxation;
@@ -135,6 +135,7 @@ impl Relaxation<'_> {
         let mut motion = Motion::new(leaf);
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let mut stalled = Stalled::default();
+        let mut forces = ForceProgress::new(leaf);
         let mut sums = assembled(leaf, &self.state, system, self.work);
         for step in 0..MAX_STEPS {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
@@ -142,12 +143,18 @@ impl Relaxation<'_> {
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
             self.solve_shortening(leaf, system, &mut motion, tolerance)?;
-            let (turn, shift) = system.largest();
-            let size = turn.max(shift);
-            let part = (MAX_TURN / turn)
-                .min(MAX_SHIFT / shift)
-                .min(motion.longest_part());
+            let (mut size, mut part) = step_size(system, &motion);
             leaf.advance(&self.state, system, part, &mut trial);
+            if forces.lag(leaf, &self.state, &trial) {
+                let solver = &mut self.solver;
+                let again = &mut |system: &mut System, forces: &Field| {
+                    solver.solve_again(system, forces)
+                };
+                system.complete_law(leaf, &self.state, again);
+                (size, part) = step_size(system, &motion);
+                leaf.advance(&self.state, system, part, &mut trial);
+            }
+            forces.observe(size, &self.state, &trial);
             let mut rest = None;
             if motion.is_newton() && part == 1.0 {
                 let contraction = &mut self.solver.contraction;
@@ -162,6 +169,7 @@ impl Relaxation<'_> {
             }
             if let Some(remaining) = rest
                 && size < SMALL
+                && forces.at_rest(accuracy)
                 && satisfies_lengths(leaf, &trial, accuracy)
             {
                 if sums.turn > RESOLVED_TURN {
@@ -188,6 +196,7 @@ impl Relaxation<'_> {
             sums = next;
             self.work.steps += 1;
             if let Some(remaining) = rest
+                && forces.at_rest(accuracy)
                 && satisfies_lengths(leaf, &self.state, accuracy)
             {
                 return Ok(remaining);
@@ -239,6 +248,13 @@ impl Relaxation<'_> {
             }
         }
     }
+}
+
+/// The size of the next step, and the part of it that is taken.
+fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
+    let (turn, shift) = system.largest();
+    let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
+    (turn.max(shift), part.min(motion.longest_part()))
 }
 
 /// Assembles the equations in a state.

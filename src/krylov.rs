@@ -1,0 +1,151 @@
+//! The generalized minimal residual method (GMRES; Y. Saad and M. H. Schultz, SIAM J. Sci. Stat.
+//! Comput. 7, 1986) for equations A x = b whose matrix is close to the identity but for few
+//! directions, as preconditioned ones are: A is known by its products.
+
+/// A solution as a sum over orthonormal directions.
+pub struct Expansion {
+    /// The directions, in the order in which they were multiplied by A.
+    pub directions: Vec<Vec<f64>>,
+    /// The coefficient of each; zero for a direction in which A is singular.
+    pub coefficients: Vec<f64>,
+    /// Norm of b - A x as a part of that of b.
+    pub residual: f64,
+}
+
+/// Solves A x = `b` until the residual is at most `accuracy` times the norm of b, in at most so
+/// many directions; `product` makes A times a direction. `None` if a product fails or is not
+/// finite. Directions beyond which no residual decreases end the search.
+pub fn minimal_residual(
+    b: &[f64],
+    (accuracy, most): (f64, usize),
+    product: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
+) -> Option<Expansion> {
+    let length = norm(b);
+    let mut found = Expansion {
+        directions: Vec::new(),
+        coefficients: Vec::new(),
+        residual: 0.0,
+    };
+    if length == 0.0 {
+        return Some(found);
+    }
+    if !length.is_finite() {
+        return None;
+    }
+    let mut next: Vec<f64> = b.iter().map(|value| value / length).collect();
+    // The triangular factor of what A makes of the directions, and the rotations that lead to it.
+    let (mut triangle, mut rotations): (Vec<Vec<f64>>, Vec<[f64; 2]>) = (Vec::new(), Vec::new());
+    let mut remaining = vec![length];
+    while found.directions.len() < most {
+        let k = triangle.len();
+        if remaining[k].abs() <= accuracy * length {
+            break;
+        }
+        let mut image = product(&next)?;
+        let size = norm(&image);
+        found.directions.push(next);
+        let mut column = Vec::with_capacity(k + 2);
+        for direction in &found.directions {
+            let part = dot(direction, &image);
+            add(&mut image, -part, direction);
+            column.push(part);
+        }
+        let left = norm(&image);
+        if !left.is_finite() {
+            return None;
+        }
+        for (i, [cos, sin]) in rotations.iter().enumerate() {
+            let [a, b] = [column[i], column[i + 1]];
+            (column[i], column[i + 1]) = (cos * a + sin * b, cos * b - sin * a);
+        }
+        let hypotenuse = column[k].hypot(left);
+        // A is singular in this direction, up to rounding.
+        if hypotenuse <= f64::EPSILON * size.max(1.0) {
+            break;
+        }
+        let [cos, sin] = [column[k] / hypotenuse, left / hypotenuse];
+        column[k] = hypotenuse;
+        remaining.push(-sin * remaining[k]);
+        remaining[k] *= cos;
+        rotations.push([cos, sin]);
+        triangle.push(column);
+        if left <= f64::EPSILON * size {
+            break;
+        }
+        next = image;
+        next.iter_mut().for_each(|value| *value /= left);
+    }
+    found.residual = remaining[triangle.len()].abs() / length;
+    for k in (0..triangle.len()).rev() {
+        let part = remaining[k] / triangle[k][k];
+        for i in 0..k {
+            remaining[i] -= part * triangle[k][i];
+        }
+        remaining[k] = part;
+    }
+    remaining.truncate(triangle.len());
+    remaining.resize(found.directions.len(), 0.0);
+    found.coefficients = remaining;
+    Some(found)
+}
+
+impl Expansion {
+    /// The solution.
+    pub fn sum(&self) -> Option<Vec<f64>> {
+        let (first, rest) = self.directions.split_first()?;
+        let mut sum: Vec<f64> = first.iter().map(|v| self.coefficients[0] * v).collect();
+        for (direction, part) in rest.iter().zip(&self.coefficients[1..]) {
+            add(&mut sum, *part, direction);
+        }
+        Some(sum)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn add(sum: &mut [f64], factor: f64, other: &[f64]) {
+    let pairs = sum.iter_mut().zip(other);
+    pairs.for_each(|(sum, other)| *sum += factor * other);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The identity with one outlier of any size takes two directions.
+    #[test]
+    fn one_outlier_takes_two_directions() {
+        for outlier in [1e-6, 0.3, 7.0] {
+            let product = &mut |v: &[f64]| {
+                let mut image = v.to_vec();
+                image[2] *= outlier;
+                Some(image)
+            };
+            let b = [1.0, -2.0, 0.5, 3.0];
+            let found = minimal_residual(&b, (1e-12, 10), product).unwrap();
+            assert_eq!(found.directions.len(), 2);
+            let x = found.sum().unwrap();
+            for (k, b) in b.iter().enumerate() {
+                let exact = if k == 2 { b / outlier } else { *b };
+                assert!((x[k] / exact - 1.0).abs() < 1e-9, "{k}: {} {exact}", x[k]);
+            }
+        }
+    }
+
+    /// A direction in which the matrix is singular is left out; what is missing is told.
+    #[test]
+    fn a_singular_direction_is_left_out() {
+        let product = &mut |v: &[f64]| Some(vec![v[0], 0.0]);
+        let found = minimal_residual(&[3.0, 4.0], (1e-12, 10), product).unwrap();
+        assert!((found.residual - 0.8).abs() < 1e-12, "{}", found.residual);
+        let none = &mut |v: &[f64]| Some(vec![0.0 * v[0]]);
+        let found = minimal_residual(&[1.0], (1e-12, 10), none).unwrap();
+        assert_eq!((found.residual, found.coefficients), (1.0, vec![0.0]));
+    }
+}

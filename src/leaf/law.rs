@@ -1,0 +1,143 @@
+//! The constitutive law of nearly rigid segments in linear equations.
+//!
+//! Newton's equations of a leaf have the spatial forces of its segments as unknowns,
+//! \[K B; B^T -C\] (dx, dn), with the compliances C. A force is condensed out with a stiffness k
+//! that is limited, as larger ones lose the soft modes to rounding
+//! ([`Section::condense`](crate::rod::Section::condense)): of a segment that is stiffer, C < 1/k,
+//! the length (1 - C k) (B^T dx - C dn) of the law v = v0 + n/H is then missing. Where loads
+//! determine the force that is next to nothing; where holders, or other rods, determine the strain,
+//! each solution gains only the part k/H of the force.
+//!
+//! So the missing lengths e are unknowns of their own: with them as additional gaps, a solution
+//! leaves G e missing in addition, and e = e0 + G e is solved by [`minimal_residual`]. But for the
+//! rods whose strain is determined G is small, so that few solutions are enough at any stiffness.
+
+use super::derivative::Response;
+use super::discrete::DiscreteLeaf;
+use super::state::{Field, State};
+use super::system::System;
+use crate::krylov::minimal_residual;
+use crate::largest::largest;
+use crate::rod::Segment;
+use glam::DVec3;
+
+/// Parts of the law of a segment below this are rounding.
+const CLOSED: f64 = 1e-12;
+
+/// What may be missing of the law after its completion, as a part of what was before, and the
+/// largest number of solutions for it.
+const COMPLETE: f64 = 1e-9;
+const SOLUTIONS: usize = 40;
+
+impl DiscreteLeaf {
+    /// The part of the law of segment `i` of rod `j` that a linear solution does not satisfy.
+    pub(super) fn missing_part(&self, j: usize, i: usize) -> DVec3 {
+        let section = self.section(j, i);
+        let left = DVec3::ONE - section.compliance * section.condensing;
+        DVec3::select(left.cmplt(DVec3::splat(CLOSED)), DVec3::ZERO, left)
+    }
+
+    /// Whether some segment is stiffer than its force is condensed out with.
+    pub fn is_nearly_rigid(&self) -> bool {
+        let mut segments = self.each(0..self.segments());
+        segments.any(|(j, i)| self.missing_part(j, i) != DVec3::ZERO)
+    }
+
+    /// The largest strain by which a step from one state to another misses the law of its nearly
+    /// rigid segments, to first order.
+    pub fn missing_strain(&self, before: &State, after: &State) -> f64 {
+        let n = self.segments();
+        let missing = |(j, i): (usize, usize)| {
+            let section = self.section(j, i);
+            let change = (after.n[j * n + i] - before.n[j * n + i]).length();
+            let missing = self.missing_part(j, i) / section.condensing;
+            missing.max_element() * change
+        };
+        largest(self.each(0..n).map(missing))
+    }
+
+    /// Largest stiffness in stretch and shear of any segment; infinite if one is rigid.
+    pub fn largest_force_stiffness(&self) -> f64 {
+        1.0 / self.least_compliance()
+    }
+
+    /// Completes the law in the `response` of a leaf with these `segments`: `gaps` are the lengths
+    /// that the response misses, and in return the additional gaps for which it was solved. `solve`
+    /// solves for the increments of the nodes under forces on them, with the factorised matrix.
+    /// False if a solution fails or the law cannot be satisfied; the response is then as it was.
+    pub fn complete_law(
+        &self,
+        segments: &[Segment],
+        response: &mut Response,
+        gaps: &mut [DVec3],
+        solve: &mut dyn FnMut(&Field) -> Option<Field>,
+    ) -> bool {
+        let missing: Vec<f64> = gaps.iter().flat_map(|gap| gap.to_array()).collect();
+        if missing.iter().all(|part| *part == 0.0) {
+            return true;
+        }
+        let none: Field = (response.nodes.iter())
+            .map(|rod| vec![[0.0; 6]; rod.len()])
+            .collect();
+        let mut responses: Vec<Response> = Vec::new();
+        let product = &mut |direction: &[f64]| {
+            let mut left: Vec<DVec3> = vectors(direction);
+            let mut forces = none.clone();
+            self.condense_gaps(segments, &left, &mut forces);
+            let nodes = solve(&forces)?;
+            let mut carried = vec![DVec3::ZERO; left.len()];
+            self.carried(segments, &nodes, &mut left, &mut carried);
+            responses.push(Response { nodes, carried });
+            let left = left.iter().flat_map(|gap| gap.to_array());
+            Some(direction.iter().zip(left).map(|(v, g)| v - g).collect())
+        };
+        let Some(found) = minimal_residual(&missing, (COMPLETE, SOLUTIONS), product) else {
+            return false;
+        };
+        for (part, more) in found.coefficients.iter().zip(&responses) {
+            response.add(*part, more);
+        }
+        if let Some(sum) = found.sum() {
+            gaps.copy_from_slice(&vectors(&sum));
+        }
+        found.residual < 1.0
+    }
+}
+
+impl System {
+    /// Completes the law of nearly rigid segments in the solution of the equations assembled in a
+    /// `state` of `leaf`; `solve` as in [`DiscreteLeaf::complete_law`].
+    pub fn complete_law(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        state: &State,
+        solve: &mut dyn FnMut(&mut System, &Field) -> Option<Field>,
+    ) {
+        let segments = leaf.all_segments(state);
+        let mut gaps: Vec<DVec3> = segments.iter().map(|segment| segment.gap).collect();
+        let mut response = Response {
+            nodes: self.solution(),
+            carried: vec![DVec3::ZERO; gaps.len()],
+        };
+        leaf.carried(&segments, &response.nodes, &mut gaps, &mut response.carried);
+        let first = response.nodes.clone();
+        let complete = leaf.complete_law(&segments, &mut response, &mut gaps, &mut |forces| {
+            solve(self, forces)
+        });
+        if !complete {
+            self.set_solution(&first);
+            return;
+        }
+        self.set_solution(&response.nodes);
+        let n = leaf.segments();
+        let forces = leaf.each(0..n).map(|(j, i)| {
+            let (section, k) = (leaf.section(j, i), j * n + i);
+            segments[k].frame * (section.condensing * gaps[k] / section.ds)
+        });
+        self.law_forces.extend(forces);
+    }
+}
+
+fn vectors(numbers: &[f64]) -> Vec<DVec3> {
+    numbers.chunks_exact(3).map(DVec3::from_slice).collect()
+}
