@@ -106,13 +106,14 @@ impl DiscreteLeaf {
 
 impl System {
     /// Completes the law of nearly rigid segments in the solution of the equations assembled in a
-    /// `state` of `leaf`; `solve` as in [`DiscreteLeaf::complete_law`].
+    /// `state` of `leaf`; `solve` as in [`DiscreteLeaf::complete_law`]. Returns the forces on the
+    /// nodes that do so, beside those assembled.
     pub fn complete_law(
         &mut self,
         leaf: &DiscreteLeaf,
         state: &State,
         solve: &mut dyn FnMut(&mut System, &Field) -> Option<Field>,
-    ) {
+    ) -> Option<Field> {
         let segments = leaf.all_segments(state);
         let mut gaps: Vec<DVec3> = segments.iter().map(|segment| segment.gap).collect();
         let mut response = Response {
@@ -126,7 +127,7 @@ impl System {
         });
         if !complete {
             self.set_solution(&first);
-            return;
+            return None;
         }
         self.set_solution(&response.nodes);
         let n = leaf.segments();
@@ -135,6 +136,20 @@ impl System {
             segments[k].frame * (section.condensing * gaps[k] / section.ds)
         });
         self.law_forces.extend(forces);
+        let mut nodes: Field = first.iter().map(|rod| vec![[0.0; 6]; rod.len()]).collect();
+        leaf.condense_gaps(&segments, &gaps, &mut nodes);
+        Some(nodes)
+    }
+
+    /// The spatial forces of the segments, beside those of the solution, that complete the law.
+    pub fn law_forces(&self) -> &[DVec3] {
+        &self.law_forces
+    }
+
+    /// Sets the solution, with these additional forces of the segments.
+    pub fn set_completed(&mut self, increments: &Field, law_forces: &[DVec3]) {
+        self.set_solution(increments);
+        self.law_forces.extend_from_slice(law_forces);
     }
 }
 

@@ -7,10 +7,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::branch::problem::equations::{
     Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized,
 };
-use crate::branch::problem::field::{add, combined, dot, is_finite, largest, times};
+use crate::branch::problem::field::{add, combined, dot, is_finite, largest, plus, times};
 use crate::branch::{Direction, Point, Solution};
 use crate::largest::larger;
-use crate::leaf::{Bordered, Field, System};
+use crate::leaf::{Bordered, Factors, Field, System};
+use glam::DVec3;
 
 /// Singular values below this, relative to the largest, count as zero.
 const NEUTRAL: f64 = 1e-7;
@@ -33,6 +34,8 @@ pub struct Sample<const N: usize = 1> {
     pub rates: Vec<Field>,
     /// Rounding error of the forces.
     pub noise: f64,
+    /// Forces of the segments that complete the law of nearly rigid ones in the increments.
+    law_forces: Vec<DVec3>,
 }
 
 impl<const N: usize> Equations<'_, N> {
@@ -84,7 +87,7 @@ impl<const N: usize> Equations<'_, N> {
         let Solution { state, params } = &sample.solution;
         let (increments, changes, size) = sample.solved.step(functions, sample.noise)?;
         let params = from_fn(|i| params[i] + changes[i]);
-        let state = self.advanced(state, params, &increments, 1.0)?;
+        let state = self.corrected(state, params, (&increments, &sample.law_forces))?;
         Ok((Solution { state, params }, size))
     }
 
@@ -98,23 +101,38 @@ impl<const N: usize> Equations<'_, N> {
         soft: bool,
     ) -> Result<Sample<N>, Stuck> {
         let linear = self.assemble(&mut solution, soft)?;
+        let (mut solved, mut factor) =
+            self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
+        let none = vec![0.0; border.len()];
+        let mut increments = solved.forces.increments.clone();
+        // The softened matrix determines what is singular, and no step.
+        let (completing, law_forces) = match soft {
+            true => (None, Vec::new()),
+            false => self.complete_law(&solution, &mut increments, &mut |_, forces| {
+                Some(factor.solve_bordered(forces, &none).increments)
+            })?,
+        };
+        if let Some(completing) = completing {
+            solved.forces = factor.solve_bordered(&plus(&linear.forces, 1.0, &completing), &none);
+        }
         Ok(Sample {
-            solved: self.solve_bordered(border, &linear.forces, &rates, 0.0)?,
+            solved,
             solution,
             rates,
             noise: linear.noise,
+            law_forces,
         })
     }
 
     /// Solves the bordered equations with K + `shift` M, where K is the assembled matrix: for the
-    /// forces, their rates, and the unit vectors of the border.
+    /// forces, their rates, and the unit vectors of the border. Also returns the factors.
     pub(in crate::branch) fn solve_bordered(
         &mut self,
         border: &[Field],
         forces: &Field,
         rates: &[Field],
         shift: f64,
-    ) -> Result<Solved, Stuck> {
+    ) -> Result<(Solved, Factors), Stuck> {
         let p = border.len();
         let pattern = self.pattern(p)?;
         self.factorizations += 1;
@@ -126,7 +144,7 @@ impl<const N: usize> Equations<'_, N> {
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
         let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
         let columns: Vec<Bordered> = columns.collect();
-        Ok(Solved {
+        let solved = Solved {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
@@ -136,7 +154,8 @@ impl<const N: usize> Equations<'_, N> {
                 .map(|rate| factor.solve_bordered(rate, &none))
                 .collect(),
             negative: factor.negative(),
-        })
+        };
+        Ok((solved, factor))
     }
 }
 

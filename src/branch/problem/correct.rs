@@ -1,24 +1,27 @@
 //! Newton's method to a branch, within a plane or at a parameter, and the Morse index there.
 
 use crate::branch::problem::equations::{
-    Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized,
+    ACCURACY, Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized,
 };
 use crate::branch::problem::family::{OutOfRange, clamp};
 use crate::branch::problem::field::{add, at_same_nodes, between, dot, is_finite, largest, plus};
 use crate::branch::problem::states::rate;
 use crate::branch::{Direction, Point, Solution};
 use crate::largest::larger;
-use crate::leaf::{DiscreteLeaf, Field, Solved, State};
+use crate::leaf::{DiscreteLeaf, Field, Solved, State, System};
+use crate::newton::ForceProgress;
 use crate::relax::NOISY;
 use crate::relax::transfer::prolong::prolong;
+use glam::DVec3;
 
 const CG_TOLERANCE: f64 = 1e-11;
 
 /// A step too small to change the sign of any eigenvalue, even of a nearly neutral one.
 const SAME_INDEX: f64 = 1e-9;
 
-/// Iterations go on while an increment is at most this part of the one before.
+/// Iterations go on while an increment is at most this part of the one before, up to so many.
 const CONTRACTING: f64 = 0.5;
+const MOST_ITERATIONS: usize = 50;
 
 /// A hyperplane in which a point is sought.
 pub(in crate::branch) struct Plane {
@@ -65,6 +68,18 @@ impl Plane {
     }
 }
 
+/// Solutions of the equations of a branch at a state.
+struct Step {
+    /// The increments that balance the forces, and the forces of the segments that complete the law
+    /// of nearly rigid ones in them.
+    forces: Field,
+    law_forces: Vec<DVec3>,
+    /// The rate of the increments with the parameter.
+    rate: Field,
+    /// Negative eigenvalues, if they were counted.
+    counted: Option<usize>,
+}
+
 impl Equations<'_> {
     /// Derivative, with respect to the parameter, of the positions of held nodes that have equations,
     /// which the forces do not contain; `None` if there are none.
@@ -86,20 +101,28 @@ impl Equations<'_> {
     /// else by a direct factorisation, which also counts the negative eigenvalues.
     fn solve(
         &mut self,
+        at: &Solution,
         linear: &Linear,
         rate: &Field,
-    ) -> Result<(Field, Field, Option<usize>), Stuck> {
+    ) -> Result<Step, Stuck> {
         let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
             if self.system.factorize(shift) {
-                let mut solved = |rhs: &Field| {
-                    self.system.set_rhs(rhs);
-                    let found = self.system.solve(None, CG_TOLERANCE);
-                    matches!(found, Solved::Yes(_)).then(|| self.system.solution())
+                let mut solved = |system: &mut System, rhs: &Field| {
+                    system.set_rhs(rhs);
+                    let found = system.solve(None, CG_TOLERANCE);
+                    matches!(found, Solved::Yes(_)).then(|| system.solution())
                 };
-                if let (Some(forces), Some(rate)) = (solved(&linear.forces), solved(rate)) {
-                    return Ok((forces, rate, None));
+                let found = [&linear.forces, rate].map(|rhs| solved(&mut self.system, rhs));
+                if let [Some(mut forces), Some(rate)] = found {
+                    let (_, law_forces) = self.complete_law(at, &mut forces, &mut solved)?;
+                    return Ok(Step {
+                        forces,
+                        law_forces,
+                        rate,
+                        counted: None,
+                    });
                 }
             }
             self.rodwise = false;
@@ -107,9 +130,16 @@ impl Equations<'_> {
         }
         let pattern = self.pattern(0)?;
         let mut factor = factorized(&pattern, &self.system, shift)?;
-        let forces = factor.solve_bordered(&linear.forces, &[]).increments;
-        let rate = factor.solve_bordered(rate, &[]).increments;
-        Ok((forces, rate, Some(factor.negative())))
+        let mut solved = |rhs: &Field| factor.solve_bordered(rhs, &[]).increments;
+        let [mut forces, rate] = [&linear.forces, rate].map(&mut solved);
+        let (_, law_forces) =
+            self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
+        Ok(Step {
+            forces,
+            law_forces,
+            rate,
+            counted: Some(factor.negative()),
+        })
     }
 
     /// Newton corrector: back to the branch within the plane normal to `normal`
@@ -146,10 +176,16 @@ impl Equations<'_> {
             params: [fraction],
         };
         let mut previous = f64::INFINITY;
+        let mut progress = None;
         for iterations in 1.. {
             let rates = self.rates(&now, false)?;
             let linear = self.assemble(&mut now, false)?;
-            let (forces, mut rate, counted) = self.solve(&linear, &rates[0])?;
+            let Step {
+                forces,
+                law_forces,
+                mut rate,
+                counted,
+            } = self.solve(&now, &linear, &rates[0])?;
             if let Some(held) = self.held_rate(&now.state, now.params[0])? {
                 add(&mut rate, 1.0, &held);
             }
@@ -164,8 +200,14 @@ impl Equations<'_> {
                 return Err(Stuck::NotConverged);
             }
             now.params[0] += step;
-            now.state = self.advanced(&now.state, now.params, &increments, 1.0)?;
-            if at_rest(size, previous) {
+            let next = self.corrected(&now.state, now.params, (&increments, &law_forces))?;
+            let progress = match &mut progress {
+                Some(progress) => progress,
+                none => none.insert(ForceProgress::new(self.leaves.at(now.params)?)),
+            };
+            progress.observe(size, &now.state, &next);
+            now.state = next;
+            if at_rest(size, previous) && progress.at_rest(ACCURACY) {
                 clamp(self.leaves.at(now.params)?, &mut now.state);
                 let tangent = self.normalised(Direction {
                     increments: rate,
@@ -185,7 +227,9 @@ impl Equations<'_> {
                 });
             }
             // Where the matrix is that of a softer leaf, the method converges linearly.
-            if iterations >= ITERATIONS && size > CONTRACTING * previous {
+            if iterations >= ITERATIONS && size > CONTRACTING * previous
+                || iterations >= MOST_ITERATIONS
+            {
                 break;
             }
             previous = size;

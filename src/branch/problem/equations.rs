@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use crate::branch::problem::family::{Family, Leaves, OutOfRange, clamp};
 use crate::branch::problem::field::{dot, prolong, times};
 use crate::branch::problem::states::{advanced, forces_on, rate, stiffest_condensed};
@@ -18,7 +20,7 @@ pub(in crate::branch) const ITERATIONS: usize = 10;
 pub(in crate::branch) const LARGEST: f64 = 1.0;
 
 /// Accuracy of a point (radians, lengths).
-const ACCURACY: f64 = 1e-10;
+pub(in crate::branch) const ACCURACY: f64 = 1e-10;
 
 /// Increments below this that do not shrink are due to rounding.
 const ROUNDED: f64 = 1e-8;
@@ -168,8 +170,39 @@ impl<'a, const N: usize> Equations<'a, N> {
         increments: &Field,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        let leaf = self.leaves.at(params)?;
+        let (leaf, increments) = (self.leaves.at(params)?, (increments, [].as_slice()));
         Ok(advanced(leaf, state, &mut self.system, increments, step))
+    }
+
+    /// The same after a step of Newton's method, with the forces that complete the law of nearly
+    /// rigid segments.
+    pub(in crate::branch) fn corrected(
+        &mut self,
+        state: &State,
+        params: [f64; N],
+        step: (&Field, &[DVec3]),
+    ) -> Result<State, OutOfRange> {
+        let leaf = self.leaves.at(params)?;
+        Ok(advanced(leaf, state, &mut self.system, step, 1.0))
+    }
+
+    /// Completes the law of nearly rigid segments in the increments under the forces assembled at
+    /// a solution; `solve` solves with the factors at hand. Returns the forces on the nodes by which
+    /// it does so, and those of the segments.
+    pub(in crate::branch) fn complete_law(
+        &mut self,
+        at: &Solution<N>,
+        increments: &mut Field,
+        solve: &mut dyn FnMut(&mut System, &Field) -> Option<Field>,
+    ) -> Result<(Option<Field>, Vec<DVec3>), OutOfRange> {
+        let leaf = self.leaves.at(at.params)?;
+        if !leaf.is_nearly_rigid() {
+            return Ok((None, Vec::new()));
+        }
+        self.system.set_solution(increments);
+        let forces = self.system.complete_law(leaf, &at.state, solve);
+        *increments = self.system.solution();
+        Ok((forces, self.system.law_forces().to_vec()))
     }
 
     /// Returns the forces; the matrix (the softened one, if `soft` and there is one) is left in

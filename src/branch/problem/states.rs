@@ -4,6 +4,7 @@
 use crate::branch::problem::family::clamp;
 use crate::branch::problem::field::{plus, times};
 use crate::leaf::{DiscreteLeaf, Field, State, System};
+use glam::DVec3;
 
 /// Step of central differences of forces, as a part of the parameter's range: truncation
 /// error and rounding error are both about 1e-10.
@@ -47,12 +48,13 @@ pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Fie
 }
 
 /// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
-/// segments at a clamp depend on all of its displacement, however short the step.
+/// segments at a clamp depend on all of its displacement, however short the step. The segments
+/// change by `law_forces` in addition (none if empty).
 pub fn advanced(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
-    increments: &Field,
+    (increments, law_forces): (&Field, &[DVec3]),
     step: f64,
 ) -> State {
     let mut clamped = state.clone();
@@ -61,11 +63,12 @@ pub fn advanced(
     if clamped.x == state.x && clamped.q == state.q {
         // The rounding error in the lengths of nearly rigid segments is scaled down
         // with the step.
-        system.set_solution(increments);
+        system.set_completed(increments, law_forces);
         leaf.advance(state, system, step, &mut next);
         return next;
     }
     let mut increments = times(increments, step);
+    let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
     for (j, i) in leaf.each(leaf.moving_nodes()) {
         let [turns, shifts] = leaf.moves(j, i);
         let increment = &mut increments[j][i - leaf.first_node()];
@@ -76,7 +79,7 @@ pub fn advanced(
             increment[..3].fill(0.0);
         }
     }
-    system.set_solution(&increments);
+    system.set_completed(&increments, &law_forces);
     leaf.advance(&clamped, system, 1.0, &mut next);
     next
 }

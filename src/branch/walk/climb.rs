@@ -134,7 +134,7 @@ impl Equations<'_> {
         let modes = self.soft_modes(point, SOFT)?;
         let linear = self.assemble(&mut point.solution(), false)?;
         let border = [self.momentum(&modes[0])];
-        let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
+        let (solved, _) = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
         Ok(-solved.h[(0, 0)] / self.mass)
     }
 
@@ -218,7 +218,7 @@ impl Equations<'_> {
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
             let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
-            let mut solved = solved.ok()?;
+            let (mut solved, _) = solved.ok()?;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {
                 let along = solved.modes.swap_remove(0);
