@@ -2,11 +2,20 @@
 //! Comput. 7, 1986) for equations A x = b whose matrix is close to the identity but for few
 //! directions, as preconditioned ones are: A is known by its products.
 
+use nalgebra::{DMatrix, DVector};
+
+/// Directions of a singular value below this are left out: A, which is close to the identity, is
+/// singular in them, up to rounding.
+const SINGULAR: f64 = 1e-8;
+
+/// The search ends where so many directions in a row leave more than this part of the residual.
+const STAGNATING: (usize, f64) = (3, 0.99);
+
 /// A solution as a sum over orthonormal directions.
 pub struct Expansion {
     /// The directions, in the order in which they were multiplied by A.
     pub directions: Vec<Vec<f64>>,
-    /// The coefficient of each; zero for a direction in which A is singular.
+    /// The coefficient of each.
     pub coefficients: Vec<f64>,
     /// Norm of b - A x as a part of that of b.
     pub residual: f64,
@@ -14,7 +23,7 @@ pub struct Expansion {
 
 /// Solves A x = `b` until the residual is at most `accuracy` times the norm of b, in at most so
 /// many directions; `product` makes A times a direction. `None` if a product fails or is not
-/// finite. Directions beyond which no residual decreases end the search.
+/// finite. In directions in which A is singular the solution is zero.
 pub fn minimal_residual(
     b: &[f64],
     (accuracy, most): (f64, usize),
@@ -38,7 +47,10 @@ pub fn minimal_residual(
     let mut remaining = vec![length];
     while found.directions.len() < most {
         let k = triangle.len();
-        if remaining[k].abs() <= accuracy * length {
+        let stagnates = k
+            .checked_sub(STAGNATING.0)
+            .is_some_and(|before| remaining[k].abs() > STAGNATING.1 * remaining[before].abs());
+        if remaining[k].abs() <= accuracy * length || stagnates {
             break;
         }
         let mut image = product(&next)?;
@@ -59,7 +71,6 @@ pub fn minimal_residual(
             (column[i], column[i + 1]) = (cos * a + sin * b, cos * b - sin * a);
         }
         let hypotenuse = column[k].hypot(left);
-        // A is singular in this direction, up to rounding.
         if hypotenuse <= f64::EPSILON * size.max(1.0) {
             break;
         }
@@ -75,17 +86,18 @@ pub fn minimal_residual(
         next = image;
         next.iter_mut().for_each(|value| *value /= left);
     }
-    found.residual = remaining[triangle.len()].abs() / length;
-    for k in (0..triangle.len()).rev() {
-        let part = remaining[k] / triangle[k][k];
-        for i in 0..k {
-            remaining[i] -= part * triangle[k][i];
-        }
-        remaining[k] = part;
-    }
-    remaining.truncate(triangle.len());
-    remaining.resize(found.directions.len(), 0.0);
-    found.coefficients = remaining;
+    let count = triangle.len();
+    let upper = DMatrix::from_fn(
+        count,
+        count,
+        |r, c| if r <= c { triangle[c][r] } else { 0.0 },
+    );
+    let right = DVector::from_column_slice(&remaining[..count]);
+    let coefficients = upper.clone().svd(true, true).solve(&right, SINGULAR).ok()?;
+    let left_out = (&right - upper * &coefficients).norm();
+    found.residual = remaining[count].hypot(left_out) / length;
+    found.coefficients = coefficients.iter().copied().collect();
+    found.coefficients.resize(found.directions.len(), 0.0);
     Some(found)
 }
 

@@ -18,7 +18,7 @@ use super::state::{Field, State};
 use super::system::System;
 use crate::krylov::minimal_residual;
 use crate::largest::largest;
-use crate::rod::Segment;
+use crate::rod::{Section, Segment};
 use glam::DVec3;
 
 /// Parts of the law of a segment below this are rounding.
@@ -56,22 +56,48 @@ impl DiscreteLeaf {
         largest(self.each(0..n).map(missing))
     }
 
-    /// Largest stiffness in stretch and shear of any segment; infinite if one is rigid.
+    /// Largest stiffness in stretch and shear of any segment; of rigid ones that with which their
+    /// force is condensed out.
     pub fn largest_force_stiffness(&self) -> f64 {
-        1.0 / self.least_compliance()
+        let stiffness = |section: &Section| {
+            let rigid = section.compliance.cmpeq(DVec3::ZERO);
+            DVec3::select(rigid, section.condensing, section.compliance.recip()).max_element()
+        };
+        largest(self.sections.iter().map(stiffness))
+    }
+
+    /// The parts of the law that a completion closes: all, or without `rigid` directions those of a
+    /// finite stiffness. A straight rigid rod between holders has no force of its own, and its
+    /// length depends on its deflection in second order: Newton's method with its exact length
+    /// would converge slowly there, where that with a limited stiffness keeps it straight.
+    fn closed_part(&self, (j, i): (usize, usize), rigid: bool) -> DVec3 {
+        let is_rigid = self.section(j, i).compliance.cmpeq(DVec3::ZERO);
+        match rigid {
+            true => DVec3::ONE,
+            false => DVec3::select(is_rigid, DVec3::ZERO, DVec3::ONE),
+        }
     }
 
     /// Completes the law in the `response` of a leaf with these `segments`: `gaps` are the lengths
-    /// that the response misses, and in return the additional gaps for which it was solved. `solve`
-    /// solves for the increments of the nodes under forces on them, with the factorised matrix.
-    /// False if a solution fails or the law cannot be satisfied; the response is then as it was.
+    /// that the response misses, and in return the additional gaps for which it was solved; without
+    /// `rigid` directions these are left to the next iteration. `solve` solves for the increments of the nodes under forces on them, with the factorised matrix.
+    /// Forces that no law determines, of rigid rods between holders, do not change. False if a
+    /// solution fails; the response is then as it was.
     pub fn complete_law(
         &self,
         segments: &[Segment],
         response: &mut Response,
         gaps: &mut [DVec3],
+        rigid: bool,
         solve: &mut dyn FnMut(&Field) -> Option<Field>,
     ) -> bool {
+        let close = |gaps: &mut [DVec3]| {
+            let segments = self.each(0..self.segments());
+            for (gap, segment) in gaps.iter_mut().zip(segments) {
+                *gap *= self.closed_part(segment, rigid);
+            }
+        };
+        close(gaps);
         let missing: Vec<f64> = gaps.iter().flat_map(|gap| gap.to_array()).collect();
         if missing.iter().all(|part| *part == 0.0) {
             return true;
@@ -87,6 +113,7 @@ impl DiscreteLeaf {
             let nodes = solve(&forces)?;
             let mut carried = vec![DVec3::ZERO; left.len()];
             self.carried(segments, &nodes, &mut left, &mut carried);
+            close(&mut left);
             responses.push(Response { nodes, carried });
             let left = left.iter().flat_map(|gap| gap.to_array());
             Some(direction.iter().zip(left).map(|(v, g)| v - g).collect())
@@ -100,7 +127,7 @@ impl DiscreteLeaf {
         if let Some(sum) = found.sum() {
             gaps.copy_from_slice(&vectors(&sum));
         }
-        found.residual < 1.0
+        true
     }
 }
 
@@ -122,9 +149,10 @@ impl System {
         };
         leaf.carried(&segments, &response.nodes, &mut gaps, &mut response.carried);
         let first = response.nodes.clone();
-        let complete = leaf.complete_law(&segments, &mut response, &mut gaps, &mut |forces| {
-            solve(self, forces)
-        });
+        let complete =
+            leaf.complete_law(&segments, &mut response, &mut gaps, false, &mut |forces| {
+                solve(self, forces)
+            });
         if !complete {
             self.set_solution(&first);
             return None;

@@ -53,5 +53,8 @@ fn field(numbers: &[f64], nodes: usize) -> Field {
     let increments: Vec<Increment> = (numbers.chunks_exact(6))
         .map(|six| std::array::from_fn(|c| six[c]))
         .collect();
-    increments.chunks(nodes).map(<[Increment]>::to_vec).collect()
+    increments
+        .chunks(nodes)
+        .map(<[Increment]>::to_vec)
+        .collect()
 }

@@ -88,11 +88,10 @@ impl ForceProgress {
             return true;
         }
         let scale = self.largest.max(1.0);
-        let rounding = larger(ROUNDED_FORCE, self.rounding.min(f64::MAX) / scale);
+        let rounding = larger(ROUNDED_FORCE, self.rounding / scale);
         // Rotations of the size of the increment shorten a segment by their square.
         let first = FIRST_SAFETY * self.stiffness * self.increment * self.increment / scale;
         let (size, previous) = (self.change / scale, self.previous / scale);
-        size == 0.0
-            || converged(size, previous, [0.0; 2], (accuracy, rounding), first).is_some()
+        size == 0.0 || converged(size, previous, [0.0; 2], (accuracy, rounding), first).is_some()
     }
 }

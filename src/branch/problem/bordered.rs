@@ -101,8 +101,7 @@ impl<const N: usize> Equations<'_, N> {
         soft: bool,
     ) -> Result<Sample<N>, Stuck> {
         let linear = self.assemble(&mut solution, soft)?;
-        let (mut solved, mut factor) =
-            self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
+        let (mut solved, mut factor) = self.solve_bordered(border, &linear.forces, &rates, 0.0)?;
         let none = vec![0.0; border.len()];
         let mut increments = solved.forces.increments.clone();
         // The softened matrix determines what is singular, and no step.

@@ -99,12 +99,7 @@ impl Equations<'_> {
 
     /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
     /// else by a direct factorisation, which also counts the negative eigenvalues.
-    fn solve(
-        &mut self,
-        at: &Solution,
-        linear: &Linear,
-        rate: &Field,
-    ) -> Result<Step, Stuck> {
+    fn solve(&mut self, at: &Solution, linear: &Linear, rate: &Field) -> Result<Step, Stuck> {
         let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {

@@ -122,7 +122,7 @@ fn response(
     leaf.condense_gaps(segments, &gaps, &mut rhs);
     response.nodes = solve(&rhs)?;
     leaf.carried(segments, &response.nodes, &mut gaps, &mut response.carried);
-    leaf.complete_law(segments, &mut response, &mut gaps, solve);
+    leaf.complete_law(segments, &mut response, &mut gaps, true, solve);
     // Held nodes move with their holders.
     for (rod, moved) in response.nodes.iter_mut().zip(&load.moved) {
         let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());

@@ -13,8 +13,8 @@
 
 use crate::leaf::{DiscreteLeaf, Field, Leaf, State, Sums, System};
 use crate::newton::{
-    Equations, ForceProgress, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance, converged,
-    satisfies_lengths,
+    Equations, ForceProgress, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance,
+    converged, satisfies_lengths,
 };
 use crate::relax::settle::methods::Relaxation;
 use crate::relax::settle::methods::damped_motion::Motion;
@@ -147,9 +147,8 @@ impl Relaxation<'_> {
             leaf.advance(&self.state, system, part, &mut trial);
             if forces.lag(leaf, &self.state, &trial) {
                 let solver = &mut self.solver;
-                let again = &mut |system: &mut System, forces: &Field| {
-                    solver.solve_again(system, forces)
-                };
+                let again =
+                    &mut |system: &mut System, forces: &Field| solver.solve_again(system, forces);
                 system.complete_law(leaf, &self.state, again);
                 (size, part) = step_size(system, &motion);
                 leaf.advance(&self.state, system, part, &mut trial);
