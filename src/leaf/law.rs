@@ -56,6 +56,11 @@ impl DiscreteLeaf {
         largest(self.each(0..n).map(missing))
     }
 
+    /// Whether a segment cannot be stretched or sheared in some direction.
+    pub fn has_rigid_segments(&self) -> bool {
+        self.least_compliance() == 0.0
+    }
+
     /// Largest stiffness in stretch and shear of any segment; of rigid ones that with which their
     /// force is condensed out.
     pub fn largest_force_stiffness(&self) -> f64 {

@@ -196,13 +196,14 @@ fn shoot(
         error_estimate: None,
         energy_error: None,
     };
-    let (mut energy, mut index) = (None, None);
+    let (mut energy, mut index, mut errors) = (None, None, None);
     let ((outcome, remark), work, rods) = match found {
         Ok(solution) => {
             accuracy.intervals = Some(solution.intervals.len() - 1);
             accuracy.residual = Some(solution.defect);
             accuracy.error_estimate = Some(solution.error.position);
             energy = Some(solution.energy);
+            errors = Some(solution.error);
             let rods = at_own(&own, &stations, &solution.rods);
             index = index_near(scenario, grid, &rods, solution.error.position);
             let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
@@ -227,6 +228,9 @@ fn shoot(
         grip_reactions: Vec::new(),
         reaction: scenario.held_tip.as_ref().map(|held| Reaction {
             force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
+            // Every rod has its part of the error.
+            error: errors.map(|error| error.force * rods.len() as f64),
+            moments_error: errors.map(|error| error.moment).filter(|_| held.clamps.is_some()),
             moments: (held.clamps.is_some())
                 .then(|| tips.iter().map(|node| -(node.rotation * node.m)).collect()),
         }),
@@ -240,7 +244,8 @@ fn shoot(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
-        stress: Stresses::of(scenario, &stations, &rods),
+        stress: Stresses::of(scenario, &stations, &rods)
+            .map(|it| it.within(scenario, errors.map(|error| [error.force, error.moment]))),
         undulation: Undulation::at_stations(scenario, &own, &rods_at_own, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),

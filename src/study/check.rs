@@ -7,6 +7,7 @@ pub use shot::Shot;
 use serde::Serialize;
 
 use super::judge::{common, differences, fine_grid, index_at, timed, with_nodes_of};
+use crate::largest::{larger, largest};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
@@ -20,6 +21,10 @@ use shot::relaxation;
 /// the shapes count as different: they are less accurate than the positions, to which
 /// the tolerance applies, but a vein with another twist is another equilibrium.
 const ROTATION_PART: f64 = 100.0;
+
+/// Forces and moments may differ by this many times the tolerance, as a part of the largest in the
+/// leaf, beside what the boundary-value solution knows of them.
+const FORCE_PART: f64 = 100.0;
 
 /// Options of a check.
 #[derive(Clone, Debug, Default)]
@@ -165,8 +170,12 @@ impl Check {
                 solution.error.position
             ));
         }
+        let [force, moment] = self.allowed_resultants();
         let same = |found: Difference| {
-            found.position <= self.allowed() && found.rotation <= self.allowed_rotation()
+            found.position <= self.allowed()
+                && found.rotation <= self.allowed_rotation()
+                && found.force <= force + solution.error.force
+                && found.moment <= moment + solution.error.moment
         };
         let contradict = self
             .indices()
@@ -221,6 +230,18 @@ impl Check {
     /// Angle between directors up to which the shapes count as the same.
     pub fn allowed_rotation(&self) -> f64 {
         ROTATION_PART * self.tolerance
+    }
+
+    /// Differences of forces and of moments up to which the leaves count as the same, in units of
+    /// these.
+    pub fn allowed_resultants(&self) -> [f64; 2] {
+        let longest = self.relaxed.shape.longest();
+        let nodes = (self.relaxed.shape.rods.iter()).flat_map(|rod| &rod.nodes);
+        let sizes = nodes.map(|node| larger(node.n.length(), node.m.length() / longest));
+        // The energy of a leaf that is bent in itself is that of forces, too.
+        let energy = self.relaxed.energy.unwrap_or(0.0).abs() / longest;
+        let force = FORCE_PART * self.tolerance * larger(largest(sizes), energy);
+        [force, force * longest]
     }
 }
 

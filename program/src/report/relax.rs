@@ -50,12 +50,14 @@ impl Reported for Equilibrium {
         let moments =
             |all: &Option<Vec<DVec3>>| largest(all.iter().flatten().map(|it| it.length()));
         if let Some(reaction) = &self.reaction {
-            let force = felt(self, reaction.force, moments(&reaction.moments));
+            let sizes = (reaction.force, moments(&reaction.moments));
+            let force = felt(self, sizes, reaction.error);
             let force = in_unit(format!("({force})"), units, FORCE);
             lines.push(("reaction", format!("{force} on the holder of the tip")));
         }
         for (number, grip) in self.grip_reactions.iter().enumerate() {
-            let force = felt(self, grip.force, grip.moment.map_or(0.0, DVec3::length));
+            let sizes = (grip.force, grip.moment.map_or(0.0, DVec3::length));
+            let force = felt(self, sizes, grip.error);
             let force = in_unit(format!("({force})"), units, FORCE);
             let grip = format!("{force} on the holder of grip {}", number + 1);
             lines.push(("grip", grip));
@@ -139,7 +141,11 @@ const OF_FORCES: f64 = 20.0;
 /// The force on a holder, which may feel a moment as well, to its known digits. Where it is small, as
 /// on a ring that closes by itself, the forces that bend the leaf and those of clamps tell how
 /// accurate it is.
-fn felt(equilibrium: &Equilibrium, force: DVec3, moment: f64) -> String {
+fn felt(equilibrium: &Equilibrium, (force, moment): (DVec3, f64), error: Option<f64>) -> String {
+    if let Some(error) = error {
+        let rounding = ROUNDING * force.length();
+        return force.to_array().map(|it| known(it, error.max(rounding))).join(", ");
+    }
     let longest = equilibrium.shape.longest();
     let energy = equilibrium.energy.unwrap_or_default().abs();
     let most = largest([force.length(), moment / longest, energy / longest]);
@@ -196,8 +202,8 @@ fn stress(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
         1.0 => "at its tip".into(),
         sigma => format!("at {} of its length", brief(sigma)),
     };
-    let error = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
-    let error = OF_FORCES * error * equivalent;
+    let relative = equilibrium.accuracy.error_estimate.unwrap_or(0.0) / equilibrium.shape.longest();
+    let error = of.error.unwrap_or(OF_FORCES * relative * equivalent);
     let [normal, shear, equivalent] =
         [normal, shear, equivalent].map(|it| in_unit(brief(rounded_to(it, error)), units, STRESS));
     Some(format!(

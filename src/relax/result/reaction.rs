@@ -1,10 +1,16 @@
-//! What a leaf exerts on what holds it.
+//! What a leaf exerts on what holds it, and how accurate that is.
 
+use crate::largest::largest;
+use crate::leaf::DiscreteLeaf;
 use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::nested::NestedEquilibrium;
 use crate::relax::transfer::level::Level;
 use crate::scenario::{Grip, Hold};
 use glam::DVec3;
 use serde::Serialize;
+
+/// Rounding error of a strain, per segment of a rod.
+const STRAIN_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The reaction at a held tip: what the leaf exerts on its holder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -18,6 +24,15 @@ pub struct Reaction {
         skip_serializing_if = "Option::is_none"
     )]
     pub moments: Option<Vec<DVec3>>,
+    /// Bound on the error of the force; `None` on a single grid.
+    #[serde(rename = "tip_reaction_error", skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Bound on the error of the moments.
+    #[serde(
+        rename = "tip_reaction_moments_error",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub moments_error: Option<f64>,
 }
 
 /// What the leaf exerts on a grip.
@@ -28,47 +43,112 @@ pub struct GripReaction {
     /// For a clamp, the moment about the middle of what it holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moment: Option<DVec3>,
+    /// Bound on the error of the force; `None` on a single grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Bound on the error of the moment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moment_error: Option<f64>,
 }
 
-/// The reaction at a held tip, after `columns` extrapolations.
-pub fn reaction(levels: &[Level], columns: usize) -> Option<Reaction> {
-    let leaf = &levels[0].leaf.leaf;
-    let held = leaf.held.as_ref()?;
-    let on = |level: &Level| {
-        let (force, moments) = level.leaf.reaction(&level.state);
-        let all = [force].into_iter().chain(moments);
-        let values = all.flat_map(|it| it.to_array()).collect();
-        (level.leaf.segments(), values)
-    };
-    let table: Richardson = levels.iter().map(on).collect();
-    let mut vectors = table.column(columns).chunks(3).map(DVec3::from_slice);
-    let force = vectors.next()? * leaf.scale.force();
-    let moments = vectors.map(|moment| moment * leaf.scale.moment()).collect();
-    Some(Reaction {
-        force,
-        moments: held.clamps.is_some().then_some(moments),
-    })
+/// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows, with
+/// the error; `relative` is that of each of them by unfinished iterations, `rounding` that by
+/// rounding. The error is unknown on a single grid.
+pub(in crate::relax) fn extrapolated(
+    levels: &[Level],
+    on: impl Fn(&Level) -> Vec<DVec3>,
+    [relative, rounding]: [f64; 2],
+) -> (Vec<DVec3>, Option<f64>) {
+    let values: Vec<Vec<DVec3>> = levels.iter().map(on).collect();
+    let all = values.iter().flatten().map(|vector| vector.length());
+    let size = largest(all);
+    let scale = if size > 0.0 { size } else { 1.0 };
+    let grids = levels.iter().zip(&values);
+    let table: Richardson = grids
+        .map(|(level, vectors)| {
+            let numbers = vectors.iter().flat_map(|it| (*it / scale).to_array());
+            (level.leaf.segments(), numbers.collect())
+        })
+        .collect();
+    let table = table.with_noise(rounding / scale);
+    let best = table.best();
+    let found = table.column(best.map_or(0, |best| best.columns));
+    let error = best.map(|best| (best.error + relative) * scale + rounding);
+    let vectors = found.chunks(3).map(|it| DVec3::from_slice(it) * scale);
+    (vectors.collect(), error)
 }
 
-/// What the leaf exerts on its grips, after `columns` extrapolations.
-pub fn grip_reactions(levels: &[Level], columns: usize) -> Vec<GripReaction> {
-    let leaf = &levels[0].leaf;
-    if !leaf.has_grips() {
-        return Vec::new();
+impl NestedEquilibrium {
+    /// The part of forces by which unfinished iterations, and the size by which rounding of
+    /// positions, may change them.
+    pub fn unfinished_forces(&self) -> [f64; 2] {
+        let stiffest = |leaf: &DiscreteLeaf| leaf.largest_force_stiffness();
+        let rounding = self.levels.last().map_or(0.0, |level| {
+            let leaf = &level.leaf;
+            let strained = leaf.leaf.is_held() && !leaf.has_rigid_segments();
+            let stiffness = if strained { stiffest(leaf) } else { 0.0 };
+            STRAIN_ROUNDING * leaf.segments() as f64 * stiffness
+        });
+        [self.history.remaining, rounding]
     }
-    let on = |level: &Level| {
-        let reactions = level.leaf.grip_reactions(&level.state);
-        let numbers = reactions.as_flattened().iter();
-        let values = numbers.flat_map(|it| it.to_array()).collect();
-        (level.leaf.segments(), values)
-    };
-    let table: Richardson = levels.iter().map(on).collect();
-    let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
-    let reactions = table.column(columns).chunks(6).zip(&scenario.grips);
-    let reaction = |(numbers, grip): (&[f64], &Grip)| GripReaction {
-        force: DVec3::from_slice(numbers) * scale.force(),
-        moment: (grip.held == Hold::Clamped)
-            .then(|| DVec3::from_slice(&numbers[3..]) * scale.moment()),
-    };
-    reactions.map(reaction).collect()
+
+    /// The reaction at a held tip.
+    pub fn reaction(&self) -> Option<Reaction> {
+        let leaf = &self.levels[0].leaf.leaf;
+        let held = leaf.held.as_ref()?;
+        let unfinished = self.unfinished_forces();
+        let force = |level: &Level| vec![level.leaf.reaction(&level.state).0];
+        let (mut forces, mut error) = extrapolated(&self.levels, force, unfinished);
+        // A single grid is compared with the leaf that was integrated from it.
+        if let ([level], Some(estimate)) = (self.levels.as_slice(), &self.estimate) {
+            let rods = estimate.rods.iter().enumerate();
+            let integrated: DVec3 = rods
+                .filter_map(|(j, rod)| Some(level.leaf.tip_force(j) - rod.last()?.n))
+                .sum();
+            error = Some(forces[0].distance(integrated) + unfinished[1]);
+            forces[0] = integrated;
+        }
+        let moments = |level: &Level| level.leaf.reaction(&level.state).1;
+        let clamped = held.clamps.is_some();
+        let moments = clamped.then(|| extrapolated(&self.levels, moments, unfinished));
+        let (moments, moments_error) = moments.unzip();
+        let of = |all: Vec<DVec3>| all.iter().map(|it| *it * leaf.scale.moment()).collect();
+        Some(Reaction {
+            force: forces[0] * leaf.scale.force(),
+            error: error.map(|error| error * leaf.scale.force()),
+            moments: moments.map(of),
+            moments_error: (moments_error.flatten()).map(|error| error * leaf.scale.moment()),
+        })
+    }
+
+    /// What the leaf exerts on its grips.
+    pub fn grip_reactions(&self) -> Vec<GripReaction> {
+        let leaf = &self.levels[0].leaf;
+        if !leaf.has_grips() {
+            return Vec::new();
+        }
+        let unfinished = self.unfinished_forces();
+        let on = |which: usize| {
+            move |level: &Level| -> Vec<DVec3> {
+                let reactions = level.leaf.grip_reactions(&level.state);
+                reactions.iter().map(|it| it[which]).collect()
+            }
+        };
+        let (forces, error) = extrapolated(&self.levels, on(0), unfinished);
+        let (moments, moment_error) = extrapolated(&self.levels, on(1), unfinished);
+        let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
+        let both = forces.iter().zip(&moments).zip(&scenario.grips);
+        let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
+            let clamped = grip.held == Hold::Clamped;
+            GripReaction {
+                force: *force * scale.force(),
+                error: error.map(|error| error * scale.force()),
+                moment: clamped.then(|| *moment * scale.moment()),
+                moment_error: moment_error
+                    .filter(|_| clamped)
+                    .map(|error| error * scale.moment()),
+            }
+        };
+        both.map(reaction).collect()
+    }
 }

@@ -9,7 +9,6 @@ use crate::relax::request::method::Method;
 use crate::relax::request::problem::Problem;
 use crate::relax::result::blade::BladeReport;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::relax::result::reaction::{grip_reactions, reaction};
 use crate::relax::result::stress::Stresses;
 use crate::relax::transfer::level::{Level, flat};
 use crate::relax::transfer::strains;
@@ -30,7 +29,6 @@ pub fn equilibrium(
         .last()
         .expect("the grid it failed on, at least");
     let (scenario, scale) = (problem.leaf.scenario(), problem.leaf.scale);
-    let columns = found.table.columns();
     let error = found.error();
     let (stations, rods, between) = fields(problem, found, error.unwrap_or(0.0));
     let joined = problem.leaf.joined();
@@ -57,8 +55,8 @@ pub fn equilibrium(
         energy: (!problem.leaf.in_wind()).then_some(energy * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
-        reaction: reaction(&found.levels, columns),
-        grip_reactions: grip_reactions(&found.levels, columns),
+        reaction: found.reaction(),
+        grip_reactions: found.grip_reactions(),
         stability: Stability {
             negative_eigenvalues: found.index,
             neutral_directions: neutral_directions(scenario, &rods),
@@ -70,7 +68,7 @@ pub fn equilibrium(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
-        stress: Stresses::of(scenario, &stations, &rods),
+        stress: Stresses::of(scenario, &stations, &rods).map(|it| it.on_grids(scenario, found)),
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),

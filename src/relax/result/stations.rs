@@ -116,7 +116,9 @@ impl Equilibrium {
         for (rod, nodes) in self.shape.rods.iter_mut().zip(rods) {
             rod.nodes = nodes;
         }
-        self.stress = Stresses::of(scenario, &to, &self.shape.rods);
+        let error = self.stress.as_ref().and_then(|it| it.error);
+        let stress = Stresses::of(scenario, &to, &self.shape.rods);
+        self.stress = stress.map(|it| Stresses { error, ..it });
         self.shape.stations = to;
         if let Some(error) = &mut self.accuracy.error_estimate {
             *error += between;

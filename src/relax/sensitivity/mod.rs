@@ -122,10 +122,14 @@ fn sensitivity(
     let held = reaction.0.split_first().map(|(force, moments)| Reaction {
         force: *force * scale.force(),
         moments: is_clamped(leaf).then(|| of(moments, scale.moment())),
+        error: None,
+        moments_error: None,
     });
     let grip = |(change, grip): (&[DVec3], &Grip)| GripReaction {
         force: change[0] * scale.force(),
         moment: (grip.held == Hold::Clamped).then(|| change[1] * scale.moment()),
+        error: None,
+        moment_error: None,
     };
     let on_grips = grips.0.chunks(2).zip(&leaf.scenario().grips).map(grip);
     Sensitivity {
