@@ -6,7 +6,8 @@ use crate::rotation::outer;
 use crate::scenario::{Dynamics, Profile, Schedule};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments.
+/// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
+/// masses on points there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
     /// Mass.
@@ -47,6 +48,8 @@ pub struct Physics {
     /// Part of the loads of single veins, and of the dead moments on points.
     own_loads: f64,
     moments: f64,
+    /// Vein, fraction of its length and mass of what is on points.
+    point_masses: Vec<(usize, f64, f64)>,
     /// Velocity of the air, if there is wind, in the scenario's units.
     air: Option<Schedule<[f64; 3]>>,
     /// The loads, if they are constant.
@@ -61,11 +64,16 @@ pub struct Physics {
 impl Physics {
     /// Inertia, damping and loads of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
-        Physics::of(leaf, leaf.scenario().dynamics.clone())
+        let mut physics = Physics::of(leaf, leaf.scenario().dynamics.clone());
+        let unit = physics.density * physics.scale.length;
+        let points = leaf.scenario().points.iter().filter(|it| it.mass > 0.0);
+        let masses = points.map(|it| (it.vein, it.at, it.mass / unit));
+        physics.point_masses = masses.collect();
+        physics
     }
 
     /// The defaults for scenarios without dynamics, under the loads at
-    /// rest: the damped motion of a relaxation.
+    /// rest: the damped motion of a relaxation, in which masses on points are weights alone.
     pub fn at_rest(leaf: &Leaf) -> Self {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
@@ -88,6 +96,7 @@ impl Physics {
             own_loads: leaf.loads.own,
             moments: leaf.loads.moments,
             constant_loads: None,
+            point_masses: Vec::new(),
             knots: knots(&dynamics, air.as_ref(), time),
             air,
             constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
@@ -117,8 +126,11 @@ impl Physics {
             true => of.at(sigma),
             false => of.at((0.5 * leaf.grid.weight(i) - sigma).abs()),
         };
+        let here = |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest(*at) == i;
+        let on_points = self.point_masses.iter().filter(here).map(|(_, _, mass)| mass);
+        let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         Inertia {
-            mass: length * around(&self.dynamics.density[j]) / self.density,
+            mass: length * around(&self.dynamics.density[j]) / self.density + on_points,
             transverse: length * around(&self.dynamics.rotary_inertia[j]) / rotary,
             excess: self.dynamics.polar_excess,
         }

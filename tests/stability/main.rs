@@ -13,6 +13,8 @@ mod margin_of_grips;
 mod margin_random;
 mod mode_shapes;
 mod modes;
+mod point_masses;
+mod taut_rods;
 mod trace_consistent;
 mod trace_of_grips;
 mod trace_verified;

@@ -37,6 +37,7 @@ mod sensitivities;
 mod soft_leaves;
 mod stiffness;
 mod stress;
+mod taut_rods;
 mod threads;
 mod tissue;
 mod turning;
