@@ -311,8 +311,7 @@ impl Leaf {
 
     /// Whether all rods begin in the origin, in the plane z = 0.
     pub fn is_fan(&self) -> bool {
-        let in_plane = |rod: &Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;
-        self.scenario.rods.iter().all(in_plane)
+        self.scenario.is_fan()
     }
 
     /// Whether tissue ties the rods.

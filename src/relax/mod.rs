@@ -24,12 +24,12 @@ pub(crate) mod transfer;
 
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
-pub use crate::refusal::RefusedOption;
+pub use crate::refusal::{RefusedOption, Unmodelled};
 pub use crate::relax::relaxation::Relaxation;
 pub use crate::relax::request::method::{Method, SemiImplicit, Settings, Unfit};
 pub use crate::relax::request::options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
-    check_tolerance, without_grips, without_wind,
+    check_tolerance, without_wind,
 };
 pub use crate::relax::result::blade::{BladeReport, FewerVeins};
 pub(crate) use crate::relax::result::equilibrium::serialize_index;

@@ -4,11 +4,9 @@ use crate::clock::Instant;
 use crate::leaf::{Grid, Leaf};
 use crate::memory;
 use crate::newton::Work;
-use crate::refusal::RefusedOption;
+use crate::refusal::{RefusedOption, Unmodelled};
 use crate::relax::request::method::Method;
-use crate::relax::request::options::{
-    MAX_INTERVALS, Options, Progress, RelaxError, without_grips, without_wind,
-};
+use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError};
 use crate::relax::rest::relax_on_grids;
 use crate::relax::result::blade::BladeReport;
 use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
@@ -19,7 +17,7 @@ use crate::relax::result::stations::SAME;
 use crate::relax::result::stress::Stresses;
 use crate::relax::settle::segments::coarsest;
 use crate::relax::stability::index::index_near;
-use crate::scenario::{Hold, Scenario, longest};
+use crate::scenario::{Scenario, longest};
 use crate::shape::{RodShape, equally_spaced};
 use crate::shooting;
 use crate::shooting::{Reason, Solution, Start};
@@ -95,24 +93,12 @@ pub fn relax(
         _ => (Some(1), false),
     };
     check_intervals(scenario.rods.len(), intervals)?;
-    without_grips(scenario, "shooting")?;
-    without_wind(scenario, "shooting")?;
-    if !from_rest && scenario.joined && scenario.rods.len() > 1 && !Leaf::new(scenario).is_fan() {
-        let why = "veins that begin apart are led to their joint tip by the relaxation; \
-                   use shooting-from-rest";
-        return Err(RefusedOption::new("method", options.method.word(), why).into());
-    }
-    if !from_rest && scenario.base_held == Hold::Pinned {
-        // Without loads the leaf of arcs turns about its hinges.
-        let why = "a leaf on hinges (leaf.base_held) is led to rest by the relaxation; use shooting-from-rest";
-        return Err(RefusedOption::new("method", options.method.word(), why).into());
-    }
-    if !from_rest && scenario.held_tip.is_some() {
-        // Shooting from arcs has no continuation to a held tip.
-        let why =
-            "a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest";
-        return Err(RefusedOption::new("method", options.method.word(), why).into());
-    }
+    shooting::check_models(scenario, from_rest).map_err(|missing| match missing {
+        Unmodelled::FromArcs { .. } => {
+            RefusedOption::new("method", options.method.word(), missing.to_string()).into()
+        }
+        other => RelaxError::from(other),
+    })?;
     let how = (intervals, tolerance);
     let mut found = match from_rest {
         true => relax_from_rest(scenario, options, how, progress)?,

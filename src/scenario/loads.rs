@@ -84,6 +84,12 @@ impl Scenario {
         self.tip_moment != [0.0; 3] || on_points()
     }
 
+    /// Whether all rods begin in the origin, in the plane z = 0.
+    pub(crate) fn is_fan(&self) -> bool {
+        let in_plane = |rod: &super::Rod| rod.base == [0.0; 3] && rod.elevation == 0.0;
+        self.rods.iter().all(in_plane)
+    }
+
     /// Whether no base, weight, load or displacement of a grip leads out of the plane z = 0.
     pub fn is_loaded_in_plane(&self) -> bool {
         let flat = |load: [f64; 3]| load[2] == 0.0;

@@ -55,4 +55,4 @@ mod trajectory;
 pub use crate::shooting::solution::{
     Correction, Failure, Neutral, Options, Precision, Reason, Solution, Start, Work,
 };
-pub use crate::shooting::solve::solve;
+pub use crate::shooting::solve::{check_models, solve};

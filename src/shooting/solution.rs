@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::limit::Limit;
 use crate::memory::TooMuch;
+use crate::refusal::Unmodelled;
 use crate::shape::{Difference, RodShape};
 use crate::shooting::dop853::Unbounded;
 
@@ -184,6 +185,14 @@ pub enum Reason {
     TooMuch(TooMuch),
     /// The time allowed was over, or the run was cancelled.
     OutOfTime,
+    /// The boundary-value problem does not contain all of the scenario.
+    Unmodelled(Unmodelled),
+}
+
+impl From<Unmodelled> for Reason {
+    fn from(unmodelled: Unmodelled) -> Self {
+        Reason::Unmodelled(unmodelled)
+    }
 }
 
 impl From<TooMuch> for Reason {
@@ -248,6 +257,7 @@ impl fmt::Display for Reason {
                 neutral.ratio
             ),
             Reason::TooMuch(too_much) => too_much.fmt(f),
+            Reason::Unmodelled(unmodelled) => unmodelled.fmt(f),
             Reason::OutOfTime => {
                 f.write_str("the time allowed was over before shooting had converged: allow more")
             }

@@ -1,6 +1,7 @@
 //! From a start to a solution with an error estimate.
 
-use crate::scenario::{Scenario, longest};
+use crate::refusal::Unmodelled;
+use crate::scenario::{Hold, Scenario, longest};
 use crate::shape::Difference;
 use crate::shooting::continuation::{Interrupted, from_arcs};
 use crate::shooting::equations::Equations;
@@ -23,6 +24,34 @@ const MOST_LOCAL: f64 = 1e-9;
 
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
+
+/// Refuses scenarios with what the boundary-value problem does not contain and, unless the start is
+/// a leaf at rest, those to which the continuation from arcs does not lead.
+///
+/// [`solve`] refuses them itself: whoever asks before saves a relaxation.
+pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodelled> {
+    if !scenario.grips.is_empty() {
+        return Err(Unmodelled::Grips { what: "shooting" });
+    }
+    if scenario.wind.is_some() {
+        return Err(Unmodelled::Wind { what: "shooting" });
+    }
+    let from_arcs = |why| Err(Unmodelled::FromArcs { why });
+    if from_rest {
+        return Ok(());
+    }
+    if scenario.joined && scenario.rods.len() > 1 && !scenario.is_fan() {
+        return from_arcs("veins that begin apart are led to their joint tip by the relaxation");
+    }
+    if scenario.base_held == Hold::Pinned {
+        // Without loads the leaf of arcs turns about its hinges.
+        return from_arcs("a leaf on hinges (leaf.base_held) is led to rest by the relaxation");
+    }
+    if scenario.held_tip.is_some() {
+        return from_arcs("a tip that is held (tip.held) is led there by the relaxation");
+    }
+    Ok(())
+}
 
 /// Solves the boundary-value problem of a scenario, as accurately as possible if not as required.
 /// `progress` is called for each correction.
@@ -95,7 +124,13 @@ fn solve_once(
         part: 1.0,
         progress,
     };
+    let modelled = check_models(scenario, matches!(start, Start::Leaf { .. }));
     let found = match start {
+        _ if let Err(missing) = modelled => Err(Interrupted {
+            reason: missing.into(),
+            part: 1.0,
+            near: Trajectory::straight(&equations),
+        }),
         Start::Arcs => from_arcs(&mut equations, options.intervals, &mut log),
         Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
     };

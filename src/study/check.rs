@@ -252,8 +252,7 @@ pub fn check(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Check, RelaxError> {
     relax::check_intervals(scenario.rods.len(), options.intervals)?;
-    relax::without_grips(scenario, "shooting")?;
-    relax::without_wind(scenario, "shooting")?;
+    shooting::check_models(scenario, true)?;
     let asked = Options {
         tolerance: options.tolerance,
         method: SemiImplicit {

@@ -357,3 +357,52 @@ fn malformed_tables_are_refused_with_file_and_line() {
     }
     place.refuses("chart leaf.toml --peers absent.csv", "absent.csv");
 }
+
+/// A leaf with a grip, which shooting does not take into account.
+fn gripped(place: &Workplace) {
+    place.write(
+        "gripped.toml",
+        "leaf = { rods = 1, length = 1.0, fan = [0.0] }\n\
+         stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 1e3, shear_2 = 1e3, shear_3 = 1e3 }\n\
+         load = { gravity = [0.0, 0.0, -8.0] }\n\
+         grip = [{ vein = 1, at = 0.7 }]\n",
+    );
+}
+
+/// No method is asked for a leaf that it does not model: its rows say so, and the reference is not
+/// called confirmed by it.
+#[test]
+fn shooting_is_not_charted_for_a_leaf_with_grips() {
+    let place = Workplace::empty();
+    gripped(&place);
+    for methods in ["shooting", "semi-implicit,shooting-from-rest"] {
+        let asked = format!("chart gripped.toml --methods {methods} --seconds 0.01 --write none");
+        let chart = place.told(1, &asked);
+        assert_eq!(chart["reference"]["confirmed"], false, "{methods}");
+        let runs = chart["runs"].list();
+        let shot = |run: &&Value| run["method"].text().starts_with("shooting");
+        assert!(runs.iter().any(|run| shot(&run)));
+        for run in runs.iter().filter(shot) {
+            assert_eq!(run["outcome"], "refused", "{run}");
+        }
+    }
+}
+
+/// The same of a map, whose other methods are right.
+#[test]
+fn shooting_is_not_right_about_a_leaf_with_grips() {
+    let place = Workplace::empty();
+    gripped(&place);
+    let map = place.told(
+        0,
+        "map gripped.toml --vary load.gravity[2]=-1..-8:3 --write none",
+    );
+    assert_eq!(map["confirmed"], 0);
+    for counted in map["outcomes"].list() {
+        let wanted = match counted["method"].text().contains("shooting") {
+            true => json!({ "refused": 3 }),
+            false => json!({ "right": 3 }),
+        };
+        assert_eq!(counted["counts"], wanted, "{counted}");
+    }
+}

@@ -4,6 +4,7 @@ mod boundary_map;
 mod chart_cli;
 mod check_cli;
 mod equilibria;
+mod keys;
 mod map_cli;
 mod map_outcomes;
 mod margin;

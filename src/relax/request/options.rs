@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::limit::Limit;
 use crate::memory::TooMuch;
-use crate::refusal::RefusedOption;
+use crate::refusal::{RefusedOption, Unmodelled};
 use crate::relax::path::Route;
 use crate::relax::request::method::Method;
 use crate::scenario::Scenario;
@@ -137,22 +137,9 @@ pub enum RelaxError {
     /// Too much memory.
     #[error("{0}")]
     Memory(#[from] TooMuch),
-    /// Grips, which this method or question does not take into account.
-    #[error(
-        "[[grip]]: {what} does not take grips along veins into account, as relaxation and following do; leave them out, or hold the tip by [tip]"
-    )]
-    Grips {
-        /// The method or the question.
-        what: &'static str,
-    },
-    /// Wind, which this method or question does not take into account.
-    #[error(
-        "[wind]: {what} does not take wind into account: simulate does, and relax --path release in a steady one; leave it out"
-    )]
-    Wind {
-        /// The method or the question.
-        what: &'static str,
-    },
+    /// The scenario has what this method or question does not take into account.
+    #[error("{0}")]
+    Unmodelled(#[from] Unmodelled),
     /// Wind that changes, in which nothing rests.
     #[error(
         "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
@@ -165,19 +152,11 @@ pub enum RelaxError {
     TurnsFreely,
 }
 
-/// Refuses scenarios with grips for what does not take them into account.
-pub fn without_grips(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
-    match scenario.grips.is_empty() {
-        true => Ok(()),
-        false => Err(RelaxError::Grips { what }),
-    }
-}
-
 /// Refuses scenarios with wind for what does not take it into account.
 pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
     match scenario.wind {
         None => Ok(()),
-        Some(_) => Err(RelaxError::Wind { what }),
+        Some(_) => Err(Unmodelled::Wind { what }.into()),
     }
 }
 
@@ -212,5 +191,5 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
         Method::Explicit { .. } => "explicit relaxation",
         _ => "shooting",
     };
-    Err(RelaxError::Wind { what })
+    Err(Unmodelled::Wind { what }.into())
 }

@@ -46,7 +46,8 @@ pub fn find(
 ) -> Result<Option<(Reference, Answer)>, RelaxError> {
     let relaxed = best_relaxed(scenario)?;
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
-    let stations = union(wanted.into_iter().chain(known.copied()).collect());
+    let ends = [0.0, 1.0].into_iter();
+    let stations = union(ends.chain(wanted).chain(known.copied()).collect());
     let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
     let precision = shooting::Precision::Error(SMALLEST_TOLERANCE);
     let options = shooting::Options::new(start, &stations, precision);

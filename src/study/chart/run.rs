@@ -70,6 +70,7 @@ impl<'s> Runs<'s> {
 /// Shooting from a coarsely relaxed leaf. The work of both is added, and no time is
 /// spent on counting eigenvalues.
 fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), RelaxError> {
+    shooting::check_models(scenario, true)?;
     let options = Options {
         tolerance: Some(SHOOTING_START),
         ..Options::default()

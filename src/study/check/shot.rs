@@ -87,6 +87,7 @@ impl Serialize for Shot {
                 Reason::Unbounded { .. } => ("unbounded", None, *work),
                 Reason::TooMuch(_) => ("too-much-memory", None, *work),
                 Reason::OutOfTime => ("out-of-time", None, *work),
+                Reason::Unmodelled(_) => ("not-modelled", None, *work),
             },
         };
         Keys {

@@ -167,7 +167,7 @@ impl<'a> Cell<'a> {
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
-                Reason::TooMuch(_) => MapOutcome::Refused,
+                Reason::TooMuch(_) | Reason::Unmodelled(_) => MapOutcome::Refused,
                 Reason::OutOfTime => MapOutcome::OutOfTime,
                 _ => MapOutcome::NotConverged,
             };
