@@ -13,7 +13,7 @@ const FILES: &str =
 const MOTION: &str = "time,rod,sigma,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 
 const ENERGY: &str =
-    "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z";
+    "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z,error";
 
 /// Runs to the end; the summary as printed.
 #[track_caller]
@@ -62,13 +62,15 @@ fn the_report_says_what_was_done() {
         "small: 5 veins joined at the tip, method explicit\n",
         "  moved    to t = 1 in ",
         " 101 outputs\n",
-        "  grid     16 segments a vein\n",
-        "  step     at most 5.3",
-        ", stable up to 5.9",
+        " segments a vein\n",
+        "  step     at most ",
+        ", stable up to ",
         " (shear with rotation)\n",
         "  energy   kinetic ",
         "  balance  ",
         "  tip      (",
+        "  error    tips within ",
+        " segments a vein tells\n",
         " ns a step and segment\n",
         "  written  out/small: motion.json, energy.svg, energy.png, filmstrip.svg, \
          filmstrip.png, motion.csv, energy.csv\n",
@@ -105,6 +107,11 @@ fn tables_and_summary_tell_the_same() {
     assert_eq!(summary["steps"].number(), last[1]);
     // The parser of this test rounds the last digit.
     let same = |a: f64, b: f64| (a - b).abs() <= 1e-15 * b.abs();
+    assert!(same(summary["error_estimate"].number(), last[11]));
+    assert_eq!(summary["error_known_until"], summary["time"]);
+    assert_eq!(summary["error_aim"], Value::Null);
+    let bars = energy.windows(2);
+    assert!(bars.into_iter().all(|pair| pair[0][11] <= pair[1][11]));
     let tip = floats(&summary["tip"]).into_iter().zip(&last[8..11]);
     assert!(tip.into_iter().all(|(a, b)| same(a, *b)));
     for (column, key) in ENERGY.split(',').enumerate().take(8).skip(2) {
@@ -153,6 +160,25 @@ fn tolerance_and_step_rule_the_semi_implicit_method() {
     let [rough, fine] = ["--tolerance 1e-3", "--tolerance 1e-5"].map(steps);
     assert!(fine > 2 * rough, "{rough} {fine}");
     assert_eq!(steps("--step 0.005"), 200);
+}
+
+/// Grid and steps are refined until the bar is as small as requested, unless a grid is given.
+#[test]
+fn a_motion_is_refined_to_its_tolerance() {
+    let place = Workplace::new();
+    let at = |how: &str| simulate(&place, &format!("leaf.toml --set dynamics.duration=1 {how}"));
+    let segments = |summary: &Value| summary["segments"].count();
+    let bar = |summary: &Value| summary["error_estimate"].number();
+    let [rough, fine] = ["", "--tolerance 1e-4"].map(at);
+    assert!(bar(&rough) <= 1e-3 && bar(&fine) <= 1e-4);
+    assert_eq!(rough["error_aim"].number(), 1e-3);
+    assert_eq!(fine["error_aim"].number(), 1e-4);
+    assert!(segments(&fine) > segments(&rough));
+    let given = at("--segments 8 --tolerance 1e-5");
+    assert_eq!(segments(&given), 8);
+    assert!(bar(&given) > 1e-5);
+    let doubts = given["doubts"].list();
+    contains(doubts[0].text(), &["the error of the tips may be ", "was aimed at"]);
 }
 
 /// A vein that falls so far that its grid cannot follow.
