@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use leafdyn::scenario;
 use leafdyn::simulate::{
-    Frame, Moment, Options, Record, Refinement, Refused, Scheme, Simulation, Still, Stopped, film, stills,
+    Frame, Moment, Options, Record, Refinement, Refused, Scheme, Simulation, Still, Stopped, film,
+    stills,
 };
 use leafdyn_program::files::{Document, Recording, Selection};
 use leafdyn_program::page;
@@ -167,7 +168,9 @@ impl Motion {
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let state = self.state();
         let errors = state.frames.iter();
-        let errors: Vec<f64> = errors.map(|frame| frame.error.unwrap_or(f64::NAN)).collect();
+        let errors: Vec<f64> = errors
+            .map(|frame| frame.error.unwrap_or(f64::NAN))
+            .collect();
         let count = errors.len();
         array(py, errors, &[count])
     }
@@ -249,8 +252,7 @@ impl Motion {
                 stopped,
             } = &mut *self.state();
             let (first, others) = frames.split_first().ok_or("there are no outputs")?;
-            let mut recording =
-                Recording::begin_with(&folder, simulation, &selection, first)?;
+            let mut recording = Recording::begin_with(&folder, simulation, &selection, first)?;
             for frame in others {
                 recording.add(simulation, frame)?;
             }

@@ -60,7 +60,9 @@ impl Trajectory {
     fn span(&self) -> f64 {
         let start = self.at(0).unwrap_or(&[]);
         let outputs = self.points.chunks(self.each.max(1));
-        outputs.fold(0.0, |most, points| largest_distance(points, start).max(most))
+        outputs.fold(0.0, |most, points| {
+            largest_distance(points, start).max(most)
+        })
     }
 
     /// The largest distances so far from another run, at the outputs that both have.

@@ -182,7 +182,9 @@ impl Refinement {
         self.seconds += simulation.seconds();
         self.runs += 1;
         let bar = simulation.error_bar().filter(|_| stopped.is_none());
-        let met = self.aim.is_some_and(|aim| bar.is_some_and(|bar| bar <= aim));
+        let met = self
+            .aim
+            .is_some_and(|aim| bar.is_some_and(|bar| bar <= aim));
         if !met && self.refines() && !self.last {
             self.refine(simulation, stopped);
         }
@@ -203,7 +205,8 @@ impl Refinement {
             && !met
             && stopped.is_none()
         {
-            simulation.doubts.push(missed(simulation, aim));
+            let doubt = missed(simulation, aim, self.refines());
+            simulation.doubts.push(doubt);
         }
     }
 
@@ -388,19 +391,25 @@ impl Refinement {
 }
 
 /// A sentence on a motion that is not as accurate as it was to be.
-fn missed(simulation: &Simulation, aim: f64) -> String {
+fn missed(simulation: &Simulation, aim: f64, refined: bool) -> String {
     let aim = two_digits(aim);
+    let why = match refined {
+        true => format!(
+            "finer grids would take more than {REFINEMENT_SECONDS} seconds, or cannot be followed; give more segments"
+        ),
+        false => "give more segments and shorter steps, or leave both out".into(),
+    };
     match (simulation.error_bar(), simulation.known_until()) {
         (Some(bar), _) => format!(
-            "the error of the tips may be {}, and {aim} was aimed at: finer grids would have taken more than {} seconds, \
-             or cannot be followed; give more segments",
-            two_digits(bar),
-            REFINEMENT_SECONDS,
+            "the error of the tips may be {}, and {aim} was aimed at: {why}",
+            two_digits(bar)
         ),
         (None, Some(until)) => format!(
             "from t = {} on runs on two grids part, as where a leaf snaps: how accurate the tips are is known until then",
             two_digits(until)
         ),
-        (None, None) => "how accurate the tips are is not known: there is no second run to compare with".into(),
+        (None, None) => {
+            "how accurate the tips are is not known: there is no second run to compare with".into()
+        }
     }
 }

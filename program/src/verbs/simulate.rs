@@ -14,7 +14,7 @@ use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped
 /// Longer simulations, in seconds, are announced with their expected duration, and longer runs on
 /// finer grids.
 const ANNOUNCED: f64 = 60.0;
-const FINER_ANNOUNCED: f64 = 2.0;
+const FINER_ANNOUNCED: f64 = 5.0;
 
 /// Larger recordings, in bytes, are announced with their expected size.
 const LARGE: u64 = 1_000_000_000;
@@ -102,8 +102,7 @@ impl Simulate {
         job: &Job,
     ) -> Result<(Simulation, Recording, Option<Stopped>), Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
-        let mut recording = match self.resume
-            && Recording::is_kept(folder, &simulation, selection)
+        let mut recording = match self.resume && Recording::is_kept(folder, &simulation, selection)
         {
             true => Recording::resume(folder, &mut simulation, selection)?,
             false => Recording::begin(folder, &mut simulation, selection)?,
