@@ -165,7 +165,7 @@ impl Motion {
 
     /// The bar on the tips at every output that was kept; not a number where it is not known.
     #[getter]
-    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+    fn errors<'py>(&self, py: Python<'py>) -> Array<'py> {
         let state = self.state();
         let errors = state.frames.iter();
         let errors: Vec<f64> = errors

@@ -453,7 +453,8 @@ impl Simulation {
     /// in a simulation of the same leaf with the same options.
     pub fn save(&mut self) -> Vec<f64> {
         let [bar, until] = [self.error_bar(), self.known_until].map(|it| it.unwrap_or(UNKNOWN));
-        let mut numbers = vec![self.made as f64, bar, until];
+        let displacement = self.comparison.as_ref().map_or(0.0, |it| it.displacement);
+        let mut numbers = vec![self.made as f64, bar, until, displacement];
         numbers.extend(self.method.save());
         numbers
     }
@@ -461,7 +462,7 @@ impl Simulation {
     /// Restores the state at a call of [`Simulation::save`]; false if the
     /// numbers do not fit, or cannot be those of a motion.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
-        let Some((&[made, bar, until], numbers)) = numbers.split_first_chunk() else {
+        let Some((&[made, bar, until, displacement], numbers)) = numbers.split_first_chunk() else {
             return false;
         };
         let finite = || numbers.iter().all(|number| number.abs() < LARGEST_NUMBER);
@@ -472,6 +473,7 @@ impl Simulation {
             let known = |number: f64| (number >= 0.0).then_some(number);
             if let Some(comparison) = &mut self.comparison {
                 comparison.bar = known(bar);
+                comparison.displacement = displacement;
             }
             self.known_until = known(until);
             // It has no beginning.
