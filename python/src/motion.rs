@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use leafdyn::scenario;
 use leafdyn::simulate::{
-    Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, film, stills,
+    Frame, Moment, Options, Record, Refinement, Refused, Scheme, Simulation, Still, Stopped, film,
+    stills,
 };
 use leafdyn_program::files::{Document, Recording, Selection};
 use leafdyn_program::page;
@@ -110,33 +111,68 @@ impl Motion {
         })
     }
 
-    /// Follows the leaf from time 0 to the end, or as far as it goes, and keeps all outputs.
+    /// Follows the leaf from time 0 to the end, or as far as it goes, on grids that are refined as
+    /// requested, and keeps all outputs of the last.
     fn follow(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
         let state = self.state.clone();
-        let duration = self.scenario.dynamics.duration;
-        run(py, progress, move |monitor| {
-            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-            let State {
-                simulation,
-                frames,
-                stopped,
-            } = &mut *state;
+        let (scenario, options) = (self.scenario.clone(), self.options.clone());
+        let duration = scenario.dynamics.duration;
+        let followed = run(py, progress, move |monitor| {
+            let mut motion = Refinement::new(&scenario, &options)?;
             let clock = Instant::now();
-            frames.push(simulation.frame());
-            while !simulation.done() && !monitor.cancelled() {
-                match simulation.next_frame() {
-                    Ok(frame) => frames.push(frame),
-                    Err(why) => {
-                        *stopped = Some(why);
-                        break;
+            let mut watch = |simulation: &Simulation| {
+                let (time, segments) = (simulation.time(), simulation.segments());
+                monitor.report(time, Some(duration), || {
+                    let run = format!("{segments} segments a rod, {}", elapsed(clock));
+                    format!("t = {time:.4} of {duration}, {run}")
+                });
+                !monitor.cancelled()
+            };
+            while let Some(mut simulation) = motion.next_run(&mut watch) {
+                let (mut frames, mut stopped) = (vec![simulation.frame()], None);
+                while !simulation.done() && stopped.is_none() && watch(&simulation) {
+                    match simulation.next_frame() {
+                        Ok(frame) => frames.push(frame),
+                        Err(why) => stopped = Some(why),
                     }
                 }
-                let time = simulation.time();
-                monitor.report(time, Some(duration), || {
-                    format!("t = {time:.4} of {duration}, {}", elapsed(clock))
-                });
+                if monitor.cancelled() {
+                    break;
+                }
+                motion.end_run(&mut simulation, stopped);
+                *state.lock().unwrap_or_else(PoisonError::into_inner) = State {
+                    simulation,
+                    frames,
+                    stopped,
+                };
             }
-        })
+            Ok::<(), Refused>(())
+        })?;
+        followed.map_err(value_error)
+    }
+
+    /// The bar on the tips, until when it is known, and what was aimed at.
+    #[getter]
+    fn accuracy(&self) -> (Option<f64>, Option<f64>, Option<f64>) {
+        let state = self.state();
+        let last = state.frames.last();
+        (
+            last.and_then(|frame| frame.error),
+            state.simulation.known_until(),
+            state.simulation.aim(),
+        )
+    }
+
+    /// The bar on the tips at every output that was kept; not a number where it is not known.
+    #[getter]
+    fn errors<'py>(&self, py: Python<'py>) -> Array<'py> {
+        let state = self.state();
+        let errors = state.frames.iter();
+        let errors: Vec<f64> = errors
+            .map(|frame| frame.error.unwrap_or(f64::NAN))
+            .collect();
+        let count = errors.len();
+        array(py, errors, &[count])
     }
 
     /// The leaf now, before the first output that `next` moves on to.
@@ -210,13 +246,17 @@ impl Motion {
             ..Selection::default()
         };
         let written = on_pool(py, || {
-            let state = self.state();
-            let mut again = Simulation::new(&self.scenario, &self.options)?;
-            let mut recording = Recording::begin(&folder, &mut again, &selection)?;
-            for frame in state.frames.iter().skip(1) {
-                recording.add(&mut again, frame)?;
+            let State {
+                simulation,
+                frames,
+                stopped,
+            } = &mut *self.state();
+            let (first, others) = frames.split_first().ok_or("there are no outputs")?;
+            let mut recording = Recording::begin_with(&folder, simulation, &selection, first)?;
+            for frame in others {
+                recording.add(simulation, frame)?;
             }
-            let record = recording.record(&state.simulation, state.stopped)?;
+            let record = recording.record(simulation, *stopped)?;
             Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)
         })?;
         written.map_err(|error: Box<dyn Error + Send + Sync>| write_error(error))

@@ -152,8 +152,12 @@ def test_a_motion_by_both_roads(tmp_path: Path) -> None:
     energies = list(csv.DictReader((tmp_path / "program" / "energy.csv").read_text().splitlines()))
     assert np.array_equal(motion.energies["kinetic"], numbers(energies, "kinetic")[:, 0])
     assert np.array_equal(motion.times, numbers(energies, "time")[:, 0])
-    one_by_one = list(leafdyn.frames(file, set={"dynamics.duration": 1}))
-    assert np.array_equal([frame.positions for frame in one_by_one], motion.positions)
+    assert np.array_equal(motion.errors, numbers(energies, "error")[:, 0])
+    assert motion.error_estimate is not None and motion.error_estimate == motion.errors[-1] <= motion.error_aim == 1e-3
+    assert motion.error_known_until == motion.times[-1]
+    one_by_one = list(leafdyn.frames(file, set={"dynamics.duration": 1}, segments=16))
+    at_once = leafdyn.simulate(file, set={"dynamics.duration": 1}, segments=16)
+    assert np.array_equal([frame.positions for frame in one_by_one], at_once.positions)
     assert {path.suffix for path in motion.save(tmp_path / "c", write="csv")} == {".csv"}
 
 

@@ -140,6 +140,16 @@ pub trait Method {
     /// Number of time steps.
     fn steps(&self) -> usize;
 
+    /// Bounds the steps from now on, of a method whose error determines them: the steps of a
+    /// finer run that is compared with a coarser one are shorter everywhere, also where the times
+    /// asked for limit both.
+    fn limit_steps(&mut self, _longest: f64) {}
+
+    /// The longest step since this was asked last, of such a method.
+    fn take_longest_step(&mut self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Advances to exactly `until`; returns the state there, in which the motion is reliable.
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped>;
 

@@ -20,11 +20,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod accuracy;
 mod choice;
 mod cost;
 mod doubt;
 mod error;
 mod record;
+mod refinement;
 mod start;
 mod stills;
 
@@ -33,7 +35,10 @@ pub use choice::{Choice, Reason};
 pub use cost::Cost;
 pub use error::{MOST_SECONDS, Refused};
 pub use record::{Frame, Imbalance, Moment, Record, Still};
+pub use refinement::{REFINEMENT_SECONDS, Refinement, Watch};
 pub use stills::{film, stills};
+
+use accuracy::{Comparison, Trajectory, compared_points};
 
 use crate::clock::Instant;
 use crate::refusal::RefusedOption;
@@ -48,8 +53,15 @@ use crate::words;
 /// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;
 
+/// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
+/// longest rod.
+pub const AIM: f64 = 1e-3;
+
 /// No number of a motion is as large.
 const LARGEST_NUMBER: f64 = 1e100;
+
+/// Stands in saved numbers for an error that is not known.
+const UNKNOWN: f64 = -1.0;
 
 words! {
     /// The method of time integration.
@@ -73,7 +85,8 @@ pub struct Options {
     /// one, such that the error of a step stays below the scenario's tolerance.
     pub step: Option<f64>,
     /// Replaces the scenario's tolerance: for the semi-implicit method, the
-    /// local error of a step relative to the longest rod.
+    /// local error of a step relative to the longest rod. Of a [`Refinement`] also the error of
+    /// tips that it aims at, in place of [`AIM`].
     pub tolerance: Option<f64>,
 }
 
@@ -91,6 +104,15 @@ pub struct Simulation {
     outputs: usize,
     made: usize,
     moving: Duration,
+    /// The run that this one is compared with, and the bar that is aimed at.
+    comparison: Option<Comparison>,
+    aim: Option<f64>,
+    /// The last output whose error is known.
+    known_until: Option<f64>,
+    /// Bounds on the steps before every output but the first; none if empty.
+    longest_steps: Vec<f64>,
+    /// What a finer run is compared with, if one may follow.
+    trajectory: Option<Trajectory>,
 }
 
 impl Simulation {
@@ -198,6 +220,11 @@ impl Simulation {
             outputs: (duration / interval * (1.0 - 1e-12)).ceil().max(1.0) as usize,
             made: 0,
             moving: Duration::ZERO,
+            comparison: None,
+            aim: None,
+            known_until: None,
+            longest_steps: Vec::new(),
+            trajectory: None,
             tolerance,
             grid,
             physics,
@@ -225,12 +252,83 @@ impl Simulation {
             (None, Some([_, estimated])) => estimated.steps * left / (duration * self.physics.time),
             (None, None) => return None,
         };
+        Some((steps, steps * self.seconds_of_a_step()))
+    }
+
+    fn seconds_of_a_step(&self) -> f64 {
         let (rods, segments) = (self.leaf.rods(), self.grid.segments());
-        let each = match self.choice.scheme {
+        match self.choice.scheme {
             Scheme::Explicit => cost::explicit_step(rods, segments),
             Scheme::SemiImplicit => cost::semi_implicit_step(rods, segments),
-        };
-        Some((steps, steps * each))
+        }
+    }
+
+    /// Seconds that the steps so far take on one core of a machine of 2020: no clock decides how
+    /// far a motion is refined.
+    fn seconds(&self) -> f64 {
+        self.steps() as f64 * self.seconds_of_a_step()
+    }
+
+    /// Compares this run, which has not begun, with another from now on; `keep`s what a finer
+    /// run is compared with.
+    fn compare_with(&mut self, comparison: Option<Comparison>, keep: bool) {
+        self.comparison = comparison;
+        self.trajectory = keep.then(Trajectory::default);
+        let mut frame = self.frame();
+        self.compare(&mut frame);
+    }
+
+    /// Compares the output just made, and keeps its points.
+    fn compare(&mut self, frame: &mut Frame) {
+        if self.comparison.is_none() && self.trajectory.is_none() {
+            return;
+        }
+        let points = compared_points(frame, self.grid.sigma(), self.leaf.joined());
+        if let Some(comparison) = &mut self.comparison {
+            comparison.compare(self.made, &points);
+            frame.error = comparison.bar;
+            self.known_until = comparison.bar.map(|_| frame.time).or(self.known_until);
+        }
+        if let Some(trajectory) = &mut self.trajectory {
+            trajectory.add(&points);
+            if self.made > 0 {
+                let longest = self.method.take_longest_step();
+                trajectory.longest_steps.push(longest);
+            }
+        }
+    }
+
+    /// Bounds the steps to half of those of a coarser run.
+    fn limit_steps_by(&mut self, coarser: &Trajectory) {
+        let halves = coarser.longest_steps.iter().map(|longest| 0.5 * longest);
+        self.longest_steps = halves.collect();
+    }
+
+    /// Bounds the steps to half of the time between outputs.
+    fn halve_outputs(&mut self) {
+        let (_, interval) = self.physics.duration();
+        self.longest_steps = vec![0.5 * interval; self.outputs];
+    }
+
+    /// A bound on the error of the tips and of the middles of all rods so far, in units of
+    /// length; `None` where no other run tells it, as from where two have parted.
+    pub fn error_bar(&self) -> Option<f64> {
+        self.comparison.as_ref()?.bar
+    }
+
+    /// The time of the last output whose error is known.
+    pub fn known_until(&self) -> Option<f64> {
+        self.known_until
+    }
+
+    /// The error of tips that is aimed at, in units of length, if one is.
+    pub fn aim(&self) -> Option<f64> {
+        self.aim
+    }
+
+    /// Segments of the run that this one is compared with.
+    pub fn compared_segments(&self) -> Option<usize> {
+        Some(self.comparison.as_ref()?.segments)
     }
 
     /// The moving leaf.
@@ -313,7 +411,9 @@ impl Simulation {
     }
 
     fn frame_of(&self, now: &Snapshot) -> Frame {
-        Frame::new(&self.leaf, &self.physics, now, self.method.steps())
+        let mut frame = Frame::new(&self.leaf, &self.physics, now, self.method.steps());
+        frame.error = self.error_bar();
+        frame
     }
 
     /// Advances to the time of the next output.
@@ -323,6 +423,9 @@ impl Simulation {
     /// returns its present state.
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
         let (clock, unit) = (Instant::now(), self.physics.time);
+        if let Some(&longest) = self.longest_steps.get(self.made) {
+            self.method.limit_steps(longest);
+        }
         let advanced = self.method.advance(self.output_time(self.made + 1));
         let frame = advanced
             .map_err(|stopped| stopped.in_unit(unit))
@@ -331,7 +434,10 @@ impl Simulation {
                 self.frame_of(&now)
             });
         self.moving += clock.elapsed();
-        frame
+        frame.map(|mut frame| {
+            self.compare(&mut frame);
+            frame
+        })
     }
 
     /// The time of an output, in the method's unit.
@@ -346,7 +452,9 @@ impl Simulation {
     /// All numbers that determine the further motion, to continue it with identical bits
     /// in a simulation of the same leaf with the same options.
     pub fn save(&mut self) -> Vec<f64> {
-        let mut numbers = vec![self.made as f64];
+        let [bar, until] = [self.error_bar(), self.known_until].map(|it| it.unwrap_or(UNKNOWN));
+        let displacement = self.comparison.as_ref().map_or(0.0, |it| it.displacement);
+        let mut numbers = vec![self.made as f64, bar, until, displacement];
         numbers.extend(self.method.save());
         numbers
     }
@@ -354,7 +462,7 @@ impl Simulation {
     /// Restores the state at a call of [`Simulation::save`]; false if the
     /// numbers do not fit, or cannot be those of a motion.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
-        let Some((&made, numbers)) = numbers.split_first() else {
+        let Some((&[made, bar, until, displacement], numbers)) = numbers.split_first_chunk() else {
             return false;
         };
         let finite = || numbers.iter().all(|number| number.abs() < LARGEST_NUMBER);
@@ -362,6 +470,14 @@ impl Simulation {
             (0.0..=self.outputs as f64).contains(&made) && finite() && self.method.restore(numbers);
         if fits {
             self.made = made as usize;
+            let known = |number: f64| (number >= 0.0).then_some(number);
+            if let Some(comparison) = &mut self.comparison {
+                comparison.bar = known(bar);
+                comparison.displacement = displacement;
+            }
+            self.known_until = known(until);
+            // It has no beginning.
+            self.trajectory = None;
         }
         let (_, interval) = self.physics.duration();
         fits && (self.method.time() - self.output_time(self.made)).abs() < 0.5 * interval

@@ -28,6 +28,9 @@ pub struct Moment {
     pub energy: Energy,
     /// The shared tip, or the mean of free ones.
     pub tip: DVec3,
+    /// A bound on the error of the tips and of the middles of all rods at all outputs so far,
+    /// where it is known.
+    pub error: Option<f64>,
 }
 
 impl Moment {
@@ -40,6 +43,7 @@ impl Moment {
             steps: frame.steps,
             energy: frame.energy.map(|e| e + 0.0),
             tip: tips.iter().sum::<DVec3>() / tips.len() as f64 + DVec3::ZERO,
+            error: frame.error,
         }
     }
 }
@@ -118,6 +122,16 @@ pub struct Record {
     pub duration: f64,
     /// The time of the last output.
     pub time: f64,
+    /// A bound on the error of the tips and of the middles of all rods at all outputs, from a
+    /// comparison with another run; `None` if that cannot tell it up to the end.
+    pub error_estimate: Option<f64>,
+    /// The time of the last output whose error is known.
+    pub error_known_until: Option<f64>,
+    /// The error that was aimed at, if one was.
+    pub error_aim: Option<f64>,
+    /// Segments of the run that this one was compared with.
+    #[serde(skip)]
+    pub compared_segments: Option<usize>,
     /// The longest time step, unless the error determined it.
     pub time_step: Option<f64>,
     /// The longest stable time step of the explicit method.
@@ -171,6 +185,10 @@ impl Record {
             tolerance: simulation.tolerance(),
             duration: scenario.dynamics.duration,
             time: moments.last().map_or(0.0, |moment| moment.time),
+            error_estimate: moments.last().and_then(|moment| moment.error),
+            error_known_until: simulation.known_until(),
+            error_aim: simulation.aim(),
+            compared_segments: simulation.compared_segments(),
             time_step: simulation.longest_step(),
             stable_step: simulation.stable_step(),
             steps: simulation.steps(),
@@ -259,6 +277,8 @@ pub struct Frame {
     pub velocities: Vec<Velocity>,
     /// Energies.
     pub energy: Energy,
+    /// As of a [`Moment`].
+    pub error: Option<f64>,
 }
 
 impl Frame {
@@ -276,6 +296,7 @@ impl Frame {
             rotations: snapshot.state.q.clone(),
             velocities: snapshot.velocity.iter().map(velocity).collect(),
             energy: snapshot.energy.map(|e| e * energy),
+            error: None,
         }
     }
 

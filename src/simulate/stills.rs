@@ -91,6 +91,7 @@ mod tests {
             steps: i,
             energy: Energy::default(),
             tip: DVec3::X * tip(i as f64),
+            error: None,
         };
         (0..count).map(moment).collect()
     }

@@ -2,6 +2,7 @@
 
 mod damping;
 mod energy;
+mod error_bars;
 mod grips;
 mod hinges;
 mod moments;

@@ -2,7 +2,7 @@
 
 use crate::report::Reported;
 use crate::report::numbers::{
-    brief, in_unit, known, point, power_of_ten, rounded_to, seconds, veins_of,
+    bound_of_positions, brief, in_unit, known, point, power_of_ten, rounded_to, seconds, veins_of,
 };
 use crate::report::table::{Lines, labelled};
 use leafdyn::largest::{larger, largest};
@@ -37,6 +37,7 @@ impl Reported for Record {
             let tip = point(tip.to_array(), decimals as usize);
             lines.push(("tip", in_unit(tip, units, LENGTH)));
         }
+        lines.push(("error", error(self, units)));
         lines.push(("speed", speed(self)));
         lines
     }
@@ -101,6 +102,23 @@ fn energy(record: &Record, units: &Units) -> Lines {
     let parts = parts.map(|(name, value)| format!("{name} {}", digits(value)));
     let parts = in_unit(parts.join(", "), units, ENERGY);
     vec![("energy", parts), ("balance", balance)]
+}
+
+/// The bar on the tips, and where it ends.
+fn error(record: &Record, units: &Units) -> String {
+    let known = record.moments.iter().filter_map(|moment| moment.error);
+    let (Some(bar), Some(segments)) = (known.last(), record.compared_segments) else {
+        return "of the tips not known: there is no second run to compare with".into();
+    };
+    let bar = bound_of_positions(bar, units);
+    let tips = format!("tips within {bar}, as a run on {segments} segments a vein tells");
+    match (record.error_estimate, record.error_known_until) {
+        (None, Some(until)) => {
+            let until = in_unit(brief(until), units, TIME);
+            format!("{tips}, until t = {until}: then the two part")
+        }
+        _ => tips,
+    }
 }
 
 fn speed(record: &Record) -> String {

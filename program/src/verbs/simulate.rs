@@ -1,21 +1,20 @@
 //! `leafdyn simulate`: follows the motion of a leaf.
 
-use std::time::Instant;
-
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, duration, fraction_between};
 use super::request::{Request, VerbTraits, words};
 use super::{OnInterrupt, note, on_interrupt, show_checkpoint};
 use super::{Refusal, Status};
 use crate::files::Recording;
-use crate::report::FileError;
 use crate::report::numbers::brief;
 use clap::Args;
 use leafdyn::memory;
-use leafdyn::simulate::{Options, Record, Scheme, Simulation, Stopped};
+use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
 
-/// Longer simulations, in seconds, are announced with their expected duration.
+/// Longer simulations, in seconds, are announced with their expected duration, and longer runs on
+/// finer grids.
 const ANNOUNCED: f64 = 60.0;
+const FINER_ANNOUNCED: f64 = 5.0;
 
 /// Larger recordings, in bytes, are announced with their expected size.
 const LARGE: u64 = 1_000_000_000;
@@ -34,11 +33,11 @@ pub struct Simulate {
     #[arg(long, value_name = "NAME", value_parser = words::<Scheme>(Scheme::ALL.map(Scheme::word)))]
     method: Option<Scheme>,
 
-    /// N segments a rod; left out: 16, or as many as the rest shape needs
+    /// N segments a rod; left out: 16, or as many as the rest shape needs, and doubled until the tips are as accurate as the tolerance, within some 10 s
     #[arg(long, value_name = "N")]
     segments: Option<usize>,
 
-    /// The longest time step; left out: explicit: nine tenths of the longest stable one; semi-implicit: as the tolerance, the local error of a step, allows
+    /// The longest time step; left out: explicit: at most nine tenths of the longest stable one; semi-implicit: as the tolerance, the local error of a step, allows; halved with the segments
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     step: Option<f64>,
 
@@ -63,39 +62,80 @@ impl Simulate {
             step: self.step,
             tolerance: self.request.tolerance,
         };
-        let mut simulation = Simulation::new(&job.scenario, &options)?;
+        let mut motion = Refinement::new(&job.scenario, &options)?;
+        if self.resume {
+            Recording::check_resumable(&job.folder, &motion, &job.selection)?;
+        }
+        announce(&motion, job, ANNOUNCED);
+        let mut line = job.progress();
+        let mut last = None;
+        while let Some(run) = motion.next_run(&mut |run| {
+            show_progress(&mut line, run);
+            true
+        }) {
+            let (simulation, recording, stopped) = self.record(run, &mut line, job)?;
+            let (simulation, _, stopped) = last.insert((simulation, recording, stopped));
+            motion.end_run(simulation, *stopped);
+            announce(&motion, job, FINER_ANNOUNCED);
+            if motion.expected().is_some() {
+                // Nothing of this run is kept.
+                *on_interrupt() = None;
+                last = None;
+            }
+        }
+        let Some((simulation, mut recording, stopped)) = last else {
+            return Err("the motion was not followed".into());
+        };
+        drop(line);
+        let delivered = self.deliver(&simulation, &mut recording, stopped, job);
+        if delivered.is_err() {
+            write_checkpoint(&recording);
+        }
+        delivered
+    }
+
+    /// Runs a simulation to its end, or until it stops early, and records it.
+    fn record(
+        &self,
+        mut simulation: Simulation,
+        line: &mut ProgressLine,
+        job: &Job,
+    ) -> Result<(Simulation, Recording, Option<Stopped>), Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
-        let mut recording = match self.resume {
+        let mut recording = match self.resume && Recording::is_kept(folder, &simulation, selection)
+        {
             true => Recording::resume(folder, &mut simulation, selection)?,
             false => Recording::begin(folder, &mut simulation, selection)?,
         };
-        if let Some((steps, seconds)) = simulation.expected()
-            && seconds > ANNOUNCED
-        {
-            let (name, steps) = (&job.scenario.name, brief(steps));
-            let time = duration(seconds);
-            note(&format!("{name}: {steps} steps to make, some {time}"));
-        }
         let bytes = recording.expected_bytes(&simulation);
         if bytes > LARGE {
             let (name, size) = (&job.scenario.name, memory::size(bytes));
             note(&format!("{name}: some {size} to record"));
         }
         *on_interrupt() = Some(OnInterrupt::Write(recording.checkpointer()));
-        let ended = self.follow(&mut simulation, &mut recording, job);
-        if ended.is_err() {
-            write_checkpoint(&recording);
+        let mut stopped = None;
+        while stopped.is_none() && !simulation.done() {
+            match simulation.next_frame() {
+                Err(why) => stopped = Some(why),
+                Ok(frame) => {
+                    if let Err(error) = recording.add(&mut simulation, &frame) {
+                        write_checkpoint(&recording);
+                        return Err(error.into());
+                    }
+                    show_progress(line, &simulation);
+                }
+            }
         }
-        ended
+        Ok((simulation, recording, stopped))
     }
 
-    fn follow(
+    fn deliver(
         &self,
-        simulation: &mut Simulation,
+        simulation: &Simulation,
         recording: &mut Recording,
+        stopped: Option<Stopped>,
         job: &Job,
     ) -> Result<Delivered, Refusal> {
-        let stopped = record(simulation, recording, job.progress())?;
         let record = recording.record(simulation, stopped)?;
         job.remark(record.remark());
         for doubt in &record.doubts {
@@ -119,26 +159,31 @@ fn write_checkpoint(recording: &Recording) {
     }
 }
 
-/// Runs the simulation to its end, or until it stops early, and records it.
-fn record(
-    simulation: &mut Simulation,
-    recording: &mut Recording,
-    mut line: ProgressLine,
-) -> Result<Option<Stopped>, FileError> {
-    let duration = simulation.leaf().scenario().dynamics.duration;
-    let (clock, begin) = (Instant::now(), simulation.time());
-    while !simulation.done() {
-        let frame = match simulation.next_frame() {
-            Ok(frame) => frame,
-            Err(stopped) => return Ok(Some(stopped)),
-        };
-        recording.add(simulation, &frame)?;
-        let fraction = fraction_between(begin, frame.time, duration, false);
-        line.update(fraction, || {
-            let speed = (frame.time - begin) / clock.elapsed().as_secs_f64();
-            let [time, duration, speed] = [frame.time, duration, speed].map(brief);
-            format!("t = {time} of {duration}, {speed} a second")
-        });
+/// Says what the next run takes, if it takes more than so many seconds.
+fn announce(motion: &Refinement, job: &Job, seconds: f64) {
+    if let Some((steps, expected)) = motion.expected()
+        && expected > seconds
+    {
+        let (name, segments, steps) = (&job.scenario.name, motion.segments(), brief(steps));
+        let time = duration(expected);
+        note(&format!(
+            "{name}: {steps} steps to make on {segments} segments a vein, some {time}"
+        ));
     }
-    Ok(None)
+}
+
+fn show_progress(line: &mut ProgressLine, simulation: &Simulation) {
+    let (time, duration) = (
+        simulation.time(),
+        simulation.leaf().scenario().dynamics.duration,
+    );
+    // Another run begins.
+    if simulation.frames().1 == 1 {
+        line.next_phase();
+    }
+    line.update(fraction_between(0.0, time, duration, false), || {
+        let segments = simulation.segments();
+        let [time, duration] = [time, duration].map(brief);
+        format!("t = {time} of {duration}, {segments} segments a vein")
+    });
 }

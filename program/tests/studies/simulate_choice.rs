@@ -175,7 +175,7 @@ fn a_choice_changes_nothing_in_the_motion() {
 #[test]
 fn the_report_and_the_summary_say_why() {
     let place = Workplace::new();
-    let short = "simulate leaf.toml --set dynamics.duration=1";
+    let short = "simulate leaf.toml --segments 16 --set dynamics.duration=1";
     let run = place.ok(short);
     let line = "\n  choice   it costs less: some ";
     run.says(&["method explicit\n", line, " by the semi-implicit one\n"]);

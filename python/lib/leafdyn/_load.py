@@ -267,6 +267,8 @@ def _motion(said: Said, files: Kept) -> Motion:
         name=scenario.name,
         remark=said.get("remark"),
         doubts=said.get("doubts", []),
+        **{name: said.get(name) for name in ("error_estimate", "error_known_until", "error_aim")},
+        errors=energies["error"] if "error" in energies else np.full(len(times), np.nan),
         stations=stations,
         times=times,
         energies={name: energies[name] for name in ENERGIES},

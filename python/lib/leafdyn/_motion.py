@@ -61,6 +61,16 @@ class Motion(Viewed):
         """What makes it doubtful from its beginning, such as a start at an unstable equilibrium."""
     )
     method = Attribute[str]("""``"explicit"`` or ``"semi-implicit"``.""")
+    error_estimate = Attribute[float | None](
+        "A bound on the error of the tips and of the middles of all rods, in units of length, told by a second run on "
+        "another grid; none where the two part."
+    )
+    error_known_until = Attribute[float | None]("The time of the last output whose error is known.")
+    error_aim = Attribute[float | None]("The error that was aimed at; none where grid or steps were given.")
+    errors = Attribute[Array](
+        "The bound at every output, of all so far, shape (T,): the column ``error`` of ``energy.csv``; not a number where "
+        "it is not known."
+    )
     stations = Attribute[Array]("Fractions of the length at which the nodes are, shape (M + 1,).")
     times = Attribute[Array]("Times of the outputs, shape (T,).")
     positions = Attribute[Array]("Positions, shape (T, N, M + 1, 3), in units of length.")
@@ -80,6 +90,8 @@ class Motion(Viewed):
         self.outcome, self.remark = core.outcome
         self.doubts = core.doubts
         self.method = core.method
+        self.error_estimate, self.error_known_until, self.error_aim = core.accuracy
+        self.errors = core.errors
         self.stations = core.stations()
         outputs = core.outputs()
         self.energies = {energy: outputs.pop(energy) for energy in ENERGIES}

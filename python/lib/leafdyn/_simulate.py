@@ -33,11 +33,13 @@ def simulate(
         ``"explicit"`` or ``"semi-implicit"``; left out: the one that costs less;
         ``to_dict()["choice"]`` says why.
     segments
-        Segments a rod; left out: 16, or as many as the rest shape needs.
+        Segments a rod; left out: 16, or as many as the rest shape needs, and doubled, with steps half as long, until
+        ``error_estimate`` is as small as the ``tolerance`` within some 10 s.
     step
         The longest time step; left out: as the method needs.
     tolerance
-        Of the semi-implicit method: the local error of a step, relative to the longest rod.
+        The error of the tips that is aimed at, relative to the longest rod, 1e-3 if it is left out; of the semi-implicit
+        method also the local error of a step on the first grid.
 
     Returns
     -------
@@ -98,7 +100,7 @@ def frames(
     tolerance: float | None = None,
 ) -> Iterator[Frame]:
     """Follow a leaf as it moves, an output at a time, so that memory does not grow. Parameters are those of `simulate`;
-    what cannot be done is refused at once, not with the first output.
+    what cannot be done is refused at once, not with the first output. There is one run, whose error is not estimated.
 
     Returns
     -------

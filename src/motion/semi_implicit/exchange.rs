@@ -34,6 +34,7 @@ impl SemiImplicit {
         }
         self.corrected = Loads::default();
         self.past_step = h;
+        self.longest_made = self.longest_made.max(h);
         self.time += h;
         self.count += 1;
     }

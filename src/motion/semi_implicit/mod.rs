@@ -137,6 +137,9 @@ pub struct SemiImplicit {
     weights: Weights,
     steps: Steps,
     step: f64,
+    /// A bound on the steps, and the longest since this was asked last.
+    longest: f64,
+    longest_made: f64,
     time: f64,
     count: usize,
     /// Number of factorisations.
@@ -168,6 +171,8 @@ impl SemiImplicit {
                 Steps::Fixed(h) => h,
                 Steps::Error(error) | Steps::ToCount(error) => 0.1 * error.cbrt(),
             },
+            longest: f64::INFINITY,
+            longest_made: 0.0,
             weights: Weights::of(RHO_INF),
             steps,
             time: 0.0,
@@ -195,13 +200,14 @@ impl SemiImplicit {
             self.time = until;
             return Ok(());
         }
-        let count = (left / self.step * (1.0 - 1e-12)).ceil().max(1.0);
+        let step = self.step.min(self.longest);
+        let count = (left / step * (1.0 - 1e-12)).ceil().max(1.0);
         // The last two steps divide the remaining time equally.
         let last = count == 1.0;
         let h = match self.steps {
             Steps::Fixed(_) => left / count,
             _ if count <= 2.0 => left / count,
-            _ => self.step,
+            _ => step,
         };
         let error = self.attempt(h);
         if let (Some(allowed), Some(error)) = (self.steps.error(), error) {
@@ -245,6 +251,14 @@ impl Method for SemiImplicit {
 
     fn steps(&self) -> usize {
         self.count
+    }
+
+    fn limit_steps(&mut self, longest: f64) {
+        self.longest = longest;
+    }
+
+    fn take_longest_step(&mut self) -> f64 {
+        std::mem::take(&mut self.longest_made)
     }
 
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {

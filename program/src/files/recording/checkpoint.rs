@@ -45,6 +45,8 @@ pub struct Identity {
     segments: usize,
     step: Option<String>,
     tolerance: String,
+    /// The error that is aimed at, if one is.
+    aim: Option<String>,
     /// The value of `--stations`.
     stations: Option<usize>,
 }
@@ -61,14 +63,16 @@ impl Identity {
             segments: simulation.segments(),
             step: simulation.longest_step().map(digits),
             tolerance: digits(simulation.tolerance()),
+            aim: simulation.aim().map(digits),
             stations,
         }
     }
 
     /// The properties that distinguish runs, as readable text.
-    fn descriptions(&self) -> [(&'static str, String); 8] {
+    fn descriptions(&self) -> [(&'static str, String); 9] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
         let step = self.step.as_deref().map(number);
+        let aim = self.aim.as_deref();
         let stations = self.stations.map(|count| count.to_string());
         [
             ("version", self.version.clone()),
@@ -78,8 +82,23 @@ impl Identity {
             ("segments", self.segments.to_string()),
             ("time step", step.unwrap_or("left to the tolerance".into())),
             ("tolerance", number(&self.tolerance)),
+            ("error aimed at", aim.map_or("left out".into(), number)),
             ("stations", stations.unwrap_or("of the grid".into())),
         ]
+    }
+
+    /// The identity of a run that this one, the first of a motion, may be refined to: that of
+    /// another run if its grid is as fine or twice, four times ... as fine.
+    pub fn refined_to(mut self, other: &Identity) -> Self {
+        let ratio = other.segments / self.segments.max(1);
+        if ratio.is_power_of_two() && ratio * self.segments == other.segments {
+            self.step.clone_from(&other.step);
+            if ratio > 1 {
+                self.segments = other.segments;
+                self.tolerance.clone_from(&other.tolerance);
+            }
+        }
+        self
     }
 
     /// Describes the first difference from the requested run.
@@ -142,6 +161,14 @@ impl Checkpoint {
 
     /// Reads the checkpoint in a folder; refused if it is damaged or of another run.
     pub fn read(folder: &Path, asked: &Identity) -> Result<Self, FileError> {
+        Checkpoint::read_as(folder, |_| asked.clone())
+    }
+
+    /// The same, of a run that is `asked` for as that in the checkpoint allows.
+    pub fn read_as(
+        folder: &Path,
+        asked: impl FnOnce(&Identity) -> Identity,
+    ) -> Result<Self, FileError> {
         let file = &folder.join(FILE_NAME);
         let text = fs::read(file).map_err(|reason| match reason.kind() {
             io::ErrorKind::NotFound => {
@@ -156,7 +183,7 @@ impl Checkpoint {
         if found.checksum != found.sum() {
             return Err(damaged(file, "its content does not match its checksum"));
         }
-        match found.run.difference(asked) {
+        match found.run.difference(&asked(&found.run)) {
             Some(what) => {
                 let (file, change) = (file.display(), "ask for the same run");
                 let why = format!("{file} is of another run: {what}");

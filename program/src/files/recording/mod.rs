@@ -26,7 +26,9 @@ use checkpoint::{Checkpoint, Identity, Latest, damaged};
 use growing::{GrowingFile, kept_path};
 use leafdyn::scenario;
 use leafdyn::shape::equally_spaced;
-use leafdyn::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
+use leafdyn::simulate::{
+    Frame, Moment, Record, Refinement, Simulation, Still, Stopped, film, stills,
+};
 use motion::{MotionFormat, Size};
 
 /// Shapes that a film strip shows.
@@ -86,6 +88,17 @@ impl Recording {
         simulation: &mut Simulation,
         selection: &Selection,
     ) -> Result<Self, FileError> {
+        let frame = simulation.frame();
+        Recording::begin_with(folder, simulation, selection, &frame)
+    }
+
+    /// The same with another first output.
+    pub fn begin_with(
+        folder: &Path,
+        simulation: &mut Simulation,
+        selection: &Selection,
+        first: &Frame,
+    ) -> Result<Self, FileError> {
         let mut recording = Recording::new(folder, simulation, selection);
         if selection.kinds.iter().any(|kind| *kind != Kind::Json) {
             atomic::make_folder(folder)?;
@@ -96,9 +109,34 @@ impl Recording {
             let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
             recording.growing = Some([motion, energy]);
         }
-        let frame = simulation.frame();
-        recording.add(simulation, &frame)?;
+        recording.add(simulation, first)?;
         Ok(recording)
+    }
+
+    /// Whether the run that was stopped with a checkpoint in `folder` is one of a motion.
+    ///
+    /// # Errors
+    /// If there is no checkpoint, or it is damaged or of another motion.
+    pub fn check_resumable(
+        folder: &Path,
+        motion: &Refinement,
+        selection: &Selection,
+    ) -> Result<(), FileError> {
+        let Some(first) = motion.first() else {
+            return Ok(());
+        };
+        let asked = Identity::of(first, selection.stations);
+        Checkpoint::read_as(folder, |found| match motion.refines() {
+            true => asked.refined_to(found),
+            false => asked,
+        })?;
+        Ok(())
+    }
+
+    /// Whether this run was stopped with a checkpoint in `folder`.
+    pub fn is_kept(folder: &Path, simulation: &Simulation, selection: &Selection) -> bool {
+        let asked = Identity::of(simulation, selection.stations);
+        Checkpoint::read(folder, &asked).is_ok()
     }
 
     /// Resumes a simulation of the same leaf and options that was stopped with a checkpoint

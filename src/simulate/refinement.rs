@@ -1,0 +1,415 @@
+//! A motion followed on finer and finer grids in shorter and shorter steps, each run compared with
+//! the one before, until its tips are as accurate as requested.
+
+use super::accuracy::{Comparison, Trajectory};
+use super::{AIM, Choice, Options, Refused, Scheme, Simulation, start};
+use crate::leaf::{Grid, Leaf};
+use crate::motion::Stopped;
+use crate::numbers::two_digits;
+use crate::relax;
+use crate::scenario::{self, Scenario};
+
+/// Seconds, on one core of a machine of 2020, that all runs of a motion may take together. The
+/// first run, and that which it is compared with, take what they need.
+pub const REFINEMENT_SECONDS: f64 = 10.0;
+
+/// The coarsest grid that a motion is compared with; below, a finer one is.
+const COARSEST: usize = 4;
+
+/// The ratio of the local errors of steps of which one is half as long: they are of third order.
+const EIGHT: f64 = 8.0;
+
+/// Bounds on the local error of a step.
+const LOCAL_ERROR: (f64, f64) = (1e-12, 0.1);
+
+/// The time of a run over that on a grid of half as many segments, in steps twice as long.
+const FOUR: f64 = 4.0;
+
+/// Explicit steps that are longer by no more than this factor count as equally long.
+const HARDLY_LONGER: f64 = 1.1;
+
+/// Where runs part later than runs on coarser grids by less than this factor, they part for
+/// another reason than the phases of vibrations, and finer grids do not help.
+const LATER: f64 = 1.3;
+
+/// The grid of a run, and its steps as in [`Options`].
+#[derive(Clone, Copy, Debug)]
+struct Resolution {
+    segments: usize,
+    step: Option<f64>,
+    tolerance: f64,
+}
+
+/// What is told of a run that unrecorded runs make, and whether they go on.
+pub type Watch<'a> = dyn FnMut(&Simulation) -> bool + 'a;
+
+/// A motion on finer and finer grids. Segments or a step that are requested fix the grid and the
+/// steps: then there is one run, compared with another that costs less.
+///
+/// ```
+/// # use leafdyn::scenario::Scenario;
+/// # use leafdyn::simulate::{Options, Refinement};
+/// # let text = r#"
+/// #     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+/// #     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+/// #     load = { gravity = [0.0, 0.0, -1.0] }
+/// #     dynamics = { duration = 1.0 }
+/// # "#;
+/// # let scenario = Scenario::from_toml(text)?;
+/// let mut refinement = Refinement::new(&scenario, &Options::default())?;
+/// let mut error = None;
+/// while let Some(mut simulation) = refinement.next_run(&mut |_| true) {
+///     let mut stopped = None;
+///     while !simulation.done() && stopped.is_none() {
+///         stopped = simulation.next_frame().err();
+///     }
+///     // The last run is the result.
+///     refinement.end_run(&mut simulation, stopped);
+///     error = simulation.error_bar();
+/// }
+/// assert!(error.unwrap() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Refinement {
+    scenario: Scenario,
+    options: Options,
+    /// The error of tips that is aimed at, if one is.
+    aim: Option<f64>,
+    length: f64,
+    choice: Choice,
+    /// The next run and the one before, as they were or will be.
+    resolution: Resolution,
+    before: Option<Resolution>,
+    /// The next run, not begun, and the points of the run that it is compared with, if they are
+    /// known.
+    next: Option<Simulation>,
+    coarser: Option<(usize, Trajectory)>,
+    /// Those of the run before that.
+    coarsest: Option<(usize, Trajectory)>,
+    /// Number of runs that have ended, and whether the next is the last in any case.
+    runs: usize,
+    last: bool,
+    /// Whether the run before was followed to its end, and until when its error is known.
+    completed: bool,
+    known_until: Option<f64>,
+    seconds: f64,
+    /// What the next run but the first takes: steps and seconds.
+    expected: (f64, f64),
+}
+
+impl Refinement {
+    /// The motion of a leaf from time 0.
+    ///
+    /// # Errors
+    /// As of [`Simulation::new`].
+    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
+        let first = Simulation::new(scenario, options)?;
+        let length = scenario::longest(&scenario.rods);
+        let mut refinement = Refinement {
+            scenario: scenario.clone(),
+            options: options.clone(),
+            aim: None,
+            length,
+            choice: first.choice(),
+            resolution: Resolution {
+                segments: first.segments(),
+                step: first.longest_step(),
+                tolerance: first.tolerance(),
+            },
+            before: None,
+            next: Some(first),
+            coarser: None,
+            coarsest: None,
+            runs: 0,
+            last: false,
+            completed: false,
+            known_until: None,
+            seconds: 0.0,
+            expected: (0.0, 0.0),
+        };
+        if refinement.refines() || options.tolerance.is_some() {
+            refinement.aim = Some(length * options.tolerance.unwrap_or(AIM));
+        }
+        if let Some(first) = &mut refinement.next {
+            first.aim = refinement.aim;
+        }
+        Ok(refinement)
+    }
+
+    /// Whether grid and steps are refined, as none of them is requested.
+    pub fn refines(&self) -> bool {
+        self.options.segments.is_none() && self.options.step.is_none()
+    }
+
+    /// The first run, before it has begun.
+    pub fn first(&self) -> Option<&Simulation> {
+        self.next.as_ref().filter(|_| self.runs == 0)
+    }
+
+    /// Steps and seconds that the next run is expected to take, as far as they are known.
+    pub fn expected(&self) -> Option<(f64, f64)> {
+        match self.runs {
+            0 => self.next.as_ref()?.expected(),
+            _ => Some(self.expected).filter(|_| self.next.is_some()),
+        }
+    }
+
+    /// Segments of the next run.
+    pub fn segments(&self) -> usize {
+        self.next.as_ref().map_or(0, Simulation::segments)
+    }
+
+    /// The next run, at time 0; none behind the last, or if `watch`, which sees runs that it is
+    /// compared with, ends them.
+    pub fn next_run(&mut self, watch: &mut Watch) -> Option<Simulation> {
+        let mut simulation = self.next.take()?;
+        let comparison = match self.runs {
+            0 => self.compare_first(&mut simulation, watch)?,
+            _ => self.compare_next(&mut simulation, watch)?,
+        };
+        simulation.choice = self.choice;
+        simulation.aim = self.aim;
+        simulation.compare_with(comparison, self.refines());
+        Some(simulation)
+    }
+
+    /// Ends a run, and decides whether another follows. What makes the last one doubtful is added
+    /// to it.
+    pub fn end_run(&mut self, simulation: &mut Simulation, stopped: Option<Stopped>) {
+        let trajectory = simulation.trajectory.take();
+        let outputs = simulation.frames().1 + 1;
+        let whole = trajectory.filter(|points| points.outputs() == outputs);
+        self.seconds += simulation.seconds();
+        self.runs += 1;
+        let bar = simulation.error_bar().filter(|_| stopped.is_none());
+        let met = self
+            .aim
+            .is_some_and(|aim| bar.is_some_and(|bar| bar <= aim));
+        if !met && self.refines() && !self.last {
+            self.refine(simulation, stopped);
+        }
+        if self.next.is_some() {
+            let others = (simulation.segments(), whole.unwrap_or_default());
+            let before = std::mem::replace(&mut self.coarser, Some(others));
+            if self.last {
+                // The run before once more, compared with what it was compared with.
+                self.coarser = self.coarsest.take();
+            } else {
+                self.coarsest = before;
+            }
+            self.completed = stopped.is_none();
+            self.known_until = simulation.known_until();
+            return;
+        }
+        if let Some(aim) = self.aim
+            && !met
+            && stopped.is_none()
+        {
+            let doubt = missed(simulation, aim, self.refines());
+            simulation.doubts.push(doubt);
+        }
+    }
+
+    /// Builds the next run, if there is one.
+    fn refine(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
+        if stopped.is_some() && self.completed {
+            // The finer grid fails: what the coarser one found is the result.
+            if let Some(before) = self.before {
+                self.last = true;
+                self.next = self.build(before).ok();
+            }
+            return;
+        }
+        let until = ended.known_until().filter(|_| ended.error_bar().is_none());
+        if let (Some(until), Some(before)) = (until, self.known_until)
+            && before > 0.0
+            && until < LATER * before
+        {
+            return;
+        }
+        let part = ended.time() / self.scenario.dynamics.duration;
+        let expected = FOUR * ended.seconds() / part.clamp(f64::EPSILON, 1.0);
+        if self.seconds + expected > REFINEMENT_SECONDS {
+            return;
+        }
+        let now = self.resolution;
+        let halved = Resolution {
+            segments: 2 * now.segments,
+            step: now.step.map(|step| 0.5 * step),
+            tolerance: self.local_error(now.tolerance / EIGHT),
+        };
+        let Ok(next) = self.build_with_steps(halved) else {
+            return;
+        };
+        // Explicit steps may have to be shorter than half as long.
+        let known = next.expected();
+        self.expected = known.unwrap_or((2.0 * ended.steps() as f64, expected));
+        if self.seconds + self.expected.1 <= REFINEMENT_SECONDS {
+            self.before = Some(now);
+            self.resolution = Resolution {
+                step: next.longest_step(),
+                ..halved
+            };
+            self.next = Some(next);
+        }
+    }
+
+    /// The local error of a step; explicit steps have none.
+    fn local_error(&self, tolerance: f64) -> f64 {
+        match self.choice.scheme {
+            Scheme::Explicit => self.resolution.tolerance,
+            Scheme::SemiImplicit => tolerance.clamp(LOCAL_ERROR.0, LOCAL_ERROR.1),
+        }
+    }
+
+    fn build(&self, at: Resolution) -> Result<Simulation, Refused> {
+        let start_tolerance = self.options.tolerance.unwrap_or(self.scenario.tolerance);
+        let options = Options {
+            scheme: Some(self.choice.scheme),
+            segments: Some(at.segments),
+            step: at.step,
+            tolerance: Some(at.tolerance),
+        };
+        let from = |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, start_tolerance);
+        Simulation::from(&self.scenario, &options, &from)
+    }
+
+    /// With steps of this length or, by the explicit method, the longest stable ones if they are
+    /// hardly longer, or shorter.
+    fn build_with_steps(&self, at: Resolution) -> Result<Simulation, Refused> {
+        let stable = self.build(Resolution { step: None, ..at })?;
+        match (at.step, stable.longest_step()) {
+            (Some(step), Some(longest)) if longest > HARDLY_LONGER * step => self.build(at),
+            _ => Ok(stable),
+        }
+    }
+
+    /// The points of a run that is not recorded, as far as it goes; none if it is ended.
+    fn follow(&mut self, mut run: Simulation, watch: &mut Watch) -> Option<Trajectory> {
+        run.choice = self.choice;
+        run.compare_with(None, true);
+        while !run.done() && run.next_frame().is_ok() {
+            if !watch(&run) {
+                return None;
+            }
+        }
+        self.seconds += run.seconds();
+        run.trajectory
+    }
+
+    /// The comparison of the first run with one on another grid; none inside if that cannot run.
+    fn compare_first(
+        &mut self,
+        first: &mut Simulation,
+        watch: &mut Watch,
+    ) -> Option<Option<Comparison>> {
+        let own = self.resolution;
+        let coarser = own.segments.div_ceil(2);
+        let (segments, factor) = match coarser >= COARSEST && self.has_grid(coarser) {
+            true => (coarser, 2.0),
+            false => (2 * own.segments, 0.5),
+        };
+        let with = |step: Option<f64>| Resolution {
+            segments,
+            step,
+            tolerance: self.local_error(own.tolerance * f64::powi(factor, 3)),
+        };
+        if let Some(step) = self.options.step {
+            // Given steps are taken on the other grid, too, and steps half as long there tell what
+            // they cost.
+            let runs = [step, 0.5 * step].map(|step| self.build(with(Some(step))).ok());
+            let [Some(same), Some(halved)] = runs else {
+                return Some(None);
+            };
+            let same = self.follow(same, watch)?;
+            let halved = self.follow(halved, watch)?;
+            let comparison = Comparison::new(own.segments, (segments, same), self.length);
+            return Some(Some(comparison.with_half_steps(&halved)));
+        }
+        let longer = own.step.map(|step| factor * step);
+        let Ok(mut run) = self.build_with_steps(with(longer)) else {
+            return Some(None);
+        };
+        if let (Some(step), Some(longer)) = (run.longest_step(), longer)
+            && factor > 1.0
+            && HARDLY_LONGER * step < longer
+        {
+            // The coarser grid does not allow explicit steps twice as long.
+            self.resolution.step = Some(0.5 * step);
+            match self.build(self.resolution) {
+                Ok(shorter) => *first = shorter,
+                // It was accepted with longer steps.
+                Err(_) => return Some(None),
+            }
+        }
+        if factor < 1.0 {
+            run.halve_outputs();
+        }
+        let trajectory = self.follow(run, watch)?;
+        if factor > 1.0 {
+            first.limit_steps_by(&trajectory);
+            self.coarser = Some((segments, trajectory.clone()));
+        }
+        Some(Some(Comparison::new(
+            own.segments,
+            (segments, trajectory),
+            self.length,
+        )))
+    }
+
+    /// Whether the leaf has a grid of so many segments.
+    fn has_grid(&self, segments: usize) -> bool {
+        relax::check_segments(&Leaf::new(&self.scenario), Some(segments), segments).is_ok()
+    }
+
+    /// The comparison of a later run with the one before.
+    fn compare_next(
+        &mut self,
+        next: &mut Simulation,
+        watch: &mut Watch,
+    ) -> Option<Option<Comparison>> {
+        let Some((segments, mut trajectory)) = self.coarser.clone() else {
+            return Some(None);
+        };
+        if trajectory.outputs() == 0
+            && let Some(before) = self.before
+        {
+            // It went on from a checkpoint, and is followed from its beginning.
+            let Ok(mut run) = self.build(before) else {
+                return Some(None);
+            };
+            if let Some((_, coarsest)) = &self.coarsest {
+                run.limit_steps_by(coarsest);
+            }
+            trajectory = self.follow(run, watch)?;
+            self.coarser = Some((segments, trajectory.clone()));
+        }
+        next.limit_steps_by(&trajectory);
+        let comparison = Comparison::new(next.segments(), (segments, trajectory), self.length);
+        Some(Some(comparison))
+    }
+}
+
+/// A sentence on a motion that is not as accurate as it was to be.
+fn missed(simulation: &Simulation, aim: f64, refined: bool) -> String {
+    let aim = two_digits(aim);
+    let why = match refined {
+        true => format!(
+            "finer grids would take more than {REFINEMENT_SECONDS} seconds, or cannot be followed; give more segments"
+        ),
+        false => "give more segments and shorter steps, or leave both out".into(),
+    };
+    match (simulation.error_bar(), simulation.known_until()) {
+        (Some(bar), _) => format!(
+            "the error of the tips may be {}, and {aim} was aimed at: {why}",
+            two_digits(bar)
+        ),
+        (None, Some(until)) => format!(
+            "from t = {} on runs on two grids part, as where a leaf snaps: how accurate the tips are is known until then",
+            two_digits(until)
+        ),
+        (None, None) => {
+            "how accurate the tips are is not known: there is no second run to compare with".into()
+        }
+    }
+}
