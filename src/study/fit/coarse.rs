@@ -46,13 +46,14 @@ impl<'a> Model<'a> {
                 let Some(at) = known.at.coarsest(count) else {
                     break;
                 };
-                let found = CaseAt::new(&self.cases[case], at).map_err(lost)?;
+                let found = self.case_at(case, &accurate.theta, at).map_err(lost)?;
                 let mut both = found.components.iter().zip(&known.components);
                 if both.all(|(a, b)| (a.model - b.model).abs() < INSIGNIFICANT * sd(b)) {
                     return Ok(found);
                 }
             }
-            CaseAt::new(&self.cases[case], known.at.grids()).map_err(lost)
+            self.case_at(case, &accurate.theta, known.at.grids())
+                .map_err(lost)
         };
         let point = self.point(&accurate.theta, coarse)?;
         Ok((model, point))
