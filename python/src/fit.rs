@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use leafdyn::scenario;
 use leafdyn::study::{
-    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading,
-    RowChoice,
+    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
 };
 use pyo3::prelude::*;
 

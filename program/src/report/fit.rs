@@ -102,7 +102,8 @@ fn number(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> Strin
         (None, Some(high)) => format!("{percent}: at most {high}"),
         (None, None) => "no bounds".into(),
     };
-    let widened = outcome == FitOutcome::Systematic && parameter.low.is_some() && parameter.high.is_some();
+    let widened =
+        outcome == FitOutcome::Systematic && parameter.low.is_some() && parameter.high.is_some();
     match parameter.determined || widened {
         true => {
             let value = in_unit_of_key(digits(parameter.value), units, key);
