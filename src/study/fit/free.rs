@@ -185,7 +185,9 @@ impl Coordinate {
                     FreeNumber::Entry(_) => {
                         format!("the scenario has {value}, which is not between the bounds")
                     }
-                    FreeNumber::Offset(_) => "an offset begins at 0, which is not between the bounds".into(),
+                    FreeNumber::Offset(_) => {
+                        "an offset begins at 0, which is not between the bounds".into()
+                    }
                 };
                 return Err(FitError::Free(format!("{free}: {why}")));
             }

@@ -92,7 +92,11 @@ pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
     let p_value = match is_as_given {
         true => tail(smooth / count as f64, count, None),
         false => {
-            let least = if stats.known { 1.0 } else { LEAST_DEVIATION.powi(2) };
+            let least = if stats.known {
+                1.0
+            } else {
+                LEAST_DEVIATION.powi(2)
+            };
             let ratio = smooth / count as f64 / scattered.max(least);
             tail(ratio, count, Some(rest))
         }
@@ -101,7 +105,9 @@ pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
         return None;
     }
     let mut along: Vec<String> = Vec::new();
-    let largest = energies.iter().fold(0.0_f64, |most, energy| most.max(*energy));
+    let largest = energies
+        .iter()
+        .fold(0.0_f64, |most, energy| most.max(*energy));
     let named = energies.iter().zip(&series);
     for (_, (name, _)) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
         if !along.contains(name) {

@@ -170,7 +170,9 @@ fn comments(files: &[DataFile]) -> Option<String> {
 fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     let base = &request.base;
     let free = expanded(request)?;
-    let coordinates = free.iter().map(|free| Coordinate::new(base, &request.data, free));
+    let coordinates = free
+        .iter()
+        .map(|free| Coordinate::new(base, &request.data, free));
     let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
     for (k, one) in coordinates.iter().enumerate() {
         if coordinates[..k]

@@ -165,8 +165,8 @@ impl<'a> Model<'a> {
             let offset: f64 = offsets.map(|(free, theta)| free.value(*theta)).sum();
             (keys, value + offset)
         });
-        let entries = free()
-            .filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))));
+        let entries =
+            free().filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))));
         settings.chain(entries).collect()
     }
 

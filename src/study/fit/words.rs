@@ -16,7 +16,8 @@ pub(super) struct Undetermined {
 
 /// The combination in the form of the result.
 pub(super) fn map(open: &Undetermined, free: &[Coordinate]) -> BTreeMap<String, f64> {
-    let part = |&(k, part): &(usize, f64)| (free[k].number.to_string(), rounded(part * free[k].unit));
+    let part =
+        |&(k, part): &(usize, f64)| (free[k].number.to_string(), rounded(part * free[k].unit));
     open.parts.iter().map(part).collect()
 }
 
