@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use leafdyn::scenario;
 use leafdyn::study::{
-    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading,
+    self, Data, Experiment, FitError, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
 };
 use pyo3::prelude::*;
 
@@ -56,6 +56,7 @@ pub fn fit(
     candidates: Option<Measurements>,
     columns: Vec<String>,
     every: NonZeroUsize,
+    rows: Vec<String>,
     tolerance: Option<f64>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Files> {
@@ -63,10 +64,12 @@ pub fn fit(
     let columns: Result<Vec<MeasuredColumn>, FitError> =
         columns.iter().map(|column| column.parse()).collect();
     let columns = columns.map_err(|error| fit_error(py, error))?;
+    let rows: Result<Vec<RowChoice>, FitError> = rows.iter().map(|choice| choice.parse()).collect();
     let mut measured = Data {
         reading: Reading {
             columns: columns.clone(),
             every,
+            rows: rows.map_err(|error| fit_error(py, error))?,
         },
         ..Data::default()
     };

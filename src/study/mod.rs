@@ -28,9 +28,10 @@ pub use chart::{
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use equilibria::{Equilibria, Found, IN_VAIN, equilibria};
 pub use fit::{
-    Data, DataFile, Experiment, Fit, FitAlternative, FitCandidate, FitError, FitExperiment,
-    FitLeaf, FitOutcome, FitParameter, FitRequest, FitResidual, FitStep, FitWork, Free, Measured,
-    MeasuredColumn, MeasuredQuantity, Origin, Reading, Traced, fit,
+    Comparison, Data, DataFile, Experiment, Fit, FitAlternative, FitCandidate, FitError,
+    FitExperiment, FitLeaf, FitOutcome, FitParameter, FitRequest, FitResidual, FitStep,
+    FitSystematic, FitWork, Free, FreeNumber, Measured, MeasuredColumn, MeasuredQuantity,
+    OffsetColumn, Origin, Reading, RowChoice, RowCondition, Traced, fit,
 };
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,

@@ -35,6 +35,7 @@ fn read_with(
     let reading = Reading {
         columns: columns.map_err(|refused| refused.to_string())?,
         every: every.try_into().unwrap(),
+        ..Reading::default()
     };
     let mut data = Data {
         reading,

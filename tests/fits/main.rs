@@ -6,6 +6,7 @@ mod dialects_written;
 mod ends;
 mod grips;
 mod hanging;
+mod lack_of_fit;
 mod next;
 mod numbers;
 mod photograph;

@@ -39,7 +39,10 @@ fn under_tension_only_many_intervals_succeed() {
         match failure.reason {
             Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
             Reason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
-            Reason::Singular(_) | Reason::TooMuch(_) | Reason::OutOfTime => {
+            Reason::Singular(_)
+            | Reason::TooMuch(_)
+            | Reason::OutOfTime
+            | Reason::Unmodelled(_) => {
                 panic!("{}", failure.reason)
             }
         }

@@ -23,13 +23,16 @@ impl Reported for Fit {
         let found = match self.outcome {
             FitOutcome::Converged => "a minimum; the data determine every free number",
             FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
+            FitOutcome::Systematic => {
+                "a minimum, at which the residuals are systematic: the model lacks something"
+            }
             FitOutcome::Contradicted => "a minimum, at which the data contradict the model",
             FitOutcome::NotConverged => "no minimum",
         };
         let mut lines: Lines = vec![("found", found.into())];
         lines.extend(labelled(
             "numbers",
-            self.parameters.iter().map(|it| number(it, units)),
+            (self.parameters.iter()).map(|it| number(it, self.outcome, units)),
         ));
         lines.extend(labelled("data say", self.says.clone()));
         lines.extend(labelled("data", self.files.iter().map(read)));
@@ -81,7 +84,7 @@ fn read(file: &DataFile) -> String {
     said.join("; ")
 }
 
-fn number(parameter: &FitParameter, units: &Units) -> String {
+fn number(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> String {
     // The interval has two digits.
     let error = match (parameter.low, parameter.high) {
         (Some(low), Some(high)) => 0.05 * (high - low),
@@ -89,13 +92,19 @@ fn number(parameter: &FitParameter, units: &Units) -> String {
     };
     let digits = |value: f64| brief(rounded_to(value, error));
     let key = &parameter.key;
+    let percent = match outcome {
+        FitOutcome::Systematic => "95 %, widened",
+        _ => "95 %",
+    };
     let bounds = match (parameter.low.map(digits), parameter.high.map(digits)) {
-        (Some(low), Some(high)) => format!("95 %: {low} to {high}"),
-        (Some(low), None) => format!("95 %: at least {low}"),
-        (None, Some(high)) => format!("95 %: at most {high}"),
+        (Some(low), Some(high)) => format!("{percent}: {low} to {high}"),
+        (Some(low), None) => format!("{percent}: at least {low}"),
+        (None, Some(high)) => format!("{percent}: at most {high}"),
         (None, None) => "no bounds".into(),
     };
-    match parameter.determined {
+    let widened =
+        outcome == FitOutcome::Systematic && parameter.low.is_some() && parameter.high.is_some();
+    match parameter.determined || widened {
         true => {
             let value = in_unit_of_key(digits(parameter.value), units, key);
             format!("{key} = {value} ({bounds})")

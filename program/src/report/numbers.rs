@@ -71,7 +71,8 @@ pub fn in_unit(number: String, units: &Units, dimension: Dimension) -> String {
 
 /// A value of the scenario, or of numbers that vary together, with the unit of its key.
 pub fn in_unit_of_key(number: String, units: &Units, key: &str) -> String {
-    let keys: Result<Keys, _> = key.parse();
+    // An offset has the unit of its column.
+    let keys: Result<Keys, _> = key.strip_prefix("offset:").unwrap_or(key).parse();
     in_unit(number, units, keys.map_or(PURE, |keys| keys.dimension()))
 }
 

@@ -11,7 +11,7 @@ use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
 use leafdyn::study::{
-    self, Data, Fit as Fitted, FitRequest, FitStep, Free, MeasuredColumn, Reading,
+    self, Data, Fit as Fitted, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
 };
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
@@ -35,7 +35,11 @@ pub struct Fit {
     #[arg(long, value_name = "K", default_value = "1", hide_default_value = true, value_parser = step_of)]
     every: NonZeroUsize,
 
-    /// A number that is free, by its key as in --vary, and its bounds; of a list or a profile every entry; may repeat
+    /// Read only rows whose number in a column is so, as in 'load.tip_force[0]>0.5' (also <, >=, <=, =); several are joined by ' and ', or by repeating it
+    #[arg(long, value_name = "COLUMN>VALUE")]
+    rows: Vec<RowChoice>,
+
+    /// A number that is free, by its key as in --vary, and its bounds; of a quantity given as a list or a profile every entry; or offset:COLUMN, what is added to a column of experiments, as for slack; may repeat
     #[arg(
         long,
         value_name = "KEY[=LOW..HIGH]",
@@ -75,6 +79,7 @@ impl Fit {
             reading: Reading {
                 columns: self.column.clone(),
                 every: self.every,
+                rows: self.rows.clone(),
             },
             ..Data::default()
         };

@@ -92,7 +92,7 @@ class Fit(Table):
     """
 
     name = Attribute[str]("The name of the scenario.")
-    outcome = Attribute[str]("""``"converged"``, ``"undetermined"``, ``"contradicted"`` or ``"not-converged"``.""")
+    outcome = Attribute[str]("""``"converged"``, ``"undetermined"``, ``"systematic"``, ``"contradicted"`` or ``"not-converged"``.""")
     success = Attribute[bool]("Whether it ended at a minimum, and the data determine every number.")
     remarks = Attribute[list[str]]("Why it did not converge, and what else is to be known.")
     parameters = Attribute[dict[str, Parameter]]("The free numbers by their keys: values and 95 % intervals.")
@@ -116,6 +116,10 @@ class Fit(Table):
         """Other values that fit as well, if such were found: ``values`` by their keys, and ``chi_squared``."""
     )
     tried = Attribute[list[str]]("Which other values were tried to find out whether they fit as well.")
+    systematic = Attribute[dict[str, Any] | None](
+        """The systematic part of the residuals, or none: ``p_value``, the columns ``along`` which they are smooth, and by how
+    much intervals are ``widened``."""
+    )
     says = Attribute[list[str]]("What the data say, in words: the undetermined combinations, too.")
     chi_squared = Attribute[float]("The sum of the squares of residuals in standard deviations.")
     degrees_of_freedom = Attribute[int]("The number of data less that of the determined combinations.")
@@ -147,6 +151,7 @@ class Fit(Table):
             setattr(self, name, said[name])
         self.alternatives = said.get("alternatives", [])
         self.tried = said.get("tried", [])
+        self.systematic = said.get("systematic")
         self.standard_deviation = said.get("standard_deviation")
         self.candidates = [Candidate(**entry) for entry in said.get("candidates", [])]
 
@@ -242,6 +247,9 @@ class Fit(Table):
             raise ValueError("what: points on veins alone were measured: name results, such as tip_x")
         for name in names:
             quantity(name)
+        # Offsets are those of columns of the data, not numbers of the leaf.
+        of_leaf = [k for k, key in enumerate(self.parameters) if not key.startswith("offset:")]
+        values = {key: value for key, value in self.values.items() if not key.startswith("offset:")}
         table: Any = conditions
         keys = [key for key, _ in table.items() if "." in str(key)] if hasattr(table, "items") else []
         if keys:
@@ -253,8 +261,9 @@ class Fit(Table):
             rows = (dict(zip(keys, row)) for row in zip(*settings.values()))
             leaves = [Scenario(self.scenario, row) for row in rows]
         else:
-            settings, leaves = {}, [Scenario(checked(table, None), self.values)]
-        return predicted(leaves, settings, names, self.values, self.coverage_factor**2 * self.covariance)
+            settings, leaves = {}, [Scenario(checked(table, None), values)]
+        covariance = self.covariance[np.ix_(of_leaf, of_leaf)]
+        return predicted(leaves, settings, names, values, self.coverage_factor**2 * covariance)
 
     def plot(self, ax: Any = None, *, show: str | None = None, against: str | None = None) -> Any:
         """Draw the measurements over the number that was varied with matplotlib, with their standard deviations, and the

@@ -29,6 +29,7 @@ def fit(
     candidates: Measured | None = None,
     columns: Mapping[str, str] | None = None,
     every: int = 1,
+    rows: str | Iterable[str] = (),
     tolerance: float | None = None,
     progress: Progress = None,
 ) -> Fit:
@@ -49,7 +50,8 @@ def fit(
         not a number, is what was not measured.
     free
         Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
-        dict of a pair ``(low, high)``, or none, for each key.
+        dict of a pair ``(low, high)``, or none, for each key. ``"offset:COLUMN"`` is what is added to a column of
+        experiments, as for slack: ``"offset:tip.position[0]"``.
     robust
         Whether data far off the others count less.
     candidates
@@ -60,6 +62,9 @@ def fit(
         such a table are left out.
     every
         The first row of each table of data is read, and then every so many.
+    rows
+        Conditions that rows meet, as ``"load.tip_force[0]>0.5"``, also with <, >=, <=, =; several in a list, or joined
+        by " and ".
 
     Returns
     -------
@@ -106,11 +111,12 @@ def fit(
     if isinstance(every, bool) or not isinstance(every, Integral) or not 1 <= every < 2**63:
         raise ValueError(f"every = {every!r}: must be a whole number from 1")
     keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
+    chosen = texts("rows", rows, "load.tip_force[0]>0.5") if rows else []
     leaf = checked(scenario, set)
     tables = measurements(data, "data", leaf.units)
     others = None if candidates is None else measurements(candidates, "candidates", leaf.units)[0]
     with reporter(progress) as heard:
-        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), tolerance, heard))
+        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), chosen, tolerance, heard))
     for remark in found.remarks:
         warn(found.name, remark)
     if found.undetermined:

@@ -180,6 +180,7 @@ def fit(
     candidates: tuple[str, str] | str | PathLike[str] | None,
     columns: Sequence[str],
     every: int,
+    rows: Sequence[str],
     tolerance: float | None,
     progress: _Heard,
 ) -> Files: ...

@@ -3,6 +3,7 @@
 
 use super::data::Origin;
 use super::experiments::{Case, Observed};
+use super::free::{Coordinate, FreeNumber, OffsetColumn};
 use super::quantity::{Kind, Quantity};
 use super::responses::Responses;
 use super::vein::Vein;
@@ -31,6 +32,16 @@ pub(super) struct Component {
     /// information on the position along it.
     pub free: bool,
     pub origin: Option<Origin>,
+}
+
+impl Component {
+    /// Whether a coordinate is the offset of its column.
+    pub fn has_offset(&self, free: &Coordinate) -> bool {
+        match (&free.number, self.what) {
+            (FreeNumber::Offset(OffsetColumn::Result(of)), Compared::Result(what)) => *of == what,
+            _ => false,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,6 +14,9 @@ const ITERATED: f64 = 10.0 * INSIGNIFICANT;
 /// Largest number of grids of a leaf.
 const MOST_GRIDS: usize = 2;
 
+/// Values, of those at which a leaf would have to jump, at which it is relaxed again.
+const FARTHEST_JUMPS: usize = 3;
+
 impl<'a> Model<'a> {
     /// The same model on a few coarse grids, and its leaves there, started from those of
     /// this one.
@@ -46,13 +49,14 @@ impl<'a> Model<'a> {
                 let Some(at) = known.at.coarsest(count) else {
                     break;
                 };
-                let found = CaseAt::new(&self.cases[case], at).map_err(lost)?;
+                let found = self.case_at(case, &accurate.theta, at).map_err(lost)?;
                 let mut both = found.components.iter().zip(&known.components);
                 if both.all(|(a, b)| (a.model - b.model).abs() < INSIGNIFICANT * sd(b)) {
                     return Ok(found);
                 }
             }
-            CaseAt::new(&self.cases[case], known.at.grids()).map_err(lost)
+            self.case_at(case, &accurate.theta, known.at.grids())
+                .map_err(lost)
         };
         let point = self.point(&accurate.theta, coarse)?;
         Ok((model, point))
@@ -61,16 +65,22 @@ impl<'a> Model<'a> {
     /// The leaves relaxed from their usual starts, beyond the values at which one of
     /// `before` would have to jump; or there, if another equilibrium exists. `None`
     /// if that does not reduce the residuals.
-    pub fn beyond(&self, theta: &[f64], before: &Point, weighting: Weighting) -> Option<Point> {
+    pub fn beyond(
+        &self,
+        jumps: &[Vec<f64>],
+        before: &Point,
+        weighting: Weighting,
+    ) -> Option<Point> {
         let residuals = weighting.residuals(before);
         let bound = weighting.bound(&residuals);
         let sum = weighting.sum(&residuals, bound);
-        [theta, before.theta.as_slice()]
-            .into_iter()
-            .find_map(|theta| {
-                let there = self.find(theta).ok()?;
-                let nearer = weighting.sum(&weighting.residuals(&there), bound) < sum;
-                nearer.then_some(there)
-            })
+        // The farthest are the steps that the data ask for; close to where a leaf buckles none is followed.
+        let far = jumps.iter().take(FARTHEST_JUMPS);
+        let near = jumps.iter().skip(FARTHEST_JUMPS).next_back();
+        far.chain(near).chain([&before.theta]).find_map(|theta| {
+            let there = self.find(theta).ok()?;
+            let nearer = weighting.sum(&weighting.residuals(&there), bound) < sum;
+            nearer.then_some(there)
+        })
     }
 }

@@ -103,6 +103,98 @@ impl FromStr for MeasuredColumn {
     }
 }
 
+/// How the number in a column compares with a given one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comparison {
+    /// `<`
+    Less,
+    /// `<=`
+    AtMost,
+    /// `>`
+    Greater,
+    /// `>=`
+    AtLeast,
+    /// `=`
+    Equal,
+}
+
+/// Longer signs come before those that they begin with.
+const COMPARISONS: [(&str, Comparison); 5] = [
+    ("<=", Comparison::AtMost),
+    (">=", Comparison::AtLeast),
+    ("<", Comparison::Less),
+    (">", Comparison::Greater),
+    ("=", Comparison::Equal),
+];
+
+/// A condition on the rows of a table: `COLUMN>VALUE`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowCondition {
+    /// The column by its name here: a key, a result, or another column of the data.
+    pub column: String,
+    /// How its number compares with the value.
+    pub comparison: Comparison,
+    /// The value, in the units of the scenario.
+    pub value: f64,
+}
+
+impl RowCondition {
+    /// Whether a row with this number is read.
+    pub(super) fn admits(&self, number: f64) -> bool {
+        match self.comparison {
+            Comparison::Less => number < self.value,
+            Comparison::AtMost => number <= self.value,
+            Comparison::Greater => number > self.value,
+            Comparison::AtLeast => number >= self.value,
+            Comparison::Equal => number == self.value,
+        }
+    }
+}
+
+/// Conditions on rows, all of which are met: `COLUMN>VALUE`, joined by `and`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowChoice {
+    /// The conditions.
+    pub conditions: Vec<RowCondition>,
+}
+
+impl FromStr for RowChoice {
+    type Err = FitError;
+
+    fn from_str(text: &str) -> Result<Self, FitError> {
+        let refuse = |why: String| FitError::Data(format!("rows {text}: {why}"));
+        let condition = |text: &str| {
+            let found = COMPARISONS.iter().filter_map(|(sign, comparison)| {
+                let at = text.find(sign)?;
+                Some((at, *sign, *comparison))
+            });
+            // The first sign; of two at one place the longer one, which comes first.
+            let (at, sign, comparison) = found.min_by_key(|(at, ..)| *at).ok_or_else(|| {
+                refuse("write COLUMN>VALUE, or <, >=, <=, =, as in load.tip_force[0]>0.5".into())
+            })?;
+            let column = text[..at].trim();
+            let value = text[at + sign.len()..].trim();
+            let number = value.parse().ok().filter(|number: &f64| number.is_finite());
+            let value = number.ok_or_else(|| refuse(format!("{value} is not a finite number")))?;
+            if !is_known(column) || column == NAME {
+                return Err(refuse(format!(
+                    "{column} is no column of numbers: keys of the scenario, results ({}) and columns of points \
+                     on veins are",
+                    Quantity::ALL
+                )));
+            }
+            Ok(RowCondition {
+                column: column.into(),
+                comparison,
+                value,
+            })
+        };
+        let conditions = text.split(" and ").map(condition);
+        let conditions = conditions.collect::<Result<_, _>>()?;
+        Ok(RowChoice { conditions })
+    }
+}
+
 /// How files of data are read.
 #[derive(Clone, Debug)]
 pub struct Reading {
@@ -110,6 +202,8 @@ pub struct Reading {
     pub columns: Vec<MeasuredColumn>,
     /// The first row is read, and then each that is so many further.
     pub every: NonZeroUsize,
+    /// Conditions that rows meet, in tables with their columns.
+    pub rows: Vec<RowChoice>,
 }
 
 impl Default for Reading {
@@ -117,6 +211,7 @@ impl Default for Reading {
         Reading {
             columns: Vec::new(),
             every: NonZeroUsize::MIN,
+            rows: Vec::new(),
         }
     }
 }

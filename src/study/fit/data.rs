@@ -89,6 +89,8 @@ pub struct DataFile {
     pub left_out: Vec<String>,
     /// Names of its columns.
     pub names: Vec<String>,
+    /// What the columns that are used are: keys, results, and others of the data.
+    pub quantities: Vec<String>,
 }
 
 /// All data.
@@ -124,6 +126,7 @@ impl Data {
             taken: table.taken.clone(),
             left_out: table.left_out.clone(),
             names: table.names.clone(),
+            quantities: table.header.clone(),
         });
         // A table of points has at least two of these, or one and sigma.
         let mut names = COORDINATES.iter().chain(&["rod"]);
@@ -148,6 +151,24 @@ impl Data {
                 return Err(FitError::Data(format!(
                     "no file of data has a column {}: {}",
                     column.name,
+                    files.collect::<Vec<_>>().join("; ")
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that every column on which rows are chosen is in one of the files.
+    pub(super) fn check_choices(&self) -> Result<(), FitError> {
+        let choices = self.reading.rows.iter().flat_map(|it| &it.conditions);
+        for condition in choices {
+            let column = &condition.column;
+            if !(self.files.iter()).any(|file| file.quantities.contains(column)) {
+                let files = self.files.iter();
+                let files =
+                    files.map(|file| format!("{} has {}", file.file, file.quantities.join(", ")));
+                return Err(FitError::Data(format!(
+                    "rows are chosen by {column}, which is a column of no file of data: {}",
                     files.collect::<Vec<_>>().join("; ")
                 )));
             }

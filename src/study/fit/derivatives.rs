@@ -11,6 +11,7 @@ use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Parameter};
 use crate::scenario::PhotoRate;
+use crate::study::Keys;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
@@ -26,6 +27,28 @@ impl Model<'_> {
         cases.map(each).collect()
     }
 
+    /// A number that changes nothing in a leaf.
+    fn without_effect<'v>(&'v self, values: &'v [(&'v Keys, f64)]) -> Parameter<'v> {
+        Parameter {
+            make: Box::new(move |_| Some(self.base.at(values).ok()?.scenario)),
+            value: 0.0,
+            unit: 1.0,
+            linear: true,
+        }
+    }
+
+    /// Adds the derivatives of predictions with respect to the offsets of their columns.
+    fn add_offsets(&self, found: &mut CaseAt, slopes: &[f64]) {
+        let rows = found.gradients.iter_mut().zip(&found.components);
+        for (row, component) in rows {
+            for (k, free) in self.coordinates.iter().enumerate() {
+                if component.has_offset(free) {
+                    row[k] -= slopes[k];
+                }
+            }
+        }
+    }
+
     /// The same for one leaf. Leaves that differ by loads only share their derivatives.
     fn differentiate_case<'s>(
         &'s self,
@@ -38,9 +61,11 @@ impl Model<'_> {
         }
         let of = &self.cases[case];
         let values = self.values(of, theta);
-        let first = values.len() - theta.len();
         let numbers: Vec<Parameter> = (self.coordinates.iter().enumerate())
-            .map(|(k, free)| self.base.parameter(&values, first + k, free.unit))
+            .map(|(k, free)| match self.place_of(of, k) {
+                Some(place) => self.base.parameter(&values, place, free.unit),
+                None => self.without_effect(&values),
+            })
             .collect();
         let changes = || -> Option<Vec<Change>> { numbers.iter().map(Parameter::rate).collect() };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
@@ -65,11 +90,13 @@ impl Model<'_> {
         let slopes: Vec<f64> = slopes.map(|(free, theta)| free.slope(*theta)).collect();
         if let Some(axes) = found.tip_axes(numbers.len()) {
             found.gradients = found.tip_rates(&responses, &axes, &slopes)?;
+            self.add_offsets(found, &slopes);
             found.responses = Some(responses);
             return Ok(());
         }
         responses.solve_each(&found.at.levels)?;
         found.gradients = found.rates(&responses, (&numbers, changes, rates), &slopes);
+        self.add_offsets(found, &slopes);
         found.responses = Some(responses);
         Ok(())
     }

@@ -6,6 +6,7 @@ use super::contradiction::{BEYOND, contradicts, misses};
 use super::data::Experiment;
 use super::directions::sparse;
 use super::experiments::Observed;
+use super::lack_of_fit;
 use super::least_squares::End;
 use super::model::Model;
 use super::quantity::Kind;
@@ -23,7 +24,7 @@ const NEGLIGIBLE: f64 = 0.1;
 pub(super) fn fit(
     stats: &Statistics,
     end: &End,
-    parameters: Vec<FitParameter>,
+    mut parameters: Vec<FitParameter>,
     work: FitWork,
     wanted: &[Experiment],
 ) -> Fit {
@@ -36,8 +37,20 @@ pub(super) fn fit(
         // Away from a minimum, the data may be insensitive to other combinations.
         _ => Vec::new(),
     };
+    let systematic = match end {
+        End::Converged => lack_of_fit::systematic(stats),
+        _ => None,
+    };
+    let mut says = words::sentences(&parameters, &open, coordinates);
+    if let Some(found) = &systematic {
+        lack_of_fit::widen(stats, &mut parameters, found.widened);
+        // None of them is determined any more.
+        says = words::sentences(&parameters, &open, coordinates);
+        says.insert(0, lack_of_fit::sentence(stats, found));
+    }
     let outcome = match end {
         End::Converged if contradicted => FitOutcome::Contradicted,
+        End::Converged if systematic.is_some() => FitOutcome::Systematic,
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
         }
@@ -52,7 +65,7 @@ pub(super) fn fit(
         }
     };
     let values: Vec<(&Keys, f64)> = (coordinates.iter().zip(&stats.point.theta))
-        .map(|(free, theta)| (&free.keys, free.value(*theta)))
+        .filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))))
         .collect();
     Fit {
         scenario: base.scenario().name.clone(),
@@ -65,7 +78,8 @@ pub(super) fn fit(
             .collect(),
         alternatives: Vec::new(),
         tried: Vec::new(),
-        says: words::sentences(&parameters, &open, coordinates),
+        systematic,
+        says,
         parameters,
         chi_squared: match stats.known {
             true => stats.residuals.norm_squared(),
@@ -108,10 +122,10 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
     }
     for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
         if let Some(bound) = free.at_bound(*theta) {
-            let (keys, bound) = (&free.keys, free.value(bound));
+            let (number, bound) = (&free.number, free.value(bound));
             remarks.push(match free.bounded {
-                true => format!("{keys} is at its bound {bound}"),
-                false => format!("{keys} went as far as {bound:.3e}, and was let no farther"),
+                true => format!("{number} is at its bound {bound}"),
+                false => format!("{number} went as far as {bound:.3e}, and was let no farther"),
             });
         }
     }

@@ -41,7 +41,7 @@ fn unknown(stats: &Statistics, k: usize) -> FitParameter {
     let given = |bound: f64| free.bounded.then(|| free.value(bound));
     let [low, high] = free.bounds.map(given);
     FitParameter {
-        key: free.keys.to_string(),
+        key: free.number.to_string(),
         value: free.value(stats.point.theta[k]),
         low,
         high,

@@ -171,8 +171,8 @@ pub(super) struct Iteration<'m, 'a> {
     pub lean: bool,
     /// A minimum besides which another one is searched that fits as well.
     pub besides: Option<Besides<'m>>,
-    /// The nearest values tried at which a leaf would have had to jump.
-    pub jump: Option<Vec<f64>>,
+    /// The values tried from the last point at which a leaf would have had to jump, the farthest first.
+    pub jumps: Vec<Vec<f64>>,
     /// Called with the number of the step and the sum.
     pub progress: &'m mut dyn FnMut(usize, f64),
 }
@@ -191,7 +191,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             enough: GAIN,
             lean: false,
             besides: None,
-            jump: None,
+            jumps: Vec::new(),
             progress,
         }
     }
@@ -220,6 +220,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             if besides.is_some_and(|it| it.is_hopeless(sum - open, sum, &longest)) {
                 return (point, End::Stuck(None), evaluations);
             }
+            self.jumps.clear();
             let nearly = open < ACCURACY * variance;
             let mut lost = None;
             loop {
@@ -263,7 +264,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
                     }
                     Err(why) => {
                         if why == Lost::Elsewhere {
-                            self.jump = Some(theta);
+                            self.jumps.push(theta);
                         }
                         lost = Some(why);
                     }

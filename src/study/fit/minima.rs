@@ -61,6 +61,21 @@ impl Beginning {
             Err(FitError::NoEquilibrium(why)) => (None, Some(why)),
             Err(other) => return Err(other),
         };
+        let mut taken = 0;
+        if let Some(point) = &initial {
+            // One search from there costs less than a look at other decades.
+            let (found, evaluations) = descend(model, weighting, &point.theta, (None, FEW_STEPS));
+            taken = evaluations;
+            let there = found.and_then(|found| loose.find(&found.theta).ok());
+            if let Some(there) = there.filter(|there| misfit(model, there) <= COARSE) {
+                return Ok(Beginning {
+                    point: there,
+                    initial: None,
+                    remark: None,
+                    evaluations: taken,
+                });
+            }
+        }
         let scout = Scout::new(model, weighting);
         let least = match &initial {
             Some(point) => sum(weighting, point),
@@ -77,7 +92,7 @@ impl Beginning {
         let better = better
             .take(MOST_STARTS)
             .find_map(|found| loose.find(&found.theta).ok());
-        let evaluations = scout.evaluations();
+        let evaluations = taken + scout.evaluations();
         match (better, initial, refused) {
             (Some(point), initial, refused) => {
                 let values = model.in_words(&point.theta);
@@ -108,6 +123,32 @@ impl Beginning {
             (None, None, refused) => Err(FitError::NoEquilibrium(refused.unwrap_or_default())),
         }
     }
+}
+
+/// The minimum near some values, on coarse grids, and how often the leaves were relaxed.
+fn descend(
+    model: &Model,
+    weighting: Weighting,
+    theta: &[f64],
+    (besides, most_steps): (Option<Besides>, usize),
+) -> (Option<Start>, usize) {
+    let first = model.with_loose_tolerance(weighting.assumed);
+    let Ok(first) = first.find_within(theta, MOST_STEPS) else {
+        return (None, 1);
+    };
+    let Ok((coarse, point)) = model.coarse(&first, weighting) else {
+        return (None, 1);
+    };
+    let mut quietly = |_, _| {};
+    let mut iteration = Iteration::new(&coarse, weighting, &mut quietly);
+    iteration.most_steps = most_steps;
+    iteration.besides = besides;
+    let (point, end, more) = iteration.run(point);
+    let found = (end == End::Converged).then(|| Start {
+        sum: sum(weighting, &point),
+        theta: point.theta,
+    });
+    (found, 1 + more)
 }
 
 /// Other minima, and what was tried to find them.
@@ -336,19 +377,10 @@ impl<'a> Minima<'_, 'a> {
 
     /// The minimum near some values, on coarse grids.
     fn descend(&self, theta: &[f64], besides: Option<Besides>, most_steps: usize) -> Option<Start> {
-        self.count(1);
-        let first = self.loose().find_within(theta, MOST_STEPS).ok()?;
-        let (coarse, point) = self.model.coarse(&first, self.weighting).ok()?;
-        let mut quietly = |_, _| {};
-        let mut iteration = Iteration::new(&coarse, self.weighting, &mut quietly);
-        iteration.most_steps = most_steps;
-        iteration.besides = besides;
-        let (point, end, more) = iteration.run(point);
-        self.count(more);
-        (end == End::Converged).then(|| Start {
-            sum: sum(self.weighting, &point),
-            theta: point.theta,
-        })
+        let (found, evaluations) =
+            descend(self.model, self.weighting, theta, (besides, most_steps));
+        self.count(evaluations);
+        found
     }
 
     /// Adds another minimum to a fit, if a number that is determined has a value there beyond its

@@ -18,6 +18,7 @@ mod experiments;
 mod found;
 mod free;
 mod interval;
+mod lack_of_fit;
 mod least_squares;
 mod minima;
 mod model;
@@ -34,13 +35,13 @@ mod vein;
 mod view;
 mod words;
 
-pub use columns::{MeasuredColumn, Reading};
+pub use columns::{Comparison, MeasuredColumn, Reading, RowChoice, RowCondition};
 pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
-pub use free::Free;
+pub use free::{Free, FreeNumber, OffsetColumn};
 pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{
     Fit, FitAlternative, FitCandidate, FitExperiment, FitLeaf, FitOutcome, FitParameter,
-    FitResidual, FitStep, FitWork,
+    FitResidual, FitStep, FitSystematic, FitWork,
 };
 
 use crate::clock::Instant;
@@ -121,6 +122,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     }
     without_wind(base.scenario(), "a fit")?;
     request.data.check_columns()?;
+    request.data.check_choices()?;
     let coordinates = coordinates(request)?;
     let options = Options {
         tolerance: request.tolerance,
@@ -168,16 +170,18 @@ fn comments(files: &[DataFile]) -> Option<String> {
 fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     let base = &request.base;
     let free = expanded(request)?;
-    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
+    let coordinates = free
+        .iter()
+        .map(|free| Coordinate::new(base, &request.data, free));
     let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
     for (k, one) in coordinates.iter().enumerate() {
         if coordinates[..k]
             .iter()
-            .any(|other| other.keys.overlaps(&one.keys))
+            .any(|other| other.number.overlaps(&one.number))
         {
-            let keys = &one.keys;
+            let number = &one.number;
             return Err(FitError::Free(format!(
-                "{keys}: is free twice: leave one out"
+                "{number}: is free twice: leave one out"
             )));
         }
     }
@@ -210,9 +214,15 @@ fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
 fn expanded(request: &FitRequest) -> Result<Vec<Free>, FitError> {
     let mut all = Vec::new();
     for free in &request.free {
-        let entries = request.base.entries_of(&free.keys);
-        all.extend(entries.into_iter().map(|keys| Free {
-            keys,
+        let entries = match &free.number {
+            FreeNumber::Entry(keys) => {
+                let entries = request.base.entries_of(keys);
+                entries.into_iter().map(FreeNumber::Entry).collect()
+            }
+            offset @ FreeNumber::Offset(_) => vec![offset.clone()],
+        };
+        all.extend(entries.into_iter().map(|number| Free {
+            number,
             bounds: free.bounds,
         }));
     }

@@ -10,7 +10,7 @@ use super::FitError;
 use super::case::{CaseAt, Component};
 use super::data::{Data, Measured, Origin, Traced};
 use super::experiments::{self, Case};
-use super::free::Coordinate;
+use super::free::{Coordinate, FreeNumber};
 use super::quantity::{Kind, Quantity};
 use super::words::digits;
 use crate::newton::Work;
@@ -72,9 +72,11 @@ const APART: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
 /// Whether the derivatives of a scenario with respect to these are constant.
 fn is_linear(coordinates: &[Coordinate]) -> bool {
     coordinates.iter().all(|free| {
-        let mut keys = free.keys.targets().iter().filter_map(|target| target.key());
-        let apart = keys.all(|key| APART.iter().any(|table| key.path().starts_with(table)));
-        apart && free.keys.is_linear()
+        free.number.keys().is_some_and(|keys| {
+            let mut all = keys.targets().iter().filter_map(|target| target.key());
+            let apart = all.all(|key| APART.iter().any(|table| key.path().starts_with(table)));
+            apart && keys.is_linear()
+        })
     })
 }
 
@@ -133,8 +135,10 @@ impl<'a> Model<'a> {
                 );
                 return Err(FitError::Data(why));
             }
-            let both =
-                |(keys, _): &&(Keys, f64)| coordinates.iter().any(|free| free.keys.overlaps(keys));
+            let both = |(keys, _): &&(Keys, f64)| {
+                let mut free = coordinates.iter().filter_map(|free| free.number.keys());
+                free.any(|free| free.overlaps(keys))
+            };
             if let Some((keys, _)) = case.settings().iter().find(both) {
                 let place = case.place();
                 let why = format!("{place}{keys} is set by the experiment, and free");
@@ -152,12 +156,50 @@ impl<'a> Model<'a> {
         })
     }
 
+    /// The numbers of the scenario in an experiment: its settings with their offsets, and then the free
+    /// ones.
     pub(super) fn values<'s>(&'s self, case: &'s Case, theta: &[f64]) -> Vec<(&'s Keys, f64)> {
-        let settings = case.settings().iter().map(|(keys, value)| (keys, *value));
-        let free = self.coordinates.iter().zip(theta);
-        settings
-            .chain(free.map(|(free, theta)| (&free.keys, free.value(*theta))))
-            .collect()
+        let free = || self.coordinates.iter().zip(theta);
+        let settings = case.settings().iter().map(|(keys, value)| {
+            let offsets = free().filter(|(free, _)| free.number.is_offset_of(keys));
+            let offset: f64 = offsets.map(|(free, theta)| free.value(*theta)).sum();
+            (keys, value + offset)
+        });
+        let entries =
+            free().filter_map(|(free, theta)| Some((free.number.keys()?, free.value(*theta))));
+        settings.chain(entries).collect()
+    }
+
+    /// Where the number that a coordinate changes stands among [`Model::values`]; none if it changes
+    /// nothing in this experiment's leaf.
+    pub(super) fn place_of(&self, case: &Case, k: usize) -> Option<usize> {
+        match &self.coordinates[k].number {
+            FreeNumber::Entry(_) => {
+                let before = self.coordinates[..k].iter();
+                let before = before.filter(|free| free.number.keys().is_some());
+                Some(case.settings().len() + before.count())
+            }
+            offset @ FreeNumber::Offset(_) => {
+                let mut settings = case.settings().iter();
+                settings.position(|(keys, _)| offset.is_offset_of(keys))
+            }
+        }
+    }
+
+    /// Predictions of a leaf at rest for the data of an experiment, less the offsets of their columns.
+    pub(super) fn case_at(
+        &self,
+        case: usize,
+        theta: &[f64],
+        at: NestedEquilibrium,
+    ) -> Result<CaseAt, Lost> {
+        let mut found = CaseAt::new(&self.cases[case], at)?;
+        for (free, theta) in self.coordinates.iter().zip(theta) {
+            let offset = free.value(*theta);
+            let own = found.components.iter_mut().filter(|it| it.has_offset(free));
+            own.for_each(|component| component.model -= offset);
+        }
+        Ok(found)
     }
 
     /// The scenario of an experiment.
@@ -173,7 +215,7 @@ impl<'a> Model<'a> {
         let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = NestedEquilibrium::find(&scenario, &self.options)?;
-            let found = found.and_then(|at| CaseAt::new(&self.cases[case], at));
+            let found = found.and_then(|at| self.case_at(case, theta, at));
             found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
         };
         self.point(theta, find)
@@ -184,7 +226,7 @@ impl<'a> Model<'a> {
         let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = NestedEquilibrium::find_within(&scenario, &self.options, most_steps)?;
-            let found = found.and_then(|at| CaseAt::new(&self.cases[case], at));
+            let found = found.and_then(|at| self.case_at(case, theta, at));
             found.map_err(|lost| self.no_equilibrium(theta, case, &lost))
         };
         self.point(theta, find)
@@ -224,7 +266,7 @@ impl<'a> Model<'a> {
     /// The number that each coordinate stands for.
     pub fn numbers(&self, theta: &[f64]) -> Vec<(String, f64)> {
         let both = self.coordinates.iter().zip(theta);
-        both.map(|(free, theta)| (free.keys.to_string(), free.value(*theta)))
+        both.map(|(free, theta)| (free.number.to_string(), free.value(*theta)))
             .collect()
     }
 
@@ -252,7 +294,7 @@ impl<'a> Model<'a> {
             let how = (&self.options, grids);
             let answer = from.answer(&from.at.levels, &steps)?;
             let at = from.at.follow(scenario, &answer, how)?;
-            CaseAt::new(&self.cases[case], at)
+            self.case_at(case, theta, at)
         };
         self.point(theta, follow)
     }

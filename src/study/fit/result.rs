@@ -18,6 +18,8 @@ words! {
         NotConverged = "not-converged",
         /// At a minimum, but some number or combination of numbers is not determined.
         Undetermined = "undetermined",
+        /// At a minimum, but the residuals are systematic there: the model lacks something.
+        Systematic = "systematic",
         /// At a minimum, but the data contradict the model there.
         Contradicted = "contradicted",
     }
@@ -45,6 +47,17 @@ pub struct FitParameter {
     /// there is not known.
     #[serde(skip)]
     pub lost: [Option<f64>; 2],
+}
+
+/// Residuals that are smooth along series of data, not scattered.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitSystematic {
+    /// The probability that independent errors are as smooth.
+    pub p_value: f64,
+    /// The columns whose residuals are.
+    pub along: Vec<String>,
+    /// By how much intervals are longer than those of independent errors.
+    pub widened: f64,
 }
 
 /// An experiment with data.
@@ -154,6 +167,9 @@ pub struct Fit {
     /// Which other values were tried to find out whether they fit as well, if any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tried: Vec<String>,
+    /// The systematic part of the residuals, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic: Option<FitSystematic>,
     /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.

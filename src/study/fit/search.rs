@@ -107,11 +107,10 @@ impl<'m, 'a> Search<'m, 'a> {
             let (mut least, end, more) = last.run(there);
             work.evaluations += 1 + more;
             work.accurate += 1 + more;
-            let beyond = last
-                .jump
-                .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
-            if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
-                && let Some(there) = model.beyond(&theta, &least, weighting)
+            let is_lost = end == End::Stuck(Some(Lost::Elsewhere));
+            if is_lost
+                && jumps < MOST_JUMPS
+                && let Some(there) = model.beyond(&last.jumps, &least, weighting)
             {
                 jumps += 1;
                 attempts -= 1;

@@ -88,7 +88,9 @@ impl<'a> Scout<'a> {
     /// after the other. By ascending sums of squares; `least` is the one there.
     pub fn in_decades(&self, from: &[f64], least: f64) -> Vec<Start> {
         let free = self.model.coordinates;
-        let positive: Vec<usize> = (0..free.len()).filter(|&k| free[k].log).collect();
+        let positive: Vec<usize> = (0..free.len())
+            .filter(|&k| free[k].is_searched_in_decades())
+            .collect();
         let mut found = self.both_ways((from, least), &positive);
         if positive.len() > 1 && positive.len() <= FEW {
             for &k in &positive {
@@ -188,7 +190,7 @@ impl<'a> Scout<'a> {
 /// Values that may fit as well as given ones, and what they are: of exchanged directions of a section,
 /// of reversed lists of veins, and of the other sign.
 pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
-    let keys = model.coordinates.iter().map(|free| free.keys.to_string());
+    let keys = model.coordinates.iter().map(|free| free.number.to_string());
     let keys: Vec<String> = keys.collect();
     let place = |key: &str| keys.iter().position(|other| other == key);
     let permuted = |other: &dyn Fn(usize) -> Option<usize>| -> Vec<f64> {
@@ -215,7 +217,11 @@ pub(super) fn images(model: &Model, of: &[f64]) -> Vec<(Vec<f64>, String)> {
             "the veins in reversed order".to_string(),
         ),
     ];
-    let signed = (0..of.len()).filter(|&k| !model.coordinates[k].log);
+    let can_be_mirrored = |k: &usize| {
+        let free = &model.coordinates[*k];
+        !free.log && free.number.keys().is_some()
+    };
+    let signed = (0..of.len()).filter(can_be_mirrored);
     let signed: Vec<usize> = signed.collect();
     for &k in signed.iter().filter(|_| signed.len() <= FEW) {
         let mut theta = of.to_vec();

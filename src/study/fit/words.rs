@@ -16,7 +16,8 @@ pub(super) struct Undetermined {
 
 /// The combination in the form of the result.
 pub(super) fn map(open: &Undetermined, free: &[Coordinate]) -> BTreeMap<String, f64> {
-    let part = |&(k, part): &(usize, f64)| (free[k].keys.to_string(), rounded(part * free[k].unit));
+    let part =
+        |&(k, part): &(usize, f64)| (free[k].number.to_string(), rounded(part * free[k].unit));
     open.parts.iter().map(part).collect()
 }
 
@@ -149,7 +150,7 @@ mod tests {
     /// What is said of a combination of logarithms.
     fn said(parts: &[(&str, f64)]) -> String {
         let coordinate = |(key, _): &(&str, f64)| Coordinate {
-            keys: key.parse().unwrap(),
+            number: key.parse().unwrap(),
             log: true,
             unit: 1.0,
             bounds: [f64::NEG_INFINITY, f64::INFINITY],

@@ -8,7 +8,7 @@ mod units;
 pub(super) use decoded::refuse;
 
 use super::FitError;
-use super::columns::{NAME, Reading, is_known};
+use super::columns::{NAME, Reading, RowChoice, is_known};
 use decimals::{Decimals, Mark, is_number};
 use decoded::decode;
 use lines::{Line, Lines};
@@ -143,6 +143,9 @@ impl<'t> Table<'t> {
             .step_by(every)
             .collect();
         table.taken = table.notation(lines.separator, decoded.encoding);
+        let before = table.rows.len();
+        table.choose_rows(&reading.rows)?;
+        let not_chosen = before - table.rows.len();
         if every > 1 {
             let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
             let thinned = format!("rows 1, {second}, {third} and so on of {all}");
@@ -158,6 +161,11 @@ impl<'t> Table<'t> {
             counted(above, "line before the header", "lines before the header"),
             units.map(|units| format!("a row of units ({units}; nothing is converted)")),
             counted(blank, "blank row", "blank rows"),
+            counted(
+                not_chosen,
+                "row that was not chosen",
+                "rows that were not chosen",
+            ),
         ]
         .into_iter()
         .flatten()
@@ -258,6 +266,19 @@ impl<'t> Table<'t> {
         };
         // With names given for columns of a file, others that mean nothing here are not meant.
         let some_given = self.names.iter().any(|name| !maps_of(name).is_empty());
+        let means_nothing = |name: &&String| !name.is_empty() && !is_known(name);
+        if !some_given
+            && !reading.columns.is_empty()
+            && self.names.iter().any(|name| means_nothing(&name))
+        {
+            let given = reading.columns.iter().map(|map| map.name.as_str());
+            let given = given.collect::<Vec<_>>().join(", ");
+            let why = format!(
+                "has none of the columns that were said to be quantities ({given}): its columns are {}",
+                self.names.join(", ")
+            );
+            return Err(refuse(self.file, self.header_line, why));
+        }
         for (at, name) in self.names.iter().enumerate() {
             let maps = maps_of(name);
             if name.is_empty() {
@@ -310,6 +331,29 @@ impl<'t> Table<'t> {
         };
         let unused = (!unused.is_empty()).then(|| format!("the {columns} {}", unused.join(", ")));
         Ok(unnamed.into_iter().chain(unused).collect())
+    }
+
+    /// Leaves out rows that do not meet a condition on a column of this table.
+    fn choose_rows(&mut self, choices: &[RowChoice]) -> Result<(), FitError> {
+        let mut kept = vec![true; self.rows.len()];
+        let mut chosen = false;
+        for condition in choices.iter().flat_map(|choice| &choice.conditions) {
+            let Some(column) = self.column(&condition.column) else {
+                continue;
+            };
+            chosen = true;
+            for (row, kept) in kept.iter_mut().enumerate() {
+                let value = self.number(row, column)?;
+                *kept &= value.is_some_and(|value| condition.admits(value));
+            }
+        }
+        let mut kept = kept.into_iter();
+        self.rows.retain(|_| kept.next().unwrap_or(true));
+        if chosen && self.rows.is_empty() {
+            let why = "has no row that meets the conditions on rows: choose others".to_string();
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        Ok(())
     }
 
     fn check_rows(&self) -> Result<(), FitError> {

@@ -1,0 +1,288 @@
+//! Whether residuals are systematic: smooth along a column of the data, or along a vein, in place of
+//! scattered, as where a machine has slack or the shape at rest is another.
+//!
+//! Residuals are tested for lack of fit against the first cosines along each series of data, less
+//! what the free numbers could explain of them: the sum of squares along these over that of all other
+//! residuals has Fisher's distribution if errors are independent and normal (Neill and Johnson 1984, Testing
+//! for lack of fit in regression, a review). All series together have one level.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use super::case::Compared;
+use super::free::FreeNumber;
+use super::result::{FitParameter, FitSystematic};
+use super::statistics::Statistics;
+
+/// The level of the test: so often residuals of a true model are called systematic.
+const LEVEL: f64 = 0.02;
+
+/// Where deviations are given, the p-value below which residuals are smooth beside the others.
+const SMOOTH: f64 = 0.05;
+
+/// Below this p-value the rest of the residuals is too large for the standard deviations that are given, and
+/// takes their place.
+const TOO_LARGE: f64 = 0.01;
+
+/// The least standard deviation of data, in assumed ones: below it errors of the equilibria decide.
+const LEAST_DEVIATION: f64 = 1e-2;
+
+/// Of a cosine at least this part is not explained by free numbers and the cosines before it.
+const INDEPENDENT: f64 = 0.1;
+
+/// Largest number of cosines of all series.
+const MOST: usize = 48;
+
+/// The number of cosines of a series of so many data.
+fn cosines(data: usize) -> usize {
+    match data {
+        0..=3 => 0,
+        4..=5 => 1,
+        6..=7 => 2,
+        8..=11 => 3,
+        12..=19 => 4,
+        _ => 5,
+    }
+}
+
+/// The systematic part of the residuals of a minimum, if there is one that is significant.
+pub(super) fn systematic(stats: &Statistics) -> Option<FitSystematic> {
+    let series = series(stats);
+    let roots = stats.weighting.roots(&stats.residuals);
+    let residuals = stats.residuals.component_mul(&roots);
+    let mut basis: Vec<DVector<f64>> = (stats.insensitive..stats.values.len())
+        .map(|k| (&stats.jacobian * stats.directions.column(k)) / stats.values[k])
+        .collect();
+    let explained = basis.len();
+    let most = MOST.min(stats.freedom / 2);
+    // By ascending frequency, so that a limit leaves out the highest.
+    let mut energies = vec![0.0; series.len()];
+    for frequency in 0..cosines(usize::MAX) {
+        for (energy, (_, places)) in energies.iter_mut().zip(&series) {
+            if frequency >= cosines(places.len()) || basis.len() - explained >= most {
+                continue;
+            }
+            let mut wave = DVector::zeros(residuals.len());
+            let step = std::f64::consts::PI * frequency as f64 / places.len() as f64;
+            for (k, place) in places.iter().enumerate() {
+                wave[*place] = (step * (k as f64 + 0.5)).cos();
+            }
+            wave /= wave.norm();
+            // Twice is enough (Giraud et al. 2005).
+            for _ in 0..2 {
+                for known in &basis {
+                    let part = known.dot(&wave);
+                    wave.axpy(-part, known, 1.0);
+                }
+            }
+            let left = wave.norm();
+            if left > INDEPENDENT {
+                wave /= left;
+                *energy += wave.dot(&residuals).powi(2);
+                basis.push(wave);
+            }
+        }
+    }
+    let count = basis.len() - explained;
+    let rest = stats.freedom.checked_sub(count).filter(|rest| *rest > 0)?;
+    if count == 0 {
+        return None;
+    }
+    let smooth: f64 = energies.iter().sum();
+    let scattered = (residuals.norm_squared() - smooth).max(0.0) / rest as f64;
+    let is_as_given = stats.known && tail(scattered, rest, None) > TOO_LARGE;
+    // Deviations that are given too small make all residuals too large, and none of them smooth.
+    let among_residuals = tail(smooth / count as f64 / scattered, count, Some(rest));
+    let p_value = match is_as_given {
+        true if among_residuals > SMOOTH => return None,
+        true => tail(smooth / count as f64, count, None),
+        false => {
+            let least = if stats.known {
+                1.0
+            } else {
+                LEAST_DEVIATION.powi(2)
+            };
+            let ratio = smooth / count as f64 / scattered.max(least);
+            tail(ratio, count, Some(rest))
+        }
+    };
+    if p_value >= LEVEL {
+        return None;
+    }
+    let mut along: Vec<String> = Vec::new();
+    let largest = energies
+        .iter()
+        .fold(0.0_f64, |most, energy| most.max(*energy));
+    let named = energies.iter().zip(&series);
+    for (_, (name, _)) in named.filter(|(energy, _)| **energy > 0.25 * largest) {
+        if !along.contains(name) {
+            along.push(name.clone());
+        }
+    }
+    Some(FitSystematic {
+        p_value,
+        along,
+        // As if all of it were one error.
+        widened: (smooth.sqrt() / stats.spread).max(1.0),
+    })
+}
+
+/// The data in series, by their places among all, each with a name: results in the order of the experiments
+/// and in that of their predictions, points of a vein from its base to its tip.
+fn series(stats: &Statistics) -> Vec<(String, Vec<usize>)> {
+    let components: Vec<_> = stats.point.components().collect();
+    let mut all: BTreeMap<(String, usize, usize), Vec<usize>> = BTreeMap::new();
+    for (place, component) in components.iter().enumerate() {
+        // Normal to a vein a point has one residual, along it none.
+        if component.free {
+            continue;
+        }
+        let column = component.what.column();
+        let key = match component.what {
+            Compared::Result(_) => (column, 0, 0),
+            Compared::Vein { rod, .. } => (column, component.experiment + 1, rod + 1),
+        };
+        all.entry(key).or_default().push(place);
+    }
+    let mut found = Vec::new();
+    for ((column, experiment, rod), mut places) in all {
+        if experiment > 0 {
+            let sigma = |place: &usize| match components[*place].what {
+                Compared::Vein { sigma, .. } => sigma,
+                Compared::Result(_) => 0.0,
+            };
+            places.sort_by(|a, b| sigma(a).total_cmp(&sigma(b)));
+            found.push((format!("{column} of vein {rod}"), places));
+            continue;
+        }
+        places.sort_by_key(|place| components[*place].experiment);
+        let mut by_size = places.clone();
+        by_size.sort_by(|a, b| components[*a].model.total_cmp(&components[*b].model));
+        let same = by_size == places || by_size.iter().rev().eq(&places);
+        found.push((column.clone(), places));
+        if !same {
+            found.push((column, by_size));
+        }
+    }
+    found
+}
+
+/// Widens the intervals of numbers, none of which is then determined.
+pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64) {
+    let all = parameters.iter_mut().zip(&stats.model.coordinates[..]);
+    for ((parameter, free), theta) in all.zip(&stats.point.theta) {
+        let [low, high] = free.bounds;
+        let end = |end: f64| {
+            let wider = theta + by * (free.of(end) - theta);
+            free.value(wider.clamp(low, high))
+        };
+        parameter.low = parameter.low.map(end);
+        parameter.high = parameter.high.map(end);
+        parameter.standard_error = parameter.standard_error.map(|error| by * error);
+        parameter.determined = false;
+    }
+}
+
+/// What the model may lack, in words.
+pub(super) fn sentence(stats: &Statistics, found: &FitSystematic) -> String {
+    let along = found.along.join(", ");
+    let cases = stats.model.cases.iter();
+    let mut settings = cases.flat_map(|case| case.settings());
+    // Where a holder was moved, it may have moved some way before it pulled.
+    let moved = settings.find(|(keys, _)| {
+        let name = keys.to_string();
+        let free = stats.model.coordinates.iter();
+        let mut free = free.map(|free| &free.number);
+        let is_free = free.any(|free: &FreeNumber| free.is_offset_of(keys));
+        (name.starts_with("tip.position") || name.contains(".move")) && !is_free
+    });
+    let slack = match moved {
+        Some((keys, _)) => format!("slack (offset:{keys} is not free)"),
+        None => "a zero that is off".into(),
+    };
+    format!(
+        "systematic: residuals of {along} are smooth, not scattered (by chance with p = {:.1e}): {slack}, rest \
+         shape, taper, direction of a load? Intervals are {:.1} times those of independent errors",
+        found.p_value, found.widened
+    )
+}
+
+/// The probability that a mean square with some degrees of freedom is at least `ratio` times that of others,
+/// or of their known expectation (Abramowitz and Stegun, 26.6.2 and 26.5.8).
+fn tail(ratio: f64, freedom: usize, of: Option<usize>) -> f64 {
+    /// So many degrees of freedom have no uncertainty.
+    const KNOWN: f64 = 1e6;
+    let [one, other] = [freedom as f64, of.map_or(KNOWN, |of| of as f64)];
+    if !ratio.is_finite() {
+        return if ratio > 0.0 { 0.0 } else { 1.0 };
+    }
+    let x = other / (other + one * ratio);
+    incomplete_beta(x, 1.0 - x, 0.5 * other, 0.5 * one)
+}
+
+/// The regularised incomplete beta function at `x`, of which `y` is the complement.
+fn incomplete_beta(x: f64, y: f64, a: f64, b: f64) -> f64 {
+    if x <= 0.0 || y <= 0.0 {
+        return if x <= 0.0 { 0.0 } else { 1.0 };
+    }
+    if x > (a + 1.0) / (a + b + 2.0) {
+        return 1.0 - incomplete_beta(y, x, b, a);
+    }
+    let log = log_gamma(a + b) - log_gamma(a) - log_gamma(b) + a * x.ln() + b * y.ln();
+    // The continued fraction by the method of Lentz.
+    let tiny = f64::MIN_POSITIVE.sqrt();
+    let clear = |value: f64| if value.abs() < tiny { tiny } else { value };
+    let (mut c, mut d) = (1.0, 1.0 / clear(1.0 - (a + b) * x / (a + 1.0)));
+    let mut fraction = d;
+    for step in 1..10_000 {
+        let m = f64::from(step);
+        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
+        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
+        let mut change = 1.0;
+        for term in [even, odd] {
+            d = 1.0 / clear(1.0 + term * d);
+            c = clear(1.0 + term / c);
+            change = c * d;
+            fraction *= change;
+        }
+        if (change - 1.0).abs() < 1e-12 {
+            break;
+        }
+    }
+    (log.exp() * fraction / a).clamp(0.0, 1.0)
+}
+
+/// The logarithm of the gamma function of a positive number (Stirling's series; Abramowitz and Stegun,
+/// 6.1.41).
+fn log_gamma(z: f64) -> f64 {
+    let (mut z, mut shift) = (z, 0.0);
+    while z < 10.0 {
+        shift -= z.ln();
+        z += 1.0;
+    }
+    let inverse = 1.0 / (z * z);
+    let series = 1.0 / 12.0 - inverse * (1.0 / 360.0 - inverse * (1.0 / 1260.0 - inverse / 1680.0));
+    shift + (z - 0.5) * z.ln() - z + 0.5 * std::f64::consts::TAU.ln() + series / z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles of tables of Fisher's distribution and of chi squared.
+    #[test]
+    fn tails_are_those_of_tables() {
+        for (ratio, freedom, of, wanted) in [
+            (6.5914, 3, Some(4), 0.05),
+            (2.7109, 5, Some(20), 0.05),
+            (12.06, 3, Some(5), 0.01),
+            (11.345 / 3.0, 3, None, 0.01),
+            (2.706, 1, None, 0.1),
+            (124.342 / 100.0, 100, None, 0.05),
+        ] {
+            let found = tail(ratio, freedom, of);
+            assert!((found / wanted - 1.0).abs() < 2e-2, "{ratio}: {found}");
+        }
+    }
+}
