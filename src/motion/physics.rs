@@ -127,7 +127,11 @@ impl Physics {
             false => of.at((0.5 * leaf.grid.weight(i) - sigma).abs()),
         };
         let here = |(vein, at, _): &&(usize, f64, f64)| *vein == j && leaf.grid.nearest(*at) == i;
-        let on_points = self.point_masses.iter().filter(here).map(|(_, _, mass)| mass);
+        let on_points = self
+            .point_masses
+            .iter()
+            .filter(here)
+            .map(|(_, _, mass)| mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
         Inertia {
             mass: length * around(&self.dynamics.density[j]) / self.density + on_points,

@@ -216,7 +216,9 @@ fn shoot(
             force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
             // Every rod has its part of the error.
             error: errors.map(|error| error.force * rods.len() as f64),
-            moments_error: errors.map(|error| error.moment).filter(|_| held.clamps.is_some()),
+            moments_error: errors
+                .map(|error| error.moment)
+                .filter(|_| held.clamps.is_some()),
             moments: (held.clamps.is_some())
                 .then(|| tips.iter().map(|node| -(node.rotation * node.m)).collect()),
         }),

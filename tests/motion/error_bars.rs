@@ -238,7 +238,7 @@ fn a_glass_fibre_tells_its_error() {
 
 #[test]
 fn bars_of_random_motions_cover_the_errors() {
-    let count = asked("LEAFDYN_MOTIONS", 8) as u64;
+    let count = asked("LEAFDYN_MOTIONS", 6) as u64;
     let first = asked("LEAFDYN_MOTIONS_FROM", 0) as u64;
     let (mut ratios, mut wrong, mut unknown, mut refused) = (Vec::new(), Vec::new(), 0, 0);
     for seed in first..first + count {

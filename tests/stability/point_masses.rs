@@ -74,7 +74,10 @@ fn masses_on_one_point_add_up() {
     let one = beam(0.7, 0.5, 0.0);
     let mut two = one.clone();
     two.points[0].mass = 0.4;
-    let other = leafdyn::scenario::PointLoad { mass: 0.3, ..two.points[0] };
+    let other = leafdyn::scenario::PointLoad {
+        mass: 0.3,
+        ..two.points[0]
+    };
     two.points.push(other);
     let (found, bar) = lowest(&two);
     let (right, other) = lowest(&one);
@@ -96,7 +99,11 @@ fn both_methods_swing_with_the_period_of_the_mode() {
     let begun = state.tip(0).z;
     assert!(begun > 5e-4, "{begun}");
     for scheme in BOTH {
-        let step = if scheme == BOTH[0] { 1e-3 } else { half / 500.0 };
+        let step = if scheme == BOTH[0] {
+            1e-3
+        } else {
+            half / 500.0
+        };
         let across = at(scheme, &leaf, &state, step, half).state.tip(0).z;
         close("half a period", across, -begun, 3e-3 * begun);
     }

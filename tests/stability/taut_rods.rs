@@ -19,7 +19,11 @@ fn wire(slenderness: f64) -> String {
 fn a_stretched_wire_carries_its_strain() {
     for slenderness in [790.0, 800.0, 1000.0, 2600.0, 1e5] {
         let found = follow(&wire(slenderness), "", "tip.position[0]=1.0..1.002", false);
-        assert!(found.complete, "{slenderness}: {:?}", found.branches[0].remark);
+        assert!(
+            found.complete,
+            "{slenderness}: {:?}",
+            found.branches[0].remark
+        );
         let stiffness = 0.25e9 * PI / slenderness.powi(2);
         for point in &found.branches[0].points {
             let right = -stiffness * (point.value - 1.0);

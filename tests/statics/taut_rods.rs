@@ -30,7 +30,8 @@ fn any_stiffness_carries_its_strain() {
                 let (found, bar) = felt(&leaf);
                 let right = -axial * ((1.0 + strain) - 1.0);
                 let off = (found - right).abs();
-                let what = format!("{axial:e}, {strain:e}, {how}: {found} for {right}, bar {bar:e}");
+                let what =
+                    format!("{axial:e}, {strain:e}, {how}: {found} for {right}, bar {bar:e}");
                 assert!(off <= bar + 1e-15 * right.abs(), "{what}");
                 let rounded = 1e-14 * axial;
                 assert!(bar <= 1e-6 * right.abs() + rounded * 10.0, "{what}");
@@ -51,7 +52,11 @@ fn wires_of_any_slenderness() {
         let strain = between(4, 1e-7, 5e-2);
         let angle = 6.0 * (number(5) - 0.5);
         let how = if number(6) < 0.5 { "pinned" } else { "clamped" };
-        let angles = if number(6) < 0.5 { String::new() } else { format!("angles = {angle:?}") };
+        let angles = if number(6) < 0.5 {
+            String::new()
+        } else {
+            format!("angles = {angle:?}")
+        };
         let (sin, cos) = angle.sin_cos();
         let [x, y] = [cos, sin].map(|part| length * (1.0 + strain) * part);
         let wire = parse(&format!(
@@ -73,7 +78,10 @@ fn wires_of_any_slenderness() {
         let bar = reaction.error.expect("several grids");
         // The place of the tip is rounded.
         let rounded = 4.0 * f64::EPSILON * stiffness;
-        let what = format!("{seed}: {:?} for {right:?}, off {off:e}, bar {bar:e}", reaction.force);
+        let what = format!(
+            "{seed}: {:?} for {right:?}, off {off:e}, bar {bar:e}",
+            reaction.force
+        );
         assert!(off <= bar + rounded, "{what}");
         assert!(bar <= 1e-6 * right.length() + 100.0 * rounded, "{what}");
     }
@@ -95,7 +103,10 @@ fn a_grip_stretches_what_is_before_it() {
         let right = -1e9 * 0.25 * PI * diameter * diameter * 0.002;
         let off = grip.force.distance(right * DVec3::X);
         let bar = grip.error.expect("several grids");
-        assert!(off <= bar + 1e-12 * right.abs(), "{diameter}: {off:e}, bar {bar:e}");
+        assert!(
+            off <= bar + 1e-12 * right.abs(),
+            "{diameter}: {off:e}, bar {bar:e}"
+        );
         assert!(bar <= 1e-6 * right.abs(), "{diameter}: {bar:e}");
     }
 }

@@ -144,7 +144,10 @@ const OF_FORCES: f64 = 20.0;
 fn felt(equilibrium: &Equilibrium, (force, moment): (DVec3, f64), error: Option<f64>) -> String {
     if let Some(error) = error {
         let rounding = ROUNDING * force.length();
-        return force.to_array().map(|it| known(it, error.max(rounding))).join(", ");
+        return force
+            .to_array()
+            .map(|it| known(it, error.max(rounding)))
+            .join(", ");
     }
     let longest = equilibrium.shape.longest();
     let energy = equilibrium.energy.unwrap_or_default().abs();

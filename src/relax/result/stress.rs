@@ -92,7 +92,10 @@ impl Stresses {
         let on = |level: &Level| -> Vec<DVec3> {
             let stride = level.leaf.segments() / (sigma.len() - 1);
             let resultants = |(j, i)| strains::resultants(&level.leaf, &level.state, j, i * stride);
-            nodes().enumerate().map(|(k, at)| stress(k, resultants(at))).collect()
+            nodes()
+                .enumerate()
+                .map(|(k, at)| stress(k, resultants(at)))
+                .collect()
         };
         let (extrapolated, error) = extrapolated(&found.levels, on, [found.history.remaining, 0.0]);
         let error = match (&error, found.integrated()) {

@@ -38,7 +38,6 @@ keep-unstable | oval | leads to no equilibrium from this start
 /// What does not count yet, and must: verbs | leaves or keys. Modes of leaves under dead moments are
 /// told by none; the bar of the coarse blade is wider than what its stiffness across does.
 const PENDING: &str = "
-modes fit simulate-explicit simulate-semi-implicit motion-figures | load.point.mass
 modes | twisted
 relax | blade.young_across
 ";
