@@ -87,6 +87,11 @@ pub fn minimal_residual(
         next.iter_mut().for_each(|value| *value /= left);
     }
     let count = triangle.len();
+    if count == 0 {
+        found.residual = 1.0;
+        found.coefficients = vec![0.0; found.directions.len()];
+        return Some(found);
+    }
     let upper = DMatrix::from_fn(
         count,
         count,

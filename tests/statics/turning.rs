@@ -240,3 +240,47 @@ fn untied_veins_turn_each_for_itself() {
         assert_eq!(found.verdict, Verdict::Agree, "{stiffness}");
     }
 }
+
+/// A leaf that can turn is the same of its circle at every tolerance, without modes as with them: its
+/// bar holds against a finer one.
+#[test]
+fn bars_of_leaves_that_can_turn_hold() {
+    let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract();
+    for seed in 0..8 {
+        let number = |k: usize, low: f64, high: f64| low + (high - low) * golden(9 * seed + k);
+        let more = match seed % 2 {
+            0 => format!(
+                "leaf.base_held = \"pinned\"\nrest.bend_2 = {:?}\nrest.bend_3 = {:?}\nload.tip_force = [{:?}, {:?}, 0.0]\nstiffness.bending_2 = 2.0",
+                number(1, -3.0, 3.0),
+                number(2, -1.0, 1.0),
+                number(3, 2.0, 5.0),
+                number(4, 2.0, 5.0),
+            ),
+            _ => format!(
+                "rest.twist = {:?}\nload.tip_force = [{:?}, 0.0, 0.0]\nstiffness.bending_2 = 1.0",
+                number(1, 1.0, 4.0),
+                number(2, -6.0, -3.5),
+            ),
+        };
+        let rod = parse(&format!(
+            r#"
+            leaf.rods = 1
+            leaf.length = 1.0
+            leaf.fan = [0.0]
+            stiffness.torsion = 0.6
+            stiffness.bending_3 = 1.0
+            stiffness.axial = inf
+            stiffness.shear_2 = inf
+            stiffness.shear_3 = inf
+            {more}
+            "#
+        ));
+        let fine = settle(&rod, 1e-10);
+        for tolerance in [1e-4, 1e-6, 1e-8] {
+            let leaf = settle(&rod, tolerance);
+            let bar = estimate(&leaf) + estimate(&fine);
+            let off = distance(&leaf, &fine);
+            assert!(off <= bar, "{seed}, {tolerance:e}: {off:e} beyond {bar:e}");
+        }
+    }
+}

@@ -7,6 +7,7 @@ use crate::newton::Work;
 use crate::relax::accuracy::defect;
 use crate::relax::accuracy::defect::Estimate;
 use crate::relax::request::problem::{COARSEST, Problem};
+use crate::relax::transfer::level::Level;
 
 /// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
 /// absolute values.
@@ -122,9 +123,12 @@ impl NestedEquilibrium {
     ) -> Self {
         let most = problem.corrections();
         let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
+        // A leaf that can turn is the same one of its circle on every grid: the response to a defect
+        // leaves where on the circle it is as it was, with the error of that.
+        let turns = |level: &Level| !level.leaf.turns(&level.state).is_empty();
         // The defect is that of dead loads.
         let columns = match self.table.best() {
-            _ if problem.leaf.in_wind() => None,
+            _ if problem.leaf.in_wind() || self.levels.last().is_some_and(turns) => None,
             Some(best) => (best.error <= farthest).then_some(best.columns),
             // What has left a saddle may be close to another on the next grid.
             None => (problem.may_be_alone() && self.history.pushes == 0).then_some(0),
