@@ -465,7 +465,11 @@ impl Simulation {
         let Some((&[made, bar, until, displacement], numbers)) = numbers.split_first_chunk() else {
             return false;
         };
-        let finite = || numbers.iter().all(|number| number.abs() < LARGEST_NUMBER);
+        let known = [bar, until, displacement];
+        let finite = || {
+            let all = known.iter().chain(numbers);
+            all.into_iter().all(|number| number.abs() < LARGEST_NUMBER)
+        };
         let fits =
             (0.0..=self.outputs as f64).contains(&made) && finite() && self.method.restore(numbers);
         if fits {

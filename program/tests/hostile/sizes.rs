@@ -191,8 +191,8 @@ fn a_checkpoint_with_an_impossible_number_is_refused() {
                 assert!(!simulation.restore(&changed), "{scheme:?}: {wild} at {at}");
             }
         }
-        // The time is the first or the second number after that of the outputs.
-        let time = 1 + usize::from(scheme == Scheme::Explicit);
+        // The time is the first or the second number after those of the outputs and their error.
+        let time = 4 + usize::from(scheme == Scheme::Explicit);
         let mut late = state.clone();
         late[time] = 1e18;
         assert!(!simulation.restore(&late), "{scheme:?}");

@@ -50,7 +50,7 @@ pub(super) fn fit(
     }
     let outcome = match end {
         End::Converged if contradicted => FitOutcome::Contradicted,
-        End::Converged if systematic.is_some() => FitOutcome::Systematic,
+        End::Converged if systematic.is_some() && open.is_empty() => FitOutcome::Systematic,
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
         }

@@ -16,7 +16,7 @@ use super::result::{FitParameter, FitSystematic};
 use super::statistics::Statistics;
 
 /// The level of the test: so often residuals of a true model are called systematic.
-const LEVEL: f64 = 0.02;
+const LEVEL: f64 = 5e-3;
 
 /// Where deviations are given, the p-value below which residuals are smooth beside the others.
 const SMOOTH: f64 = 0.05;

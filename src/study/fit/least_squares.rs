@@ -231,7 +231,9 @@ impl<'m, 'a> Iteration<'m, 'a> {
                     true => End::Stuck(lost),
                     false => End::Converged,
                 };
-                if size < STEP || predicted < GAIN * variance || radius < LEAST_STEP {
+                let number = size.is_finite() && predicted.is_finite();
+                let worth = size >= STEP && predicted >= GAIN * variance && radius >= LEAST_STEP;
+                if !number || !worth {
                     return (point, end(lost), evaluations);
                 }
                 evaluations += 1;
