@@ -4,12 +4,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Directions of a singular value below this are left out: A, which is close to the identity, is
-/// singular in them, up to rounding.
-const SINGULAR: f64 = 1e-8;
-
-/// The search ends where so many directions in a row leave more than this part of the residual.
-const STAGNATING: (usize, f64) = (3, 0.99);
+/// When a search ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// Norm of the residual, as a part of that of b.
+    pub accuracy: f64,
+    /// Largest number of directions.
+    pub most: usize,
+    /// Directions of a singular value up to this are left out: A is singular in them, up to
+    /// rounding. With zero none is.
+    pub singular: f64,
+    /// The search ends where so many directions in a row leave more than this part of the residual.
+    pub stagnating: Option<(usize, f64)>,
+}
 
 /// A solution as a sum over orthonormal directions.
 pub struct Expansion {
@@ -21,12 +28,11 @@ pub struct Expansion {
     pub residual: f64,
 }
 
-/// Solves A x = `b` until the residual is at most `accuracy` times the norm of b, in at most so
-/// many directions; `product` makes A times a direction. `None` if a product fails or is not
+/// Solves A x = `b`; `product` makes A times a direction. `None` if a product fails or is not
 /// finite. In directions in which A is singular the solution is zero.
 pub fn minimal_residual(
     b: &[f64],
-    (accuracy, most): (f64, usize),
+    search: Search,
     product: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<Expansion> {
     let length = norm(b);
@@ -45,12 +51,13 @@ pub fn minimal_residual(
     // The triangular factor of what A makes of the directions, and the rotations that lead to it.
     let (mut triangle, mut rotations): (Vec<Vec<f64>>, Vec<[f64; 2]>) = (Vec::new(), Vec::new());
     let mut remaining = vec![length];
-    while found.directions.len() < most {
+    while found.directions.len() < search.most {
         let k = triangle.len();
-        let stagnates = k
-            .checked_sub(STAGNATING.0)
-            .is_some_and(|before| remaining[k].abs() > STAGNATING.1 * remaining[before].abs());
-        if remaining[k].abs() <= accuracy * length || stagnates {
+        let stagnates = search.stagnating.is_some_and(|(count, part)| {
+            let before = k.checked_sub(count);
+            before.is_some_and(|before| remaining[k].abs() > part * remaining[before].abs())
+        });
+        if remaining[k].abs() <= search.accuracy * length || stagnates {
             break;
         }
         let mut image = product(&next)?;
@@ -98,7 +105,11 @@ pub fn minimal_residual(
         |r, c| if r <= c { triangle[c][r] } else { 0.0 },
     );
     let right = DVector::from_column_slice(&remaining[..count]);
-    let coefficients = upper.clone().svd(true, true).solve(&right, SINGULAR).ok()?;
+    let coefficients = upper
+        .clone()
+        .svd(true, true)
+        .solve(&right, search.singular)
+        .ok()?;
     let left_out = (&right - upper * &coefficients).norm();
     found.residual = remaining[count].hypot(left_out) / length;
     found.coefficients = coefficients.iter().copied().collect();
@@ -135,6 +146,13 @@ fn add(sum: &mut [f64], factor: f64, other: &[f64]) {
 mod tests {
     use super::*;
 
+    const SEARCH: Search = Search {
+        accuracy: 1e-12,
+        most: 10,
+        singular: 1e-8,
+        stagnating: Some((3, 0.99)),
+    };
+
     /// The identity with one outlier of any size takes two directions.
     #[test]
     fn one_outlier_takes_two_directions() {
@@ -145,7 +163,7 @@ mod tests {
                 Some(image)
             };
             let b = [1.0, -2.0, 0.5, 3.0];
-            let found = minimal_residual(&b, (1e-12, 10), product).unwrap();
+            let found = minimal_residual(&b, SEARCH, product).unwrap();
             assert_eq!(found.directions.len(), 2);
             let x = found.sum().unwrap();
             for (k, b) in b.iter().enumerate() {
@@ -159,10 +177,10 @@ mod tests {
     #[test]
     fn a_singular_direction_is_left_out() {
         let product = &mut |v: &[f64]| Some(vec![v[0], 0.0]);
-        let found = minimal_residual(&[3.0, 4.0], (1e-12, 10), product).unwrap();
+        let found = minimal_residual(&[3.0, 4.0], SEARCH, product).unwrap();
         assert!((found.residual - 0.8).abs() < 1e-12, "{}", found.residual);
         let none = &mut |v: &[f64]| Some(vec![0.0 * v[0]]);
-        let found = minimal_residual(&[1.0], (1e-12, 10), none).unwrap();
+        let found = minimal_residual(&[1.0], SEARCH, none).unwrap();
         assert_eq!((found.residual, found.coefficients), (1.0, vec![0.0]));
     }
 }

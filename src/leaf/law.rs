@@ -16,7 +16,7 @@ use super::derivative::Response;
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, State};
 use super::system::System;
-use crate::krylov::minimal_residual;
+use crate::krylov::{Search, minimal_residual};
 use crate::largest::largest;
 use crate::rod::{Section, Segment};
 use glam::DVec3;
@@ -24,10 +24,14 @@ use glam::DVec3;
 /// Parts of the law of a segment below this are rounding.
 const CLOSED: f64 = 1e-12;
 
-/// What may be missing of the law after its completion, as a part of what was before, and the
-/// largest number of solutions for it.
-const COMPLETE: f64 = 1e-9;
-const SOLUTIONS: usize = 40;
+/// The search for what is missing of the law. Forces of which the law determines less than a
+/// hundred millionth are undetermined.
+const COMPLETION: Search = Search {
+    accuracy: 1e-9,
+    most: 40,
+    singular: 1e-8,
+    stagnating: Some((3, 0.99)),
+};
 
 impl DiscreteLeaf {
     /// The part of the law of segment `i` of rod `j` that a linear solution does not satisfy.
@@ -37,10 +41,11 @@ impl DiscreteLeaf {
         DVec3::select(left.cmplt(DVec3::splat(CLOSED)), DVec3::ZERO, left)
     }
 
-    /// Whether some segment is stiffer than its force is condensed out with.
+    /// Whether some segment of finite stiffness is stiffer than its force is condensed out with.
     pub fn is_nearly_rigid(&self) -> bool {
         let mut segments = self.each(0..self.segments());
-        segments.any(|(j, i)| self.missing_part(j, i) != DVec3::ZERO)
+        segments
+            .any(|at| self.missing_part(at.0, at.1) * self.closed_part(at, false) != DVec3::ZERO)
     }
 
     /// The largest strain by which a step from one state to another misses the law of its nearly
@@ -50,15 +55,19 @@ impl DiscreteLeaf {
         let missing = |(j, i): (usize, usize)| {
             let section = self.section(j, i);
             let change = (after.n[j * n + i] - before.n[j * n + i]).length();
-            let missing = self.missing_part(j, i) / section.condensing;
-            missing.max_element() * change
+            let missing = self.missing_part(j, i) * self.closed_part((j, i), false);
+            (missing / section.condensing).max_element() * change
         };
         largest(self.each(0..n).map(missing))
     }
 
-    /// Whether a segment cannot be stretched or sheared in some direction.
-    pub fn has_rigid_segments(&self) -> bool {
-        self.least_compliance() == 0.0
+    /// Largest finite stiffness in stretch and shear of any segment; zero if all are rigid.
+    pub fn largest_finite_stiffness(&self) -> f64 {
+        let stiffness = |section: &Section| {
+            let rigid = section.compliance.cmpeq(DVec3::ZERO);
+            DVec3::select(rigid, DVec3::ZERO, section.compliance.recip()).max_element()
+        };
+        largest(self.sections.iter().map(stiffness))
     }
 
     /// Largest stiffness in stretch and shear of any segment; of rigid ones that with which their
@@ -123,7 +132,7 @@ impl DiscreteLeaf {
             let left = left.iter().flat_map(|gap| gap.to_array());
             Some(direction.iter().zip(left).map(|(v, g)| v - g).collect())
         };
-        let Some(found) = minimal_residual(&missing, (COMPLETE, SOLUTIONS), product) else {
+        let Some(found) = minimal_residual(&missing, COMPLETION, product) else {
             return false;
         };
         for (part, more) in found.coefficients.iter().zip(&responses) {

@@ -6,12 +6,16 @@
 //! factorised once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
-use crate::krylov::minimal_residual;
+use crate::krylov::{Search, minimal_residual};
 use crate::leaf::{Factors, Field, Increment, State, System};
 
-/// Relative accuracy of the solution, and the largest number of directions.
-const ACCURACY: f64 = 1e-10;
-const DIRECTIONS: usize = 100;
+/// The search for the solution.
+const SEARCH: Search = Search {
+    accuracy: 1e-10,
+    most: 100,
+    singular: 0.0,
+    stagnating: None,
+};
 
 /// Forces on the nodes of a leaf that are not the derivatives of an energy.
 pub trait Following {
@@ -39,8 +43,8 @@ pub fn solve(
         let image = flat(&solved(&change));
         Some(direction.iter().zip(image).map(|(v, w)| v - w).collect())
     };
-    let found = minimal_residual(&first, (ACCURACY, DIRECTIONS), product)?;
-    let solved = found.residual <= ACCURACY;
+    let found = minimal_residual(&first, SEARCH, product)?;
+    let solved = found.residual <= SEARCH.accuracy;
     solved.then(|| found.sum().map_or(zero, |sum| field(&sum, nodes)))
 }
 

@@ -20,6 +20,9 @@ const STRAIN_ROUNDING: f64 = 10.0 * f64::EPSILON;
 /// Changes of forces below this part of the largest that do not decrease are due to rounding.
 const ROUNDED_FORCE: f64 = 1e-9;
 
+/// On the way to a leaf at rest, to more than this accuracy, its forces are not asked for.
+const ROUGH: f64 = 1e-3;
+
 /// Safety factor on the error of forces after a first increment.
 const FIRST_SAFETY: f64 = 10.0;
 
@@ -84,7 +87,7 @@ impl ForceProgress {
     /// Whether the error that remains in the forces is at most this part of the largest, or
     /// rounding.
     pub fn at_rest(&self, accuracy: f64) -> bool {
-        if !self.redundant {
+        if !self.redundant || accuracy > ROUGH {
             return true;
         }
         let scale = self.largest.max(1.0);

@@ -93,6 +93,12 @@ pub fn relax(
         _ => (Some(1), false),
     };
     check_intervals(scenario.rods.len(), intervals)?;
+    if !from_rest && scenario.held_tip.is_some() {
+        // Shooting from arcs has no continuation to a held tip.
+        let why =
+            "a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest";
+        return Err(RefusedOption::new("method", options.method.word(), why).into());
+    }
     shooting::check_models(scenario, from_rest).map_err(|missing| match missing {
         Unmodelled::FromArcs { .. } => {
             RefusedOption::new("method", options.method.word(), missing.to_string()).into()

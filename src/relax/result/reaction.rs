@@ -82,13 +82,11 @@ impl NestedEquilibrium {
     /// The part of forces by which unfinished iterations, and the size by which rounding of
     /// positions, may change them.
     pub fn unfinished_forces(&self) -> [f64; 2] {
-        let stiffest = |leaf: &DiscreteLeaf| leaf.largest_force_stiffness();
-        let rounding = self.levels.last().map_or(0.0, |level| {
-            let leaf = &level.leaf;
-            let strained = leaf.leaf.is_held() && !leaf.has_rigid_segments();
-            let stiffness = if strained { stiffest(leaf) } else { 0.0 };
-            STRAIN_ROUNDING * leaf.segments() as f64 * stiffness
-        });
+        let rounding = |leaf: &DiscreteLeaf| {
+            STRAIN_ROUNDING * leaf.segments() as f64 * leaf.largest_finite_stiffness()
+        };
+        let held = self.levels.last().filter(|level| level.leaf.leaf.is_held());
+        let rounding = held.map_or(0.0, |level| rounding(&level.leaf));
         [self.history.remaining, rounding]
     }
 
