@@ -190,7 +190,7 @@ impl Refinement {
         }
         if self.next.is_some() {
             let others = (simulation.segments(), whole.unwrap_or_default());
-            let before = std::mem::replace(&mut self.coarser, Some(others));
+            let before = self.coarser.replace(others);
             if self.last {
                 // The run before once more, compared with what it was compared with.
                 self.coarser = self.coarsest.take();

@@ -106,8 +106,8 @@ fn energy(record: &Record, units: &Units) -> Lines {
 
 /// The bar on the tips, and where it ends.
 fn error(record: &Record, units: &Units) -> String {
-    let known = record.moments.iter().filter_map(|moment| moment.error);
-    let (Some(bar), Some(segments)) = (known.last(), record.compared_segments) else {
+    let mut known = record.moments.iter().filter_map(|moment| moment.error);
+    let (Some(bar), Some(segments)) = (known.next_back(), record.compared_segments) else {
         return "of the tips not known: there is no second run to compare with".into();
     };
     let bar = bound_of_positions(bar, units);

@@ -114,7 +114,7 @@ impl Stresses {
         let told = self.largest.equivalent;
         let peak = largest(extrapolated.iter().map(|it| it.z));
         // Between the nodes of the coarsest grid stresses may be larger, but not those at a node.
-        let off = match sigma.iter().any(|at| *at == self.sigma) {
+        let off = match sigma.contains(&self.sigma) {
             true => (told - peak).abs(),
             false => 0.0,
         };

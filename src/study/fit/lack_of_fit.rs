@@ -170,7 +170,7 @@ fn series(stats: &Statistics) -> Vec<(String, Vec<usize>)> {
 
 /// Widens the intervals of numbers, none of which is then determined.
 pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64) {
-    let all = parameters.iter_mut().zip(&stats.model.coordinates[..]);
+    let all = parameters.iter_mut().zip(stats.model.coordinates);
     for ((parameter, free), theta) in all.zip(&stats.point.theta) {
         let [low, high] = free.bounds;
         let end = |end: f64| {

@@ -22,11 +22,10 @@ fn is_product(cell: &str) -> bool {
         factor.trim_end_matches(exponent).into()
     };
     let mut factors = small.split(['/', '*', '·']).enumerate();
-    let of_units = factors.all(|(at, factor)| match factor.trim() {
+    factors.all(|(at, factor)| match factor.trim() {
         "1" => at == 0 && small.contains('/'),
         factor => UNITS.contains(&base(factor).as_str()),
-    });
-    of_units
+    })
 }
 
 /// Whether a row has units, and nothing else but dashes for what has none.
