@@ -32,6 +32,7 @@ fn beam_of([stiffness, inertia]: [&str; 2], mass: f64, place: f64, load: f64) ->
         [dynamics]
         density = 1.0
         rotary_inertia = {inertia}
+        external_damping = 0.0
         "#
     ))
 }

@@ -38,7 +38,8 @@ pub(super) fn fit(
         _ => Vec::new(),
     };
     let systematic = match end {
-        End::Converged => lack_of_fit::systematic(stats),
+        // What the data leave open comes first.
+        End::Converged if open.is_empty() => lack_of_fit::systematic(stats),
         _ => None,
     };
     let mut says = words::sentences(&parameters, &open, coordinates);
@@ -50,7 +51,7 @@ pub(super) fn fit(
     }
     let outcome = match end {
         End::Converged if contradicted => FitOutcome::Contradicted,
-        End::Converged if systematic.is_some() && open.is_empty() => FitOutcome::Systematic,
+        End::Converged if systematic.is_some() => FitOutcome::Systematic,
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
         }
