@@ -168,7 +168,8 @@ fn series(stats: &Statistics) -> Vec<(String, Vec<usize>)> {
     found
 }
 
-/// Widens the intervals of numbers, none of which is then determined.
+/// Widens the intervals of numbers, none of which is then determined. Standard errors stay those of
+/// independent errors, as covariances and bands are.
 pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64) {
     let all = parameters.iter_mut().zip(stats.model.coordinates);
     for ((parameter, free), theta) in all.zip(&stats.point.theta) {
@@ -179,7 +180,6 @@ pub(super) fn widen(stats: &Statistics, parameters: &mut [FitParameter], by: f64
         };
         parameter.low = parameter.low.map(end);
         parameter.high = parameter.high.map(end);
-        parameter.standard_error = parameter.standard_error.map(|error| by * error);
         parameter.determined = false;
     }
 }
