@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// When a search ends.
+/// When [`minimal_residual`] ends, and which directions it leaves out.
 #[derive(Clone, Copy, Debug)]
-pub struct Search {
+pub struct KrylovLimits {
     /// Norm of the residual, as a part of that of b.
     pub accuracy: f64,
     /// Largest number of directions.
@@ -32,7 +32,7 @@ pub struct Expansion {
 /// finite. In directions in which A is singular the solution is zero.
 pub fn minimal_residual(
     b: &[f64],
-    search: Search,
+    limits: KrylovLimits,
     product: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<Expansion> {
     let length = norm(b);
@@ -51,13 +51,13 @@ pub fn minimal_residual(
     // The triangular factor of what A makes of the directions, and the rotations that lead to it.
     let (mut triangle, mut rotations): (Vec<Vec<f64>>, Vec<[f64; 2]>) = (Vec::new(), Vec::new());
     let mut remaining = vec![length];
-    while found.directions.len() < search.most {
+    while found.directions.len() < limits.most {
         let k = triangle.len();
-        let stagnates = search.stagnating.is_some_and(|(count, part)| {
+        let stagnates = limits.stagnating.is_some_and(|(count, part)| {
             let before = k.checked_sub(count);
             before.is_some_and(|before| remaining[k].abs() > part * remaining[before].abs())
         });
-        if remaining[k].abs() <= search.accuracy * length || stagnates {
+        if remaining[k].abs() <= limits.accuracy * length || stagnates {
             break;
         }
         let mut image = product(&next)?;
@@ -108,7 +108,7 @@ pub fn minimal_residual(
     let coefficients = upper
         .clone()
         .svd(true, true)
-        .solve(&right, search.singular)
+        .solve(&right, limits.singular)
         .ok()?;
     let left_out = (&right - upper * &coefficients).norm();
     found.residual = remaining[count].hypot(left_out) / length;
@@ -146,7 +146,7 @@ fn add(sum: &mut [f64], factor: f64, other: &[f64]) {
 mod tests {
     use super::*;
 
-    const SEARCH: Search = Search {
+    const LIMITS: KrylovLimits = KrylovLimits {
         accuracy: 1e-12,
         most: 10,
         singular: 1e-8,
@@ -163,7 +163,7 @@ mod tests {
                 Some(image)
             };
             let b = [1.0, -2.0, 0.5, 3.0];
-            let found = minimal_residual(&b, SEARCH, product).unwrap();
+            let found = minimal_residual(&b, LIMITS, product).unwrap();
             assert_eq!(found.directions.len(), 2);
             let x = found.sum().unwrap();
             for (k, b) in b.iter().enumerate() {
@@ -177,10 +177,10 @@ mod tests {
     #[test]
     fn a_singular_direction_is_left_out() {
         let product = &mut |v: &[f64]| Some(vec![v[0], 0.0]);
-        let found = minimal_residual(&[3.0, 4.0], SEARCH, product).unwrap();
+        let found = minimal_residual(&[3.0, 4.0], LIMITS, product).unwrap();
         assert!((found.residual - 0.8).abs() < 1e-12, "{}", found.residual);
         let none = &mut |v: &[f64]| Some(vec![0.0 * v[0]]);
-        let found = minimal_residual(&[1.0], SEARCH, none).unwrap();
+        let found = minimal_residual(&[1.0], LIMITS, none).unwrap();
         assert_eq!((found.residual, found.coefficients), (1.0, vec![0.0]));
     }
 }

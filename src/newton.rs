@@ -292,7 +292,7 @@ impl Newton<'_> {
                 return Err(Stop::Stuck);
             }
             leaf.advance(state, system, (longest / size).min(1.0), &mut next);
-            if forces.lag(leaf, state, &next) {
+            if forces.law_lags(leaf, state, &next) {
                 let again = &mut |system: &mut System, forces: &Field| {
                     linear.solve_again(state, system, forces)
                 };

@@ -6,11 +6,11 @@
 //! factorised once for every iteration of Newton's method; as K^-1 W is smooth, few directions are
 //! enough.
 
-use crate::krylov::{Search, minimal_residual};
+use crate::krylov::{KrylovLimits, minimal_residual};
 use crate::leaf::{Factors, Field, Increment, State, System};
 
-/// The search for the solution.
-const SEARCH: Search = Search {
+/// Accuracy of the solution. No direction is left out: none is undetermined.
+const LIMITS: KrylovLimits = KrylovLimits {
     accuracy: 1e-10,
     most: 100,
     singular: 0.0,
@@ -35,25 +35,26 @@ pub fn solve(
 ) -> Option<Field> {
     let mut solved = |forces: &Field| factors.solve_bordered(forces, &[]).increments;
     let start = solved(forces);
-    let (nodes, first) = (start[0].len(), flat(&start));
+    let (nodes, first) = (start[0].len(), flattened(&start));
     let zero: Field = vec![vec![[0.0; 6]; nodes]; start.len()];
     let product = &mut |direction: &[f64]| {
         let mut change = zero.clone();
-        following.add_change(state, &field(direction, nodes), &mut change);
-        let image = flat(&solved(&change));
+        following.add_change(state, &unflattened(direction, nodes), &mut change);
+        let image = flattened(&solved(&change));
         Some(direction.iter().zip(image).map(|(v, w)| v - w).collect())
     };
-    let found = minimal_residual(&first, SEARCH, product)?;
-    let solved = found.residual <= SEARCH.accuracy;
-    solved.then(|| found.sum().map_or(zero, |sum| field(&sum, nodes)))
+    let found = minimal_residual(&first, LIMITS, product)?;
+    let solved = found.residual <= LIMITS.accuracy;
+    solved.then(|| found.sum().map_or(zero, |sum| unflattened(&sum, nodes)))
 }
 
-fn flat(field: &Field) -> Vec<f64> {
+/// The increments of all nodes, one number after the other.
+fn flattened(field: &Field) -> Vec<f64> {
     field.iter().flatten().flatten().copied().collect()
 }
 
-/// Increments of rods of so many nodes.
-fn field(numbers: &[f64], nodes: usize) -> Field {
+/// The increments again, of rods of so many nodes.
+fn unflattened(numbers: &[f64], nodes: usize) -> Field {
     let increments: Vec<Increment> = (numbers.chunks_exact(6))
         .map(|six| std::array::from_fn(|c| six[c]))
         .collect();

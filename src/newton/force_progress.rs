@@ -64,7 +64,7 @@ impl ForceProgress {
 
     /// Whether the law of nearly rigid segments lags behind in a step between two states, so that
     /// it must be completed.
-    pub fn lag(&mut self, leaf: &DiscreteLeaf, before: &State, after: &State) -> bool {
+    pub fn law_lags(&mut self, leaf: &DiscreteLeaf, before: &State, after: &State) -> bool {
         if !self.nearly_rigid {
             return false;
         }

@@ -360,6 +360,18 @@ mod tests {
         assert_eq!(twisted.farthest(Quantity::Rotation), Some(place));
     }
 
+    /// Forces of the relaxed leaf that are wrong by one in a thousand are seen, the shape being right.
+    #[test]
+    fn other_forces_are_a_difference() {
+        let weaker = changed(fan(), |solution| {
+            for node in solution.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+                node.n *= 1.001;
+            }
+        });
+        assert_eq!(weaker.verdict, Verdict::Differ);
+        assert_eq!(weaker.difference.map(|it| it.position < 1e-7), Some(true));
+    }
+
     /// Both are stable: an index of one of them that is another contradicts that, one that is not
     /// known does not.
     #[test]

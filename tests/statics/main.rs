@@ -28,6 +28,7 @@ mod order;
 mod path;
 mod point_moments;
 mod published;
+mod reaction_bars;
 mod real_leaves;
 mod reductions;
 mod reference_leaves;

@@ -69,7 +69,7 @@ impl Plane {
 }
 
 /// Solutions of the equations of a branch at a state.
-struct Step {
+struct CorrectorStep {
     /// The increments that balance the forces, and the forces of the segments that complete the law
     /// of nearly rigid ones in them.
     forces: Field,
@@ -99,7 +99,12 @@ impl Equations<'_> {
 
     /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
     /// else by a direct factorisation, which also counts the negative eigenvalues.
-    fn solve(&mut self, at: &Solution, linear: &Linear, rate: &Field) -> Result<Step, Stuck> {
+    fn solve(
+        &mut self,
+        at: &Solution,
+        linear: &Linear,
+        rate: &Field,
+    ) -> Result<CorrectorStep, Stuck> {
         let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
@@ -112,7 +117,7 @@ impl Equations<'_> {
                 let found = [&linear.forces, rate].map(|rhs| solved(&mut self.system, rhs));
                 if let [Some(mut forces), Some(rate)] = found {
                     let (_, law_forces) = self.complete_law(at, &mut forces, &mut solved)?;
-                    return Ok(Step {
+                    return Ok(CorrectorStep {
                         forces,
                         law_forces,
                         rate,
@@ -129,7 +134,7 @@ impl Equations<'_> {
         let [mut forces, rate] = [&linear.forces, rate].map(&mut solved);
         let (_, law_forces) =
             self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
-        Ok(Step {
+        Ok(CorrectorStep {
             forces,
             law_forces,
             rate,
@@ -175,7 +180,7 @@ impl Equations<'_> {
         for iterations in 1.. {
             let rates = self.rates(&now, false)?;
             let linear = self.assemble(&mut now, false)?;
-            let Step {
+            let CorrectorStep {
                 forces,
                 law_forces,
                 mut rate,

@@ -140,7 +140,7 @@ fn every_key_counts_in_every_verb_or_is_refused() {
         .filter(|row| !row.leaf.is_empty())
         .collect();
     // The leaves as they are.
-    let all = |leaf| Verb::ALL.map(|verb| (leaf, verb));
+    let all = |leaf| Verb::ALL.iter().map(move |verb| (leaf, *verb));
     let asked: Vec<(&TestLeaf, Verb)> = names.iter().copied().flat_map(all).collect();
     let answers = asked.par_iter().filter_map(|&(leaf, verb)| {
         let answer = ask(&place, verb, leaf, None)?;
@@ -152,7 +152,7 @@ fn every_key_counts_in_every_verb_or_is_refused() {
     // With another value of each key.
     let cells: Vec<(&Row, Verb)> = rows
         .iter()
-        .flat_map(|row| Verb::ALL.map(|verb| (row, verb)))
+        .flat_map(|row| Verb::ALL.iter().map(move |verb| (row, *verb)))
         .collect();
     let answers = cells.par_iter().filter_map(|&(row, verb)| {
         if !(verb.shows(row.acts) || verb == Verb::Chart && row.acts == Acts::Always) {

@@ -9,88 +9,54 @@ use serde_json::Value;
 use crate::keys::leaves::TestLeaf;
 use crate::keys::rows::Acts;
 
-/// What is asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Verb {
-    Relax,
-    Release,
-    Explicit,
-    SingleShooting,
-    Shooting,
-    ShootingFromRest,
-    KeepUnstable,
-    Modes,
-    All,
-    Margin,
-    Trace,
-    Boundary,
-    Map,
-    Chart,
-    Check,
-    Fit,
-    SimulateExplicit,
-    SimulateSemiImplicit,
-    Page,
-    Figures,
-    MotionPage,
-    MotionFigures,
+macro_rules! verbs {
+    ($($verb:ident = $word:literal,)*) => {
+        /// What is asked.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Verb {
+            $($verb,)*
+        }
+
+        impl Verb {
+            pub const ALL: &[Verb] = &[$(Verb::$verb,)*];
+
+            pub fn word(self) -> &'static str {
+                match self {
+                    $(Verb::$verb => $word,)*
+                }
+            }
+        }
+    };
+}
+
+verbs! {
+    Relax = "relax",
+    Release = "release",
+    Explicit = "explicit",
+    SingleShooting = "single-shooting",
+    Shooting = "shooting",
+    ShootingFromRest = "shooting-from-rest",
+    KeepUnstable = "keep-unstable",
+    Modes = "modes",
+    All = "all",
+    Margin = "margin",
+    Trace = "trace",
+    Boundary = "boundary",
+    Map = "map",
+    Chart = "chart",
+    Check = "check",
+    Fit = "fit",
+    SimulateExplicit = "simulate-explicit",
+    SimulateSemiImplicit = "simulate-semi-implicit",
+    Page = "page",
+    Figures = "figures",
+    MotionPage = "motion-page",
+    MotionFigures = "motion-figures",
 }
 
 use Verb::*;
 
 impl Verb {
-    pub const ALL: [Verb; 22] = [
-        Relax,
-        Release,
-        Explicit,
-        SingleShooting,
-        Shooting,
-        ShootingFromRest,
-        KeepUnstable,
-        Modes,
-        All,
-        Margin,
-        Trace,
-        Boundary,
-        Map,
-        Chart,
-        Check,
-        Fit,
-        SimulateExplicit,
-        SimulateSemiImplicit,
-        Page,
-        Figures,
-        MotionPage,
-        MotionFigures,
-    ];
-
-    pub fn word(self) -> &'static str {
-        match self {
-            Relax => "relax",
-            Release => "release",
-            Explicit => "explicit",
-            SingleShooting => "single-shooting",
-            Shooting => "shooting",
-            ShootingFromRest => "shooting-from-rest",
-            KeepUnstable => "keep-unstable",
-            Modes => "modes",
-            All => "all",
-            Margin => "margin",
-            Trace => "trace",
-            Boundary => "boundary",
-            Map => "map",
-            Chart => "chart",
-            Check => "check",
-            Fit => "fit",
-            SimulateExplicit => "simulate-explicit",
-            SimulateSemiImplicit => "simulate-semi-implicit",
-            Page => "page",
-            Figures => "figures",
-            MotionPage => "motion-page",
-            MotionFigures => "motion-figures",
-        }
-    }
-
     /// Whether it answers with a leaf in motion.
     pub fn moves(self) -> bool {
         matches!(

@@ -145,7 +145,7 @@ impl Relaxation<'_> {
             self.solve_shortening(leaf, system, &mut motion, tolerance)?;
             let (mut size, mut part) = step_size(system, &motion);
             leaf.advance(&self.state, system, part, &mut trial);
-            if forces.lag(leaf, &self.state, &trial) {
+            if forces.law_lags(leaf, &self.state, &trial) {
                 let solver = &mut self.solver;
                 let again =
                     &mut |system: &mut System, forces: &Field| solver.solve_again(system, forces);
