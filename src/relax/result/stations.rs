@@ -117,6 +117,9 @@ impl Equilibrium {
             rod.nodes = nodes;
         }
         let error = self.stress.as_ref().and_then(|it| it.error);
+        // Where stations in between are less accurate than the nodes, so are the forces there.
+        let at_nodes = self.accuracy.error_estimate;
+        let error = error.filter(|_| at_nodes.is_some_and(|at_nodes| between <= at_nodes));
         let stress = Stresses::of(scenario, &to, &self.shape.rods);
         self.stress = stress.map(|it| Stresses { error, ..it });
         self.shape.stations = to;
