@@ -17,13 +17,13 @@ pub const REFINEMENT_SECONDS: f64 = 10.0;
 const COARSEST: usize = 4;
 
 /// The ratio of the local errors of steps of which one is half as long: they are of third order.
-const EIGHT: f64 = 8.0;
+const LOCAL_ERROR_RATIO: f64 = 8.0;
 
 /// Bounds on the local error of a step.
 const LOCAL_ERROR: (f64, f64) = (1e-12, 0.1);
 
 /// The time of a run over that on a grid of half as many segments, in steps twice as long.
-const FOUR: f64 = 4.0;
+const COST_RATIO: f64 = 4.0;
 
 /// Explicit steps that are longer by no more than this factor count as equally long.
 const HARDLY_LONGER: f64 = 1.1;
@@ -228,7 +228,7 @@ impl Refinement {
             return;
         }
         let part = ended.time() / self.scenario.dynamics.duration;
-        let expected = FOUR * ended.seconds() / part.clamp(f64::EPSILON, 1.0);
+        let expected = COST_RATIO * ended.seconds() / part.clamp(f64::EPSILON, 1.0);
         if self.seconds + expected > REFINEMENT_SECONDS {
             return;
         }
@@ -236,7 +236,7 @@ impl Refinement {
         let halved = Resolution {
             segments: 2 * now.segments,
             step: now.step.map(|step| 0.5 * step),
-            tolerance: self.local_error(now.tolerance / EIGHT),
+            tolerance: self.local_error(now.tolerance / LOCAL_ERROR_RATIO),
         };
         let Ok(next) = self.build_with_steps(halved) else {
             return;
