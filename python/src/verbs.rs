@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::time::Instant;
 
-use leafdyn::relax::SemiImplicit;
+use leafdyn::relax::{Limit, SemiImplicit};
 use leafdyn::scenario;
 use leafdyn::study::{
     self, BoundaryRequest, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender,
@@ -107,6 +107,7 @@ type Traced<'py> = (Files, bool, Option<String>, Vec<Vec<Bound<'py, PyAny>>>);
 #[pyo3(from_item_all)]
 pub struct Asked {
     switch: bool,
+    until: Option<String>,
     keep_unstable: bool,
     segments: Option<usize>,
     tolerance: Option<f64>,
@@ -115,14 +116,18 @@ pub struct Asked {
 
 impl Asked {
     fn request(&self, py: Python, scenario: &Scenario, vary: &Range) -> PyResult<TraceRequest> {
+        let until = self.until.as_deref().map(str::parse).transpose();
+        let until = until.or_else(|error| refuse(format!("until = {error}")))?;
         Ok(TraceRequest {
             vary: vary.vary(py)?,
             base: scenario.base(py)?,
             switch: self.switch,
+            until,
             keep_unstable: self.keep_unstable,
             segments: self.segments,
             tolerance: self.tolerance,
             most_points: self.points.unwrap_or(MOST_POINTS),
+            limit: Limit::default(),
         })
     }
 }

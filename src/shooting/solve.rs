@@ -122,14 +122,16 @@ fn solve_once(
         progress,
     };
     let modelled = check_models(scenario, matches!(start, Start::Leaf { .. }));
-    let found = match start {
-        _ if let Err(missing) = modelled => Err(Interrupted {
+    let found = match (modelled, start) {
+        (Err(missing), _) => Err(Interrupted {
             reason: missing.into(),
             part: 1.0,
             near: Trajectory::straight(&equations),
         }),
-        Start::Arcs => from_arcs(&mut equations, options.intervals, &mut log),
-        Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
+        (Ok(()), Start::Arcs) => from_arcs(&mut equations, options.intervals, &mut log),
+        (Ok(()), Start::Leaf { stations, rods }) => {
+            Ok(Trajectory::of_leaf(&equations, stations, rods))
+        }
     };
     let end = match found {
         Err(end) => end,

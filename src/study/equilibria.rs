@@ -143,7 +143,12 @@ pub fn equilibria(
         next += BATCH;
         for ended in batch {
             let before = all.found.len();
-            all.take(ended?, false);
+            let ended = ended?;
+            if limit.reached() && !ended.outcome.is_success() {
+                // Stopped on its way, which says nothing of its start.
+                continue;
+            }
+            all.take(ended, false);
             in_vain = if all.found.len() > before {
                 0
             } else {
@@ -157,6 +162,11 @@ pub fn equilibria(
         a.total_cmp(&b)
     });
     all.remark = all.lower();
+    if limit.reached() {
+        let stopped = format!("the search was stopped after {} starts", all.starts);
+        let both = all.remark.take().into_iter().chain([stopped]);
+        all.remark = Some(both.collect::<Vec<_>>().join("; "));
+    }
     all.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(all)
 }

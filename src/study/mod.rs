@@ -41,6 +41,6 @@ pub use margin::{MarginError, MarginProgress, relax_with_margin};
 pub use sensitivity::{SensitivityError, relax_with_sensitivities, sensitivities_of};
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
-    TraceRequest, TraceShow, trace, trace_through,
+    TraceRequest, TraceShow, TraceUntil, trace, trace_through,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Number, Target, Varied, Vary, VaryError};

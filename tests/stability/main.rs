@@ -4,6 +4,7 @@ mod beside_bifurcations;
 mod bifurcations;
 mod boundary;
 mod boundary_random;
+mod branch_ends;
 mod eigenvalue_bars;
 mod follower;
 mod hinges;

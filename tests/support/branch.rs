@@ -1,5 +1,6 @@
 //! Branches of equilibria, and the critical values along them.
 
+use leafdyn::relax::Limit;
 use leafdyn::study::{Base, Trace, TraceRequest, trace};
 
 use crate::{base, path};
@@ -31,10 +32,12 @@ pub fn request(base: Base, vary: &str, tolerance: f64, most_points: usize) -> Tr
         base,
         vary: vary.parse().unwrap(),
         switch: false,
+        until: None,
         keep_unstable: true,
         segments: None,
         tolerance: Some(tolerance),
         most_points,
+        limit: Limit::default(),
     }
 }
 

@@ -279,10 +279,12 @@ impl Open {
             base: self.fixed(Some(&vary.keys))?,
             vary,
             switch: false,
+            until: None,
             keep_unstable: false,
             segments: None,
             tolerance: Some(TOLERANCE),
             most_points: MOST_POINTS,
+            limit: Limit::default(),
         };
         let given = self
             .values

@@ -14,7 +14,7 @@ use crate::figure::small::SmallPanels;
 use crate::figure::veins::{Veins, longest};
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::{branch_end, stable_or_index};
-use crate::report::{error_location, slope_unit};
+use crate::report::{error_location, passes_crossings, slope_unit};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
@@ -279,7 +279,11 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
     let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
     if critical().any(|point| !folds(point)) {
-        key.marker(page, "branches cross", "", Marker::Diamond, INK);
+        let how = match passes_crossings(trace) {
+            true => "--switch follows them",
+            false => "",
+        };
+        key.marker(page, "branches cross", how, Marker::Diamond, INK);
     }
     if critical().any(folds) {
         key.marker(page, "fold", "", Marker::Ring, INK);

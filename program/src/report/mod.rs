@@ -30,7 +30,9 @@ pub use centerlines::{centerlines, modes_table, sensitivity_table};
 pub use chart::{chart_table, scaling_table};
 pub use fit::{fitted, table as fit_table};
 pub use map::{MapWork, lines, map_table, read_rows, table};
-pub use trace::{boundary_table, error_location, is_special, sides, slope_unit, trace_table};
+pub use trace::{
+    boundary_table, error_location, is_special, passes_crossings, sides, slope_unit, trace_table,
+};
 
 /// A result with a report: labelled lines under a heading.
 pub trait Reported {

@@ -66,8 +66,40 @@ impl Reported for Trace {
 
     fn remarks(&self) -> Lines {
         let remark = labelled("remark", self.remark.clone());
-        [remark, labelled("doubtful", self.doubts.clone())].concat()
+        let advice = labelled("advice", advice(self));
+        [remark, labelled("doubtful", self.doubts.clone()), advice].concat()
     }
+}
+
+/// So many losses of stability along a branch suggest that it goes on for ever.
+const MANY_LOSSES: usize = 3;
+
+/// Options with which a trace tells more, or less.
+fn advice(trace: &Trace) -> Vec<String> {
+    let mut advice = Vec::new();
+    if passes_crossings(trace) {
+        advice.push("branches cross here that are not followed: --switch follows them".into());
+    }
+    if trace.until.is_none() {
+        let losses = trace.branches.iter().map(TraceBranch::destabilizations);
+        let first = losses
+            .enumerate()
+            .find(|(_, losses)| *losses >= MANY_LOSSES);
+        advice.extend(first.map(|(branch, losses)| {
+            let branch = branch + 1;
+            format!(
+                "branch {branch} loses its stability {losses} times: --until unstable ends branches \
+                 where they do"
+            )
+        }));
+    }
+    advice
+}
+
+/// Whether other branches cross those of a trace, and were not to be followed.
+pub fn passes_crossings(trace: &Trace) -> bool {
+    let mut critical = trace.branches.iter().flat_map(TraceBranch::critical);
+    !trace.switch && critical.any(|(_, point)| point.kind != PointKind::Fold)
 }
 
 /// How a branch ended, its ends and its critical points.
@@ -282,6 +314,8 @@ fn curve_end(end: &End) -> &'static str {
         End::Closed => "closed",
         End::Met => "on a curve above",
         End::MostPoints | End::Enough => "goes on: allow more points",
+        End::Unstable => "loses its stability",
+        End::Stopped | End::Stuck(Stuck::Stopped) => "goes on: stopped",
         End::Stuck(Stuck::Unfolded) => {
             "the second number breaks the symmetry by which branches cross"
         }

@@ -91,6 +91,8 @@ pub fn branch_end(end: &End) -> &'static str {
         End::Closed => "closed",
         End::Met => "met",
         End::MostPoints | End::Enough => "goes on",
+        End::Unstable => "ends: loses its stability",
+        End::Stopped | End::Stuck(Stuck::Stopped) => "goes on: stopped",
         End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
         End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
         End::Stuck(_) => "lost",

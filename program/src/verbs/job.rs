@@ -4,16 +4,18 @@ use std::any::Any;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 use crate::files::{self, Document, Selection, Written};
 use crate::live;
 use crate::report::table::list_files;
 use crate::report::{Refused, Reported, json};
+use leafdyn::relax::Limit;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::Base;
 
 use super::progress::ProgressLine;
-use super::{Refusal, Status, note};
+use super::{INTERRUPTED, Refusal, Status, note};
 
 /// One scenario of a request, and where its files go.
 pub struct Job {
@@ -32,6 +34,8 @@ pub struct Job {
     pub(super) source: String,
     /// Whether several run in parallel.
     pub(super) parallel: bool,
+    /// When the run ends with what it has found: at Ctrl-C, if that is of use.
+    pub limit: Limit,
 }
 
 /// The lines that list files, or why these could not be written.
@@ -79,9 +83,19 @@ impl Job {
         }
     }
 
-    /// A result with its input.
+    /// Whether Ctrl-C has ended the run.
+    pub fn is_interrupted(&self) -> bool {
+        let cancel = self.limit.cancel.as_ref();
+        cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+    }
+
+    /// A result with its input; of a run that Ctrl-C has ended it says so.
     pub fn document<'a, R>(&'a self, result: &'a R) -> Document<'a, R> {
-        Document::new(result, &self.scenario, Some(&self.source))
+        let mut document = Document::new(result, &self.scenario, Some(&self.source));
+        let status = Status::Interrupted as i32;
+        let interrupted = self.is_interrupted();
+        document.refused = interrupted.then(|| Refused::new(INTERRUPTED, status));
+        document
     }
 
     /// Writes the files of a result; returns the line that lists them, if there are any.
@@ -137,7 +151,9 @@ impl Job {
         let mut json = Vec::new();
         if self.json || !self.single {
             let mut document = self.document(result);
-            document.refused = error.as_deref().map(|error| Refused::new(error, 2));
+            if let Some(error) = &error {
+                document.refused = Some(Refused::new(error, Status::Refused as i32));
+            }
             json::write(&document, &mut json)?;
         }
         let report = match self.json {
@@ -145,7 +161,10 @@ impl Job {
             false => report.report(&self.scenario.units, files, self.verbose),
         };
         Ok(Delivered {
-            status: Status::of(success),
+            status: match self.is_interrupted() {
+                true => Status::Interrupted,
+                false => Status::of(success),
+            },
             report,
             json,
             error,

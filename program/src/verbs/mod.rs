@@ -19,7 +19,9 @@ use std::io::{self, IsTerminal, Write};
 use std::iter::successors;
 use std::process::{self, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
@@ -27,7 +29,7 @@ use clap::{Parser, Subcommand};
 use crate::files::{self, Checkpointer};
 use crate::report::{FileError, Refused, json, numbers::brief};
 use leafdyn::memory::TooMuch;
-use leafdyn::relax::RefusedOption;
+use leafdyn::relax::{Limit, RefusedOption};
 use leafdyn::scenario::{ScenarioError, printable};
 
 /// What the program says without a verb.
@@ -133,7 +135,16 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
     };
     let interrupted = stop_at_once_on_interrupt();
     let status = interrupted.and_then(|()| command_line.run());
-    status.unwrap_or_else(|refusal| refuse(&refusal.to_string(), json)) as u8
+    status.unwrap_or_else(|refusal| match Status::of_refusal(&refusal) {
+        Status::Interrupted => {
+            note(&refusal.to_string());
+            if json {
+                show_refused(&refusal.to_string(), Status::Interrupted as i32);
+            }
+            Status::Interrupted
+        }
+        _ => refuse(&refusal.to_string(), json),
+    }) as u8
 }
 
 /// Whether standard output is JSON.
@@ -188,6 +199,9 @@ enum Status {
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,
+    /// Ctrl-C ended the run: 128 and the number of the signal. What was found until then is
+    /// written, if it is of use.
+    Interrupted = 130,
 }
 
 impl Status {
@@ -197,13 +211,31 @@ impl Status {
             false => Status::Failure,
         }
     }
+
+    /// That of a run that ended with this refusal.
+    fn of_refusal(refusal: &Refusal) -> Self {
+        match cause::<Interrupted>(refusal) {
+            Some(_) => Status::Interrupted,
+            None => Status::Refused,
+        }
+    }
 }
 
-/// Status of a run ended by Ctrl-C: 128 and the number of the signal.
-const INTERRUPTED: i32 = 130;
+/// Ctrl-C ended a run that has found nothing of use.
+#[derive(Debug, thiserror::Error)]
+#[error("{INTERRUPTED}: {0}")]
+struct Interrupted(&'static str);
 
-/// What a run that can be continued does when the process is stopped.
+/// What is told of a run that Ctrl-C ended.
+const INTERRUPTED: &str = "stopped by Ctrl-C";
+
+/// Time after Ctrl-C in which a run ends by itself, with what it has found.
+const GRACE: Duration = Duration::from_secs(10);
+
+/// What a run does when the process is stopped, if more than to end at once.
 enum OnInterrupt {
+    /// It ends with what it has found, once this is `true`.
+    Finish(Arc<AtomicBool>),
     /// A simulation writes a checkpoint.
     Write(Checkpointer),
     /// What is finished is on disk: how to go on.
@@ -212,31 +244,63 @@ enum OnInterrupt {
 
 static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
 
-/// Makes Ctrl-C end the process at once, without half-written files and with a
-/// checkpoint of a simulation.
+/// Makes Ctrl-C end the process at once, without half-written files and with a checkpoint of a
+/// simulation; or, where a part of a result is of use, with that.
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
-        let (kept, goes_on) = match on_interrupt().as_ref() {
-            Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
-            Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
-            None => (None, None),
-        };
-        files::abandon_unfinished();
-        if io::stderr().is_terminal() {
-            // Clears the progress line.
-            let _ = write!(io::stderr(), "\r\x1b[2K");
+        if let Some(OnInterrupt::Finish(cancel)) = on_interrupt().as_ref()
+            && !cancel.swap(true, Ordering::Relaxed)
+        {
+            clear_progress_line();
+            note("stopping with what was found so far; Ctrl-C again: at once, without it");
+            thread::spawn(|| {
+                thread::sleep(GRACE);
+                end_now();
+            });
+            return;
         }
-        goes_on.iter().for_each(|how| note(how));
-        let status = match kept {
-            Some(kept) if !show_checkpoint(&kept) => Status::Refused as i32,
-            _ => INTERRUPTED,
-        };
-        if JSON.load(Ordering::Relaxed) {
-            show_refused("stopped by Ctrl-C", status);
-        }
-        process::exit(status);
+        end_now();
     })?;
     Ok(())
+}
+
+/// Ends the process after Ctrl-C, and says what is kept.
+fn end_now() -> ! {
+    let (kept, told) = match on_interrupt().as_ref() {
+        Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
+        Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
+        Some(OnInterrupt::Finish(_)) | None => (None, Some(format!("{INTERRUPTED}: {UNKEPT}"))),
+    };
+    files::abandon_unfinished();
+    clear_progress_line();
+    told.iter().for_each(|told| note(told));
+    let status = match kept {
+        Some(kept) if !show_checkpoint(&kept) => Status::Refused,
+        _ => Status::Interrupted,
+    };
+    if JSON.load(Ordering::Relaxed) {
+        show_refused(INTERRUPTED, status as i32);
+    }
+    process::exit(status as i32);
+}
+
+/// What is told where nothing of an unfinished result is kept.
+const UNKEPT: &str = "nothing of an unfinished result is kept";
+
+fn clear_progress_line() {
+    if io::stderr().is_terminal() {
+        let _ = write!(io::stderr(), "\r\x1b[2K");
+    }
+}
+
+/// The limit of a run that ends with what it has found when the process is stopped.
+fn limit_until_interrupt() -> Limit {
+    let cancel = Arc::new(AtomicBool::new(false));
+    *on_interrupt() = Some(OnInterrupt::Finish(cancel.clone()));
+    Limit {
+        cancel: Some(cancel),
+        ..Limit::default()
+    }
 }
 
 /// What Ctrl-C does from now on.

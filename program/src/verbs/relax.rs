@@ -4,11 +4,11 @@ use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, fraction_of};
 use super::request::{Request, VerbTraits, words};
-use super::{Refusal, Status};
+use super::{Interrupted, Refusal, Status};
 use crate::files::{Kind, LIVE};
 use crate::report::numbers::brief;
 use clap::Args;
-use leafdyn::relax::{self, Equilibrium, Method, Options, Outcome, Route, Settings};
+use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
 use leafdyn::study::{self, Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
 
 /// Eigenvalues that are reported by default.
@@ -89,6 +89,7 @@ impl Relax {
             varies: !self.sensitivity.is_empty(),
             stations: true,
             parallel: true,
+            partial: self.all || self.margin,
             reads: &[],
             puts: None,
         };
@@ -104,6 +105,9 @@ impl Relax {
             false => None,
         };
         let equilibrium = self.solve(job)?;
+        if job.is_interrupted() && !equilibrium.outcome.is_at_rest() {
+            return Err(Interrupted("the leaf is not at rest").into());
+        }
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.remark(equilibrium.remark.as_ref());
         for doubt in &equilibrium.doubts {
@@ -141,6 +145,7 @@ impl Relax {
             modes: self.modes.unwrap_or(DEFAULT_MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
             every_node: true,
+            limit: job.limit.clone(),
             stations: job.selection.stations,
             ..Options::default()
         };
@@ -185,7 +190,7 @@ impl Relax {
             &job.scenario,
             how,
             self.request.tolerance,
-            &relax::Limit::default(),
+            &job.limit,
             &mut |starts, found| {
                 if found > known {
                     (known, last_new) = (found, starts);
@@ -196,6 +201,9 @@ impl Relax {
             },
         )?;
         drop(line);
+        if job.is_interrupted() && all.found.is_empty() {
+            return Err(Interrupted("no equilibrium was found").into());
+        }
         for found in &mut all.found {
             let leaf = found.equilibrium.clone();
             found.equilibrium = leaf.at_stations(&job.scenario, job.selection.stations);

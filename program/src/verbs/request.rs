@@ -16,13 +16,17 @@ use crate::files::{self, Kind, Selection, Written};
 use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, json};
 use leafdyn::memory;
+use leafdyn::relax::Limit;
 use leafdyn::scenario::{Entries, Place, ScenarioError, printable};
 use leafdyn::study::{Base, UnknownWord};
 
 use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job, attempt};
 use super::progress::{ProgressLine, fraction_of};
-use super::{Refusal, Status, cause, name_options, note, refuse, show, show_report};
+use super::{
+    INTERRUPTED, Interrupted, Refusal, Status, cause, limit_until_interrupt, name_options, note,
+    refuse, show, show_report,
+};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -105,6 +109,9 @@ pub struct VerbTraits<'f> {
     /// Whether scenarios run in parallel; otherwise one after the other, each on all
     /// cores.
     pub parallel: bool,
+    /// Whether a part of a result, as it is known at Ctrl-C, is of use; of several scenarios those
+    /// that are finished are.
+    pub partial: bool,
     /// Files that it reads besides its scenarios.
     pub reads: &'f [PathBuf],
     /// The option besides --set that puts values into its scenarios.
@@ -121,7 +128,11 @@ impl Request {
         self.memory.into_iter().for_each(memory::allow);
         let selection = self.selection::<R>(traits)?;
         self.check_scenarios::<R>(traits, &selection)?;
-        let job = |file: &Path| self.open::<R>(file, traits, &selection);
+        let limit = match traits.partial || !self.single() {
+            true => limit_until_interrupt(),
+            false => Limit::default(),
+        };
+        let job = |file: &Path| self.open::<R>(file, traits, (&selection, &limit));
         if let [file] = self.scenarios.as_slice() {
             let done = attempt(&job(file)?, &run);
             let done = done.map_err(|refusal| self.as_typed(traits, refusal))?;
@@ -147,9 +158,15 @@ impl Request {
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
             let done = job.and_then(|job| {
+                if job.is_interrupted() {
+                    return Err(Interrupted("before this scenario was begun").into());
+                }
                 attempt(&job, &run).map_err(|refusal| self.as_typed(traits, refusal))
             });
-            let done = done.map_err(|refusal| name_options(refusal).to_string());
+            let done = done.map_err(|refusal| {
+                let status = Status::of_refusal(&refusal);
+                (name_options(refusal).to_string(), status)
+            });
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
                 let all = self.scenarios.len();
@@ -219,10 +236,11 @@ impl Request {
     fn finish<R: Written>(
         &self,
         selection: &Selection,
-        all: Vec<Result<Delivered, String>>,
+        all: Vec<Result<Delivered, (String, Status)>>,
     ) -> Result<Status, Refusal> {
         let mut status = Status::Success;
         let (mut documents, mut errors) = (Vec::new(), Vec::new());
+        let mut unsolved = 0;
         for (done, file) in all.into_iter().zip(&self.scenarios) {
             let (this, error, json) = match done {
                 Ok(done) => {
@@ -231,19 +249,29 @@ impl Request {
                     }
                     (done.status, done.error, done.json)
                 }
-                Err(error) => {
+                Err((error, this)) => {
                     let mut json = Vec::new();
-                    json::write(&Refused::new(&error, 2), &mut json)?;
-                    (Status::Refused, Some(error), json)
+                    json::write(&Refused::new(&error, this as i32), &mut json)?;
+                    unsolved += usize::from(this == Status::Interrupted);
+                    let told = (this != Status::Interrupted).then_some(error);
+                    (this, told, json)
                 }
             };
-            let refused = error.is_some();
+            status = status.max(this);
+            if error.is_some() {
+                status = status.max(Status::Refused);
+            }
             errors.extend(error);
-            status = status.max(if refused { Status::Refused } else { this });
             documents.push((file.display().to_string(), this as i32, json));
         }
         for error in errors {
             note(&format!("error: {error}"));
+        }
+        if unsolved > 0 {
+            let count = self.scenarios.len();
+            note(&format!(
+                "{INTERRUPTED}: {unsolved} of {count} scenarios are not solved"
+            ));
         }
         if selection.kinds.contains(&Kind::Csv) {
             let (out, name) = self.table::<R>();
@@ -287,7 +315,7 @@ impl Request {
         &self,
         path: &Path,
         traits: VerbTraits,
-        selection: &Selection,
+        (selection, limit): (&Selection, &Limit),
     ) -> Result<Job, Refusal> {
         let (file, text) = match path.to_str() {
             Some("-") => ("standard input".into(), standard_input()?),
@@ -332,6 +360,7 @@ impl Request {
             file,
             source,
             parallel: traits.parallel && !self.single(),
+            limit: limit.clone(),
         })
     }
 

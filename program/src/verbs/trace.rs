@@ -2,19 +2,19 @@
 
 use super::job::{Delivered, Job};
 use super::progress::fraction_between;
-use super::request::{Request, VerbTraits};
-use super::{Refusal, Status};
+use super::request::{Request, VerbTraits, words};
+use super::{Interrupted, Refusal, Status};
 use crate::report::numbers::brief;
 use clap::Args;
 use leafdyn::study::{
     self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest,
-    TraceShow, Vary,
+    TraceShow, TraceUntil, Vary,
 };
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.
 ///
-/// Exit status: 0 all branches, or curves, are followed to an end of a range or in a
-/// circle; 1 not (the files are still written and say how far); 2 the request
+/// Exit status: 0 all branches, or curves, are followed to an end of a range, in a
+/// circle, or to where --until ends them; 1 not (the files are still written and say how far); 2 the request
 /// was refused.
 #[derive(Debug, Args)]
 pub struct Trace {
@@ -28,6 +28,10 @@ pub struct Trace {
     /// Also follow the branches that cross
     #[arg(long)]
     switch: bool,
+
+    /// What ends a branch before the end of the range: the loss of its stability (where it is unstable from its beginning: of one more direction)
+    #[arg(long, value_name = "WHAT", value_parser = words::<TraceUntil>([TraceUntil::Unstable.word()]))]
+    until: Option<TraceUntil>,
 
     /// Go to the first equilibrium by Newton's method, stable or not
     #[arg(long)]
@@ -55,6 +59,7 @@ impl Trace {
         let traits = VerbTraits {
             varies: true,
             puts: Some("--vary"),
+            partial: true,
             ..VerbTraits::default()
         };
         match self.vary.as_slice() {
@@ -81,10 +86,12 @@ impl Trace {
             base: job.base.clone(),
             vary: vary.clone(),
             switch: self.switch,
+            until: self.until,
             keep_unstable: self.keep_unstable,
             segments: self.segments,
             tolerance: self.request.tolerance,
             most_points: self.points,
+            limit: job.limit.clone(),
         }
     }
 
@@ -119,6 +126,9 @@ impl Trace {
         })
         .map_err(name_option)?;
         drop(line);
+        if job.is_interrupted() && boundary.curves.is_empty() {
+            return Err(Interrupted("no curve was found").into());
+        }
         job.remark(boundary.remark.as_ref());
         boundary
             .doubts
@@ -160,6 +170,9 @@ impl Trace {
         })
         .map_err(name_option)?;
         drop(line);
+        if job.is_interrupted() && trace.branches.iter().all(|branch| branch.points.is_empty()) {
+            return Err(Interrupted("no point was found").into());
+        }
         trace.show.clone_from(&self.show);
         job.remark(trace.remark.as_ref());
         trace

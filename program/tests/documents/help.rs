@@ -8,7 +8,7 @@ const OPTIONS: &str = "
     simulate => --tolerance --set --out --json --method explicit semi-implicit --segments --step --resume
     chart => --seconds --methods --peers --rods --tolerance --set --out --json shooting-from-rest
     map => --vary --methods --cell-seconds --shard --show --tolerance --set --out --json
-    trace => --vary --switch --keep-unstable --segments --points --tolerance --set --out --json
+    trace => --vary --switch --until --keep-unstable --segments --points --tolerance --set --out --json
 ";
 
 const STATUSES: &str = "

@@ -2,6 +2,7 @@
 
 mod dynamics;
 mod ends;
+mod interrupts;
 mod mutations;
 mod options;
 mod overrides;

@@ -250,3 +250,28 @@ fn a_spiral_is_wound_up_until_no_grid_resolves_it() {
     let last = branch["last"]["value"].number();
     assert!((last - 819.2).abs() < 1.0, "{last}");
 }
+
+/// Where branches cross that are not followed, and where stability is lost again and again, report
+/// and figure say which option helps; with it they do not.
+#[test]
+fn options_that_help_are_told() {
+    let place = Workplace::new();
+    let column =
+        "trace scenarios/classic/elastica_buckled.toml --vary load.tip_force[0]=-1..-60 --out c";
+    let [crossings, losses] = ["--switch follows them", "--until unstable ends branches"];
+    let run = place
+        .run(column)
+        .ends(0)
+        .says(&[crossings, losses, "3 times"]);
+    contains(&place.picture("c/trace"), &[crossings]);
+    assert!(!run.out.contains("doubtful"));
+    let run = place
+        .run(format!("{column} --switch --until unstable"))
+        .ends(0);
+    let told = [crossings, losses].map(|it| run.out.contains(it));
+    assert_eq!(told, [false, false], "{}", run.out);
+    assert!(!place.picture("c/trace").contains("--switch"));
+    let trace = place.json("c/trace.json");
+    assert_eq!(trace["branches"][0]["end"], "unstable");
+    assert_eq!(trace["branches"].list().len(), 3);
+}

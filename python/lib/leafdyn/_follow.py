@@ -21,6 +21,7 @@ def trace(
     *,
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
+    until: str | None = None,
     keep_unstable: bool = False,
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
@@ -36,6 +37,7 @@ def trace(
     *,
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
+    until: str | None = None,
     keep_unstable: bool = False,
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
@@ -51,6 +53,7 @@ def trace(
     *,
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
+    until: str | None = None,
     keep_unstable: bool = False,
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
@@ -65,6 +68,7 @@ def trace(
     *,
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
+    until: str | None = None,
     keep_unstable: bool = False,
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
@@ -84,6 +88,9 @@ def trace(
         other. Of two numbers, in a list or the dict: see `boundary`.
     switch
         Also follow the branches that cross.
+    until
+        ``"unstable"`` ends a branch where it loses its stability; one that is unstable from its beginning, where it
+        becomes unstable in one more direction. Of two numbers: of the first trace.
     points
         Most points of a branch, or of a curve to either side.
 
@@ -120,10 +127,10 @@ def trace(
     found: Trace | Boundary
     if len(given) == 2:
         found = _boundary(
-            scenario, given[0], given[1], set, switch, keep_unstable, segments, tolerance, points, progress
+            scenario, given[0], given[1], set, switch, until, keep_unstable, segments, tolerance, points, progress
         )
     else:
-        leaf, asked = _followed(scenario, set, switch, keep_unstable, segments, tolerance, points)
+        leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
         with reporter(progress) as heard:
             found = Trace(*_leafdyn.trace(leaf._core, given[0], asked, heard))
     warn(found.name, found.remark)
@@ -136,6 +143,7 @@ def boundary(
     *,
     set: Mapping[str, Any] | None = None,
     switch: bool = False,
+    until: str | None = None,
     keep_unstable: bool = False,
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
@@ -190,7 +198,7 @@ def boundary(
     both = ranges(vary, lambda: checked(scenario, set).units)
     if isinstance(vary, str) or len(both) != 2:
         raise ValueError(f"vary has {len(both)} number{'s' * (len(both) != 1)}: give two, in a dict or a list")
-    found = _boundary(scenario, both[0], both[1], set, switch, keep_unstable, segments, tolerance, points, progress)
+    found = _boundary(scenario, both[0], both[1], set, switch, until, keep_unstable, segments, tolerance, points, progress)
     warn(found.name, found.remark)
     return found
 
@@ -201,13 +209,14 @@ def _boundary(
     across: Given,
     set: Mapping[str, Any] | None,
     switch: bool,
+    until: str | None,
     keep_unstable: bool,
     segments: SupportsIndex | None,
     tolerance: float | None,
     points: SupportsIndex | None,
     progress: Progress,
 ) -> Boundary:
-    leaf, asked = _followed(scenario, set, switch, keep_unstable, segments, tolerance, points)
+    leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
     with reporter(progress) as heard:
         return Boundary(*_leafdyn.boundary(leaf._core, along, across, asked, heard))
 
@@ -216,6 +225,7 @@ def _followed(
     scenario: Source,
     set: Mapping[str, Any] | None,
     switch: bool,
+    until: str | None,
     keep_unstable: bool,
     segments: SupportsIndex | None,
     tolerance: float | None,
@@ -227,6 +237,7 @@ def _followed(
     switches(switch=switch, keep_unstable=keep_unstable)
     asked = {
         "switch": switch,
+        "until": until,
         "keep_unstable": keep_unstable,
         "segments": segments,
         "tolerance": tolerance,

@@ -105,6 +105,9 @@ impl<'a, 'h> Walk<'a, 'h> {
             if cancelled() {
                 return End::Closed;
             }
+            if self.plane.limit.reached() {
+                return End::Stopped;
+            }
             // The next points are computed while the previous ones are verified, in parallel.
             let (plane, accuracy, grid) = (self.plane, self.how.accuracy, manifold.grid().clone());
             let new = self.steps[self.verified.len()..].to_vec();

@@ -60,6 +60,7 @@ impl<const N: usize> Equations<'_, N> {
         let mut corrected =
             !exactly && self.leaves.at(solution.params)?.least_compliance() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
+            self.check_limit()?;
             let rates = match rates {
                 Some(rates) => rates.to_vec(),
                 None => self.rates(&solution, finished)?,

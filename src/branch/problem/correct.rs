@@ -178,6 +178,7 @@ impl Equations<'_> {
         let mut previous = f64::INFINITY;
         let mut progress = None;
         for iterations in 1.. {
+            self.check_limit()?;
             let rates = self.rates(&now, false)?;
             let linear = self.assemble(&mut now, false)?;
             let CorrectorStep {

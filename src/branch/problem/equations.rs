@@ -74,6 +74,14 @@ impl<'a, const N: usize> Equations<'a, N> {
         }
     }
 
+    /// Fails once the limit of the run is reached.
+    pub(in crate::branch) fn check_limit(&self) -> Result<(), Stuck> {
+        match self.leaves.family.limit.reached() {
+            true => Err(Stuck::Stopped),
+            false => Ok(()),
+        }
+    }
+
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
         Equations::of(self.leaves.refined())

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::branch::problem::cache::{LruCache, Patterns};
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State, System};
+use crate::limit::Limit;
 use crate::scenario::Scenario;
 
 /// Up to this stiffness in stretch and shear, in units of A/L^2, the matrix is that of the leaf:
@@ -39,6 +40,8 @@ pub struct Family<'a, const N: usize = 1> {
     coupled: Leaf,
     /// Sparsity patterns of their matrices.
     pub patterns: Arc<Patterns>,
+    /// When branches of these leaves are followed no further: every Newton iteration checks it.
+    pub limit: Limit,
 }
 
 /// The range of a parameter.
@@ -106,6 +109,7 @@ impl<'a> Family<'a, 2> {
         let family = Family::of(make, [Range { ends, log }], self.scale(), [[0.0], [1.0]])?;
         Ok(Family {
             patterns: self.patterns.clone(),
+            limit: self.limit.clone(),
             ..family
         })
     }
@@ -133,7 +137,13 @@ impl<'a, const N: usize> Family<'a, N> {
             coupled: coupled.unwrap_or(&ends[1]).clone(),
             first: ends[0].clone(),
             patterns: Arc::default(),
+            limit: Limit::default(),
         })
+    }
+
+    /// The same leaves, whose branches are followed until this limit is reached.
+    pub fn with_limit(self, limit: Limit) -> Self {
+        Family { limit, ..self }
     }
 
     /// The units of all its leaves.

@@ -32,6 +32,9 @@ pub enum Stuck {
     /// The second parameter breaks the symmetry to which the branch point is due.
     #[error("the second number breaks the symmetry by which branches cross")]
     Unfolded,
+    /// The limit of the run was reached.
+    #[error("the run was stopped")]
+    Stopped,
 }
 
 impl From<DirectError> for Stuck {

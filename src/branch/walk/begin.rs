@@ -1,12 +1,13 @@
 //! The first points of branches: the equilibrium that a relaxation found, and those beside a
 //! branch point.
 
-use crate::branch::Point;
 use crate::branch::events::critical::Critical;
 use crate::branch::problem::equations::{Equations, Stuck};
 use crate::branch::problem::family::Family;
 use crate::branch::verify::regular::refine;
 use crate::branch::walk::follow::Grids;
+use crate::branch::{Direction, Point};
+use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Grid, System};
 use crate::relax::transfer::prolong::prolong;
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
@@ -23,6 +24,14 @@ const COARSEST: usize = 8;
 
 /// Distances from the branch point at which the other branch is sought, in this order.
 const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+
+/// Where the first of these distances leads out of the range of the parameter, it is shortened by
+/// this factor, fewer times than that.
+const NEARER: f64 = 0.3;
+const NEARER_TRIES: i32 = 8;
+
+/// Fractions of the range by which a point may be beyond an end of it, due to rounding.
+const WITHIN: f64 = 1e-12;
 
 /// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
 /// these `options`; on a grid of at least `segments` segments, or, if none is given, on
@@ -113,24 +122,46 @@ fn search<'a>(
 
 /// The first points of the branches that cross at `critical` in the plane of
 /// the first of its neutral modes, one on either side: as near as possible, but so far from the
-/// branch point that finer grids have them too, with this accuracy of their tips.
+/// branch point that finer grids have them too, with this accuracy of their tips. A side is
+/// missing where its branch leaves the range of the parameter at once.
 pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
     let across = critical.across(equations);
-    let (family, grid) = (equations.leaves.family, equations.grid().clone());
     [across.clone(), across.reversed()]
         .iter()
-        .filter_map(|direction| {
-            let mut nearest = None;
-            for away in AWAY {
-                let Ok(point) = critical.beside(equations, direction, away) else {
-                    continue;
-                };
-                if refine(family, &grid, &point, accuracy).is_ok() {
-                    return Some(point);
-                }
-                nearest = nearest.or(Some(point));
-            }
-            nearest
-        })
+        .filter_map(|direction| first_beside(equations, critical, direction, accuracy))
         .collect()
+}
+
+/// The first point of the branch that leaves a branch point in this direction, within the range.
+fn first_beside(
+    equations: &mut Equations,
+    critical: &Critical,
+    direction: &Direction,
+    accuracy: f64,
+) -> Option<Point> {
+    let (family, grid) = (equations.leaves.family, equations.grid().clone());
+    let mut at = |away: f64| {
+        let point = critical.beside(equations, direction, away).ok()?;
+        let beyond = larger(-point.fraction, point.fraction - 1.0);
+        (beyond <= WITHIN).then_some(point)
+    };
+    let mut nearest = None;
+    for away in AWAY {
+        let Some(point) = at(away) else {
+            if nearest.is_none() && away == AWAY[0] {
+                // Over a short range the parameter changes by more than all of it there.
+                let nearer = (1..NEARER_TRIES).map(|k| away * NEARER.powi(k));
+                let found = nearer.into_iter().find_map(&mut at);
+                if found.is_some() {
+                    return found;
+                }
+            }
+            continue;
+        };
+        if refine(family, &grid, &point, accuracy).is_ok() {
+            return Some(point);
+        }
+        nearest = nearest.or(Some(point));
+    }
+    nearest
 }

@@ -116,6 +116,12 @@ impl<'a> Grids<'a> {
             if known.points.len() > before {
                 tries = 0;
             }
+            if leaves.family.limit.reached() && !(doubt.is_none() && known.branch.is_complete()) {
+                let last = known.points.len().saturating_sub(1);
+                known.branch.truncate_at(last);
+                known.end = End::Stopped;
+                return known;
+            }
             match (doubt, &known.branch.end) {
                 (None, None) => {
                     ahead = (2 * ahead).min(MOST);

@@ -95,6 +95,10 @@ pub enum End {
     MostPoints,
     /// Where the stopping criterion was met.
     Enough,
+    /// Where it loses its stability, as requested.
+    Unstable,
+    /// Where the limit of the run was reached.
+    Stopped,
     /// The step could not be made however short.
     Stuck(Stuck),
     /// The next point is not verified on any grid up to the finest.
@@ -170,6 +174,10 @@ impl Branch {
         progress: &mut dyn FnMut(usize, f64),
     ) {
         while self.end.is_none() && self.points.len() < until.min(how.most) {
+            if equations.leaves.family.limit.reached() {
+                self.end = Some(End::Stopped);
+                return;
+            }
             if how.enough.is_some_and(|enough| enough(&self.points)) {
                 self.end = Some(End::Enough);
                 return;
@@ -196,6 +204,11 @@ impl Branch {
         self.missed.retain(|after| *after < to);
         self.unmet.retain(|after| *after < to);
         self.end = None;
+    }
+
+    /// Whether it ended where a branch is known as far as requested.
+    pub fn is_complete(&self) -> bool {
+        self.end.as_ref().is_some_and(End::complete)
     }
 
     pub fn shorten(&mut self, part: f64) {

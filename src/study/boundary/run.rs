@@ -12,7 +12,7 @@ use crate::branch::boundary::{
     self as curves, Accuracy, AtRest, Neighbour, Plane, Seed, Solution, Verified, WalkOptions,
     beside, coarsened, refine_on_path,
 };
-use crate::branch::{End, Range};
+use crate::branch::{End, Range, Stuck};
 use crate::scenario::Scenario;
 use crate::study::trace::{Trace, TraceError, TraceRequest, traced};
 use crate::study::vary::Vary;
@@ -65,7 +65,8 @@ pub fn boundary(
         log: it.log,
     });
     let plane = Plane::plane(&make, ranges, start);
-    let plane = &plane.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+    let plane = plane.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+    let plane = &plane.with_limit(request.trace.limit.clone());
     let from = [0.0, ranges[1].fraction(start)];
     let mut boundary = without_curves(request, &begun.trace, start);
     let mut run = Run {
@@ -94,9 +95,14 @@ pub fn boundary(
                 params: from,
             },
         };
-        boundary.map = Some(run.map(size, first, &mut boundary));
+        let map = run.map(size, first, &mut boundary);
+        // Cells that were not reached would look like those without an equilibrium.
+        boundary.map = (!plane.limit.reached()).then_some(map);
     }
     add_leaves(plane, &run.known, &mut boundary);
+    if plane.limit.reached() && boundary.remark.is_none() {
+        boundary.remark = Some(Stuck::Stopped.to_string());
+    }
     conclude(&mut boundary, begun.trace.complete);
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(boundary)
@@ -180,6 +186,9 @@ struct Run<'r, 'p> {
 impl Run<'_, '_> {
     /// Follows the curve through a critical point, unless it lies on a known one.
     fn follow_new(&mut self, seed: &Seed, boundary: &mut Boundary) {
+        if self.plane.limit.reached() {
+            return;
+        }
         if self.known.iter().any(|known| seed.is_on(known)) {
             return;
         }

@@ -132,9 +132,13 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
             _ if stable.limit.reached() => Some("the time allowed was over".into()),
             End::Stuck(stuck) => Some(stuck.to_string()),
             End::Unverified(doubt) => Some(doubt.to_string()),
-            End::Closed | End::Returned | End::Met | End::MostPoints | End::Enough => {
-                Some("the branch could not be followed further".into())
-            }
+            End::Closed
+            | End::Returned
+            | End::Met
+            | End::MostPoints
+            | End::Enough
+            | End::Unstable
+            | End::Stopped => Some("the branch could not be followed further".into()),
         },
         ..unknown
     }

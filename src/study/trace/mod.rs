@@ -12,10 +12,12 @@ pub use run::{trace, trace_through};
 pub use show::TraceShow;
 
 use super::vary::{Base, Vary};
+use crate::limit::Limit;
 use crate::refusal::RefusedOption;
 use crate::relax::{RelaxError, without_wind};
 use crate::scenario::Key;
-use crate::study::{Target, VaryError};
+use crate::study::{Target, UnknownWord, VaryError};
+use std::str::FromStr;
 
 /// Largest number of branches of a trace.
 pub const MOST_BRANCHES: usize = 24;
@@ -33,6 +35,8 @@ pub struct TraceRequest {
     pub vary: Vary,
     /// Whether to follow crossing branches as well.
     pub switch: bool,
+    /// What ends a branch before the end of the range, if anything.
+    pub until: Option<TraceUntil>,
     /// Whether to take the first equilibrium from Newton's method, stable or not.
     pub keep_unstable: bool,
     /// The grid on which the branch is followed; default: twice as fine as the
@@ -42,6 +46,38 @@ pub struct TraceRequest {
     pub tolerance: Option<f64>,
     /// Largest number of points of a branch.
     pub most_points: usize,
+    /// When the run ends; what is known of the branches then is its result.
+    pub limit: Limit,
+}
+
+/// What ends a branch before the end of the range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraceUntil {
+    /// The loss of its stability; a branch that is unstable from its beginning ends where it
+    /// becomes unstable in one more direction: where its Morse index grows.
+    Unstable,
+}
+
+impl TraceUntil {
+    /// The word on the command line and in Python.
+    pub fn word(self) -> &'static str {
+        match self {
+            TraceUntil::Unstable => "unstable",
+        }
+    }
+}
+
+impl FromStr for TraceUntil {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let allowed = [TraceUntil::Unstable];
+        let found = allowed.into_iter().find(|it| it.word() == text);
+        found.ok_or_else(|| UnknownWord {
+            found: text.into(),
+            allowed: allowed.map(TraceUntil::word).into(),
+        })
+    }
 }
 
 /// Why a trace cannot be made.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
+use super::TraceUntil;
 use super::law::Law;
 use super::show::TraceShow;
 use crate::branch::{Doubt, End, Stuck};
@@ -45,6 +46,12 @@ pub struct Trace {
     pub segments: usize,
     /// Required accuracy of the tips, relative to the longest rod.
     pub tolerance: f64,
+    /// Whether branches that cross were followed as well.
+    #[serde(skip)]
+    pub switch: bool,
+    /// What was to end branches before the end of the range.
+    #[serde(skip)]
+    pub until: Option<TraceUntil>,
     /// Whether there are branches, and all are known as far as requested.
     pub complete: bool,
     /// Why there is no branch, or fewer than there are.
@@ -173,6 +180,8 @@ impl End {
             End::Closed => "closed",
             End::Met => "met",
             End::MostPoints | End::Enough => "most-points",
+            End::Unstable => "unstable",
+            End::Stopped | End::Stuck(Stuck::Stopped) => "stopped",
             End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
             End::Stuck(Stuck::Unresolved) => "unresolved",
             End::Stuck(Stuck::Unfolded) => "unfolds",
@@ -184,13 +193,22 @@ impl End {
 
     /// Whether the branch is known as far as requested.
     pub fn complete(&self) -> bool {
-        matches!(self, End::Reached | End::Returned | End::Closed | End::Met)
+        matches!(
+            self,
+            End::Reached | End::Returned | End::Closed | End::Met | End::Unstable
+        )
     }
 
     /// Why an incomplete branch stopped, and what may help.
     pub(super) fn remark(&self) -> Option<String> {
         match self {
-            End::Reached | End::Returned | End::Closed | End::Met => None,
+            // Of a stopped run the trace says so.
+            End::Reached
+            | End::Returned
+            | End::Closed
+            | End::Met
+            | End::Unstable
+            | End::Stopped => None,
             End::MostPoints | End::Enough => Some("there are more points: allow more".into()),
             End::Stuck(stuck) => Some(stuck.to_string()),
             End::Unverified(Doubt::Inaccurate) => {
@@ -208,6 +226,18 @@ impl Serialize for End {
 }
 
 impl TraceBranch {
+    /// How often its Morse index grows along it: at a critical point, or between two points.
+    pub fn destabilizations(&self) -> usize {
+        let pairs = self.points.windows(2);
+        pairs.filter(|pair| pair[1].index > pair[0].index).count()
+    }
+
+    /// Adds sentences to its remark.
+    pub(super) fn add_remarks(&mut self, more: Vec<String>) {
+        let all: Vec<String> = self.remark.take().into_iter().chain(more).collect();
+        self.remark = (!all.is_empty()).then(|| all.join("; "));
+    }
+
     /// Its critical points, with their indices.
     pub fn critical(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
         let points = self.points.iter().enumerate();

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};
-use super::{MOST_BRANCHES, TraceError, TraceRequest};
+use super::{MOST_BRANCHES, TraceError, TraceRequest, TraceUntil};
 use crate::branch::{
-    Critical, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch,
+    Critical, End, Family, Followed, Grids, Kind, Point, Range, Refined, Walk, begin, switch,
 };
 use crate::leaf::Grid;
 use crate::memory;
@@ -83,15 +83,18 @@ fn traced_from(
     }
     let family = Family::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
+    let family = family.with_limit(request.limit.clone());
     let value = given.map_or(ends[0], |(_, value)| value);
     let scenario = request.base.at(&[(keys, value)])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
     let last = request.base.at(&[(keys, ends[1])])?.scenario;
     let leaning = total_load(&last) - total_load(&scenario);
-    let keep_unstable = request.keep_unstable;
     let (rest, options) = match given {
-        Some((leaf, _)) => (leaf.clone(), options((tolerance, leaning), keep_unstable)),
-        None => first_equilibrium(&scenario, (tolerance, leaning), keep_unstable)?,
+        Some((leaf, _)) => {
+            let options = options(request, (tolerance, leaning), request.keep_unstable);
+            (leaf.clone(), options)
+        }
+        None => first_equilibrium(request, &scenario, (tolerance, leaning))?,
     };
     let fraction = Range {
         ends,
@@ -113,6 +116,8 @@ fn traced_from(
         joined: scenario.joined,
         segments: wanted.unwrap_or(2 * (rest.shape.stations.len() - 1)),
         tolerance,
+        switch: request.switch,
+        until: request.until,
         complete: false,
         remark: None,
         doubts: slips(&scenario),
@@ -137,6 +142,7 @@ fn traced_from(
                 tolerance,
                 first: None,
                 critical: Vec::new(),
+                untried: false,
                 progress,
             };
             run.follow_all(point, given.is_some(), &mut trace);
@@ -167,22 +173,27 @@ fn total_load(scenario: &Scenario) -> DVec3 {
 /// The equilibrium at the start of the range, from Newton's method if it may be unstable, and how
 /// it was found. Where it may turn to either side it turns to that to which the range pushes.
 fn first_equilibrium(
+    request: &TraceRequest,
     scenario: &Scenario,
     (tolerance, leaning): (f64, DVec3),
-    keep_unstable: bool,
 ) -> Result<(Equilibrium, Options), RelaxError> {
-    let wanted = options((tolerance, leaning), keep_unstable);
+    let wanted = options(request, (tolerance, leaning), request.keep_unstable);
     let mut rest = relax(scenario, &wanted, &mut |_| {})?;
-    if keep_unstable && !rest.outcome.is_at_rest() {
+    if request.keep_unstable && !rest.outcome.is_at_rest() {
         // Newton's method leads nowhere from this start.
-        let stable = options((tolerance, leaning), false);
+        let stable = options(request, (tolerance, leaning), false);
         rest = relax(scenario, &stable, &mut |_| {})?;
     }
     Ok((rest, wanted))
 }
 
-fn options((tolerance, leaning): (f64, DVec3), keep_unstable: bool) -> Options {
+fn options(
+    request: &TraceRequest,
+    (tolerance, leaning): (f64, DVec3),
+    keep_unstable: bool,
+) -> Options {
     Options {
+        limit: request.limit.clone(),
         tolerance: Some(tolerance),
         leaning,
         method: SemiImplicit {
@@ -233,6 +244,8 @@ struct Run<'r, 'p> {
     /// As in [`Traced`], so far.
     first: Option<(Point, Grid)>,
     critical: Vec<(Critical, Refined)>,
+    /// Whether the run was stopped before branches that cross were sought.
+    untried: bool,
     progress: &'p mut dyn FnMut(usize, usize, f64),
 }
 
@@ -244,7 +257,17 @@ impl Run<'_, '_> {
         first.tangent = first.tangent.growing();
         let values = self.request.vary.values.len();
         let longest = (1.0 / (values - 1) as f64).min(LONGEST);
-        let how = Walk::new(longest, self.request.most_points);
+        let grows = |points: &[Point]| match points {
+            [.., before, last] => last.index > before.index,
+            _ => false,
+        };
+        let how = Walk {
+            enough: match self.request.until {
+                Some(TraceUntil::Unstable) => Some(&grows),
+                None => None,
+            },
+            ..Walk::new(longest, self.request.most_points)
+        };
         let back = both_ways.then(|| Point {
             tangent: first.tangent.reversed(),
             ..first.clone()
@@ -262,7 +285,10 @@ impl Run<'_, '_> {
             }
             let (family, progress) = (self.family, &mut *self.progress);
             let mut report = |points, at| progress(number, points, family.value(at));
-            let followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
+            let mut followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
+            if followed.end == End::Enough {
+                end_at_growth(&mut followed);
+            }
             let last = followed.branch.points.last();
             let segments = last.map_or(0, |point| point.state.segments());
             trace.segments = trace.segments.max(segments);
@@ -270,20 +296,30 @@ impl Run<'_, '_> {
             let begun = followed.branch.points.first().zip(followed.points.first());
             let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
             self.first = self.first.take().or(begun);
-            self.enter_crossings(&followed, number, &mut entrances);
+            let missing = self.enter_crossings(&followed, number, &mut entrances);
+            trace.branches[number].add_remarks(missing);
+            let left = followed.end == End::Stopped || !entrances.is_empty() || self.untried;
+            if left && self.family.limit.reached() {
+                trace.remark = Some(match self.untried || !entrances.is_empty() {
+                    true => "the run was stopped: branches that cross are not all followed".into(),
+                    false => "the run was stopped".into(),
+                });
+                break;
+            }
         }
         trace.factorizations = self.grids.factorizations();
     }
 
     /// Records the critical points of a branch; if requested, adds the first points of crossing
     /// branches, each with the indices of the branch and the point at which it was entered, if that
-    /// is new.
+    /// is new. Returns where no crossing branch begins within the range.
     fn enter_crossings(
         &mut self,
         followed: &Followed,
         number: usize,
         entrances: &mut VecDeque<(Point, Option<[usize; 2]>)>,
-    ) {
+    ) -> Vec<String> {
+        let mut missing = Vec::new();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
             let mut crossings = (self.critical.iter()).filter(|(it, _)| it.kind == Kind::Branching);
@@ -295,9 +331,20 @@ impl Run<'_, '_> {
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
             let new = switch(self.grids.of(&critical.state), critical, self.tolerance);
+            if new.is_empty() && !self.family.limit.reached() {
+                let value = self.family.value(refined.fraction);
+                // As many digits as tell one crossing from the next.
+                let value = format!("{value:.8e}").parse().unwrap_or(value);
+                missing.push(format!(
+                    "the branches that cross at {} are not followed: none was found within the range",
+                    self.request.vary.keys.text(value)
+                ));
+            }
+            self.untried |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.into_iter().map(|point| (point, from)));
         }
+        missing
     }
 
     /// A branch in the scenario's units.
@@ -380,6 +427,21 @@ impl Run<'_, '_> {
             stations: refined.grid.sigma().to_vec(),
             curves: self.family.curves(&refined.state),
         }
+    }
+}
+
+/// Ends a branch, whose last step its Morse index grew in, at the first critical point at which it
+/// grows.
+fn end_at_growth(followed: &mut Followed) {
+    followed.end = End::Unstable;
+    let mut critical = followed.branch.critical.iter();
+    let grows = critical.position(|(_, critical)| critical.indices[1] > critical.indices[0]);
+    if let Some(last) = grows {
+        let (after, _) = followed.branch.critical[last];
+        followed.branch.critical.truncate(last + 1);
+        followed.critical.truncate(last + 1);
+        followed.branch.points.truncate(after + 1);
+        followed.points.truncate(after + 1);
     }
 }
 

@@ -1,0 +1,69 @@
+//! Ctrl-C: what was found until then is written as whole files, and the exit status is 130; where
+//! nothing is kept of what is unfinished, that is said.
+#![cfg(unix)]
+
+use std::process::Child;
+use std::thread;
+use std::time::Duration;
+
+use leafdyn_testing::workplace::{Json, Run, Workplace, contains, interrupt, leaf};
+
+/// Long enough to be in the midst of what takes longer.
+const MEANWHILE: Duration = Duration::from_millis(900);
+
+#[track_caller]
+fn interrupted(child: Child) -> Run {
+    thread::sleep(MEANWHILE);
+    interrupt(&child);
+    Run::from(child.wait_with_output().unwrap()).ends(130)
+}
+
+/// A branch in so many steps that nobody waits for its end.
+#[test]
+fn points_of_a_branch_are_kept() {
+    let place = Workplace::new();
+    let many = "--vary load.gravity[2]=0..-3:10000 --points 10000";
+    let run = interrupted(place.start(&format!("trace leaf.toml {many}")));
+    contains(&run.out, &["goes on: stopped", "written"]);
+    place.holds("out/small", "trace.csv trace.json trace.png trace.svg");
+    let json = place.json("out/small/trace.json");
+    assert_eq!(json["exit_status"], 130);
+    assert_eq!(json["error"], "stopped by Ctrl-C");
+    assert_eq!(
+        (&json["complete"], &json["branches"][0]["end"]),
+        (&false.into(), &"stopped".into())
+    );
+    let points = json["branches"][0]["points"].number();
+    assert!(points > 1.0, "{points}");
+}
+
+/// Of several scenarios those that are finished have their files and their rows.
+#[test]
+fn finished_scenarios_are_kept() {
+    let place = Workplace::new();
+    place.write("large.toml", leaf("large", 3000));
+    let run = place.start("relax leaf.toml large.toml --tolerance 1e-10 --write json,csv");
+    let run = interrupted(run);
+    contains(&run.err, &["1 of 2 scenarios are not solved"]);
+    place.holds("out/small", "centerlines.csv summary.json");
+    let table = place.read("out/table.csv");
+    let rows: Vec<&str> = table.lines().skip(1).collect();
+    assert_eq!(rows.len(), 2, "{table}");
+    contains(rows[0], &["leaf.toml", "converged"]);
+    contains(rows[1], &["large.toml", "stopped by Ctrl-C"]);
+}
+
+#[test]
+fn that_nothing_is_kept_is_said() {
+    let place = Workplace::new();
+    for (verb, rods) in [("relax", 3000), ("check", 300)] {
+        place.write("large.toml", leaf("large", rods));
+        let run = interrupted(place.start(&format!("{verb} large.toml --tolerance 1e-10")));
+        assert_eq!(
+            run.err,
+            "stopped by Ctrl-C: nothing of an unfinished result is kept\n"
+        );
+        assert_eq!(run.out, "");
+        assert!(!place.path("out").exists(), "{verb}");
+    }
+}
