@@ -154,6 +154,8 @@ pub fn on_next_grid(coarser: Option<&Level>, finest: &Level, tolerance: f64) -> 
     }
     let leaf = DiscreteLeaf::new(&finest.leaf.leaf, finest.leaf.grid.refined());
     let mut system = System::new(&leaf);
+    // What is held stays where the guess has it, which is predicted from other grids.
+    leaf.hold(&mut state);
     let guess = state.clone();
     let newton = Newton {
         accuracy: NEARBY_ACCURACY * tolerance,

@@ -265,7 +265,7 @@ fn what_no_grid_can_tell_the_eigenvalues_do() {
             }
         }
     }
-    let leaf = settled(&flat_strip(5e-5), &with_modes(3, to(1e-6)));
+    let leaf = settled(&flat_strip(1e-5), &with_modes(3, to(1e-6)));
     assert!(leaf.doubts.iter().any(|it| it.contains("not certain")));
 }
 

@@ -137,5 +137,11 @@ fn a_run_that_is_stopped_says_nothing_of_what_it_did_not_try() {
     assert_eq!(stopped.branches.len(), 1);
     let straight = &stopped.branches[0];
     assert!(straight.critical().next().is_some() && straight.remark.is_none());
-    assert!(stopped.remark.as_ref().unwrap().contains("branches that cross"));
+    assert!(
+        stopped
+            .remark
+            .as_ref()
+            .unwrap()
+            .contains("branches that cross")
+    );
 }

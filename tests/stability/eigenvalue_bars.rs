@@ -1,5 +1,8 @@
 //! Error bars of eigenvalues where grids agree by chance.
 
+use leafdyn::relax::Mode;
+use leafdyn::scenario::Scenario;
+use leafdyn_testing::bench::figure;
 use leafdyn_testing::*;
 
 /// Five free veins, alike but for their directions: 8 and 16 segments have the same lowest
@@ -30,4 +33,63 @@ fn stated_errors_of_eigenvalues_hold_where_two_grids_agree_by_chance() {
             "{tolerance:e}, {count}: {error:e}, {told:e}"
         );
     }
+}
+
+/// Eigenvalues of Fig. 4 that are listed without their shapes have four digits by default, and
+/// more where a smaller tolerance is asked for.
+#[test]
+fn listed_eigenvalues_have_four_digits() {
+    let leaf = figure("fig04", 21);
+    let exact = eigenvalues(&leaf, 1e-10);
+    for (tolerance, wanted) in [(1e-4, 2e-4), (1e-6, 1e-4), (1e-8, 1e-6)] {
+        for ((value, bar), (exact, _)) in eigenvalues(&leaf, tolerance).into_iter().zip(&exact) {
+            assert!(bar < wanted * exact, "{tolerance:e}: {value} within {bar}");
+            assert!(
+                (value - exact).abs() <= bar + 1e-9 * exact,
+                "{tolerance:e}: {value} within {bar}"
+            );
+        }
+    }
+}
+
+/// Between two grips the leaf on a grid that is added for eigenvalues is held where it is natural
+/// on that grid, not where coarser ones predict it.
+#[test]
+fn eigenvalues_between_grips_are_those_of_any_grids() {
+    let rod = parse(
+        r#"
+        name = "rod"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.0, axial = 1000.0, shear_2 = 300.0, shear_3 = 300.0 }
+        rest = { bend_2 = -2.0, bend_3 = -3.8 }
+        grip = [{ vein = 1, at = 0.881 }, { vein = 1, at = 0.809 }]
+        "#,
+    );
+    let exact = eigenvalues(&rod, 1e-10);
+    for tolerance in [1e-4, 1e-6, 1e-7, 1e-8, 1e-9] {
+        for ((value, bar), (exact, _)) in eigenvalues(&rod, tolerance).into_iter().zip(&exact) {
+            let error = (value - exact).abs();
+            assert!(
+                error <= bar,
+                "{tolerance:e}: {value} within {bar}: {error:e}"
+            );
+        }
+    }
+}
+
+/// The three lowest, as they are listed by default, and their bars.
+fn eigenvalues(leaf: &Scenario, tolerance: f64) -> Vec<(f64, f64)> {
+    let leaf = settled(leaf, &with_modes(3, to(tolerance)));
+    let modes = leaf
+        .stability
+        .modes
+        .as_ref()
+        .expect("a small leaf has modes");
+    let known = |mode: &Mode| {
+        (
+            mode.eigenvalue,
+            mode.error.expect("there are several grids"),
+        )
+    };
+    modes.iter().map(known).collect()
 }

@@ -41,6 +41,8 @@ pub struct Series {
     pub single: bool,
     pub grids: Vec<Vec<f64>>,
     pub tolerance: f64,
+    /// Relative error of frequencies that is small enough.
+    pub wanted: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     pub rounding: f64,
 }
@@ -110,10 +112,10 @@ impl Series {
         values
     }
 
-    /// Whether the relative error of all frequencies is within the tolerance.
+    /// Whether the relative error of all frequencies is as small as wanted.
     pub fn accurate(&self) -> bool {
         let known = |(k, it): (usize, Extrapolated)| {
-            let wanted = 2.0 * self.tolerance * self.unit(k);
+            let wanted = 2.0 * self.wanted * self.unit(k);
             it.error
                 .is_some_and(|error| error <= wanted + self.rounding)
         };
@@ -211,6 +213,7 @@ mod tests {
             single: false,
             grids: grids.map(Vec::from).into(),
             tolerance: 1e-6,
+            wanted: 1e-6,
             rounding: 8e-6,
         };
         assert_eq!(found.negative(), None);

@@ -43,12 +43,15 @@ const SIGN_TOLERANCE: f64 = 1e-2;
 const ACCURACY: f64 = 5e-3;
 const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
 
-/// To a tolerance of this or more the grids are so coarse that two of them do not tell how
-/// eigenvalues converge, and few eigenvalues may be equal on two grids by chance: so many are
-/// compared.
-const LOW_TOLERANCE: f64 = 1e-3;
-const FEW: usize = 3;
+/// Two grids do not tell how eigenvalues converge, and one may be equal on both by chance: of
+/// requested ones so many are compared.
 const COMPARED: usize = 3;
+
+/// Frequencies that are listed without their shapes are accurate to this many times the
+/// tolerance of positions, or to the second number if that is less, but never asked to be
+/// better than the tolerance: by default eigenvalues have four digits.
+const LISTED: f64 = 25.0;
+const LEAST_LISTED: f64 = 2.5e-5;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
@@ -143,18 +146,24 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
             single: found.clearly_stable || problem.segments().is_some(),
             grids: Vec::new(),
             tolerance,
+            wanted: match options.mode_shapes || list.exact {
+                true => tolerance,
+                false => tolerance.max((LISTED * tolerance).min(LEAST_LISTED)),
+            },
             rounding: 0.0,
         },
         finest: None,
         coarser: None,
         segments: Vec::new(),
     };
-    let sharp = requested && options.mode_shapes || list.exact;
-    let few = requested && !list.decides && count < FEW;
-    let compares =
-        (few || problem.tolerance >= LOW_TOLERANCE) && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
+    let sharp = requested || list.exact;
+    let compares = requested && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
     let enough = |series: &Series| {
         (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
+    };
+    let most_unknowns = match options.mode_shapes || list.exact {
+        true => MANY_MORE_UNKNOWNS,
+        false => FEW_UNKNOWNS,
     };
     let sufficient_grids = sufficient_grids(options, found);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
@@ -174,7 +183,7 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
     }
     nested.finest.as_ref()?;
     if options.method.segments().is_none() {
-        refine(problem, &mut nested, (on, enough));
+        refine(problem, &mut nested, most_unknowns, (on, enough));
     }
     let on = found.segments_of_estimate();
     let softening = (nested
@@ -288,6 +297,7 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
 fn refine(
     problem: &Problem,
     nested: &mut Nested,
+    most_unknowns: usize,
     (on, enough): (
         impl Fn(&Level, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
         impl Fn(&Series) -> bool,
@@ -298,7 +308,7 @@ fn refine(
             break;
         }
         let finest = &*nested.finest.as_ref()?.level;
-        if !is_affordable(problem.leaf, &finest.leaf.grid.refined()) {
+        if 2 * unknowns(&finest.leaf) > most_unknowns {
             break;
         }
         let next = on_next_grid(nested.coarser.as_deref(), finest, problem.tolerance)?;
