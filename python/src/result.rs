@@ -1,5 +1,6 @@
 //! Results: a leaf at rest, and the contents of the files of any result.
 
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -245,6 +246,16 @@ impl Leaf {
             Ok((force, moment.transpose()?))
         };
         self.found.grip_reactions.iter().map(reaction).collect()
+    }
+
+    /// Bounds on the errors of the force and of the moments at the tip, then of the force and of the
+    /// moment at every grip; none where they are not known.
+    fn reaction_errors(&self) -> Vec<[Option<f64>; 2]> {
+        let tip = self.found.reaction.as_ref();
+        let tip = tip.map_or([None; 2], |it| [it.error, it.moments_error]);
+        let grips = self.found.grip_reactions.iter();
+        let grips = grips.map(|it| [it.error, it.moment_error]);
+        iter::once(tip).chain(grips).collect()
     }
 
     fn stations<'py>(&self, py: Python<'py>) -> Array<'py> {

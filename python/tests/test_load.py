@@ -32,7 +32,8 @@ def test_a_leaf_of_the_program(source: Any, tmp_path: Path) -> None:
         assert (one is None) == (two is None) and (one is None or np.array_equal(one, two)), name
     for name in (
         "name method outcome success remark doubts rods joined segments tolerance residual energy stable "
-        "negative_eigenvalues neutral_directions path path_events error_estimate"
+        "negative_eigenvalues neutral_directions path path_events error_estimate tip_reaction_error "
+        "tip_reaction_moments_error grip_reaction_errors"
     ).split():
         assert getattr(again, name) == getattr(leaf, name), name
     assert repr(again) == repr(leaf)

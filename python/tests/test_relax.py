@@ -62,6 +62,8 @@ def test_a_held_tip_pushes_back() -> None:
     assert leaf.tip_reaction is not None
     assert np.allclose(leaf.tip, [0.9, 0.0, 0.0], atol=1e-12)
     assert leaf.tip_reaction.tolist() == leaf.to_dict()["tip_reaction"]
+    assert leaf.tip_reaction_error is not None
+    assert leaf.tip_reaction_error == leaf.to_dict()["tip_reaction_error"]
     assert np.abs(leaf.tip_reaction).max() > 0.1
     assert leafdyn.relax(fan(1), set={"leaf.fan": [0.0]}).tip_reaction is None
 

@@ -119,6 +119,25 @@ class Equilibrium(Viewed):
         return self._core.grip_reactions()
 
     @computed
+    def _reaction_errors(self) -> list[list[float | None]]:
+        return self._core.reaction_errors()
+
+    @property
+    def tip_reaction_error(self) -> float | None:
+        """Bound on the error of `tip_reaction`; none if the tip is free, or on a single grid."""
+        return self._reaction_errors[0][0]
+
+    @property
+    def tip_reaction_moments_error(self) -> float | None:
+        """Bound on the error of `tip_reaction_moments`; none if there are none, or on a single grid."""
+        return self._reaction_errors[0][1]
+
+    @property
+    def grip_reaction_errors(self) -> list[list[float | None]]:
+        """Bounds on the errors of every grip's force and moment; none where there is none, or on a single grid."""
+        return self._reaction_errors[1:]
+
+    @computed
     def stations(self) -> Array:
         """Fractions of the length, base to tip, shape (K + 1,), from 0 to 1."""
         return self._core.stations()
@@ -393,6 +412,8 @@ _LATER = (
     "curve_stations",
     "_veins",
     "_reaction",
+    "grip_reactions",
+    "_reaction_errors",
     "_modes",
     "_mode_shapes",
     "sensitivities",

@@ -171,6 +171,10 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
             (_array(grip["force"]), None if grip.get("moment") is None else _array(grip["moment"]))
             for grip in said.get("grip_reactions") or []
         ],
+        "_reaction_errors": [
+            [said.get("tip_reaction_error"), said.get("tip_reaction_moments_error")],
+            *([grip.get("error"), grip.get("moment_error")] for grip in said.get("grip_reactions") or []),
+        ],
     }
     if "tip_force_sum" in said:
         state["tip_force_sum"] = _array(said["tip_force_sum"])
