@@ -1,5 +1,6 @@
 //! Grips hold veins while they move.
 
+use leafdyn::relax::Route;
 use leafdyn::simulate;
 use leafdyn_testing::motion::{BOTH, Scheme, at, gripped_veins, moving, rest, run};
 use leafdyn_testing::*;
@@ -57,4 +58,53 @@ fn nothing_moves_in_grips_at_rest() {
             assert!(off < 1e-12, "{scheme:?}, vein {j}, node {i}: {off:e}");
         }
     }
+}
+
+/// As [`shaken`], in a wind that comes and turns.
+fn blown(scheme: Scheme, length: f64, segments: usize, grip: &str) -> Vec<DVec3> {
+    let text = format!(
+        r#"
+        {ROD}
+        {grip}
+        wind = {{ velocity = {{ at = [0.0, 0.3, 1.0], value = [[0.0, 0.0, 0.0], [0.5, 2.0, -2.0], [0.0, -1.0, 2.0]] }}, density = 1.2, drag = 2.0, width = 0.5 }}
+        dynamics = {{ density = 1.0, rotary_inertia = 0.01, external_damping = 0.5, duration = 1.0, start = "released" }}
+        "#
+    );
+    let made = base(&text, &format!("leaf.length={length:?}"));
+    let options = simulate::Options {
+        step: Some(1e-3),
+        ..moving(scheme, Some(segments))
+    };
+    run(made.scenario(), &options).positions
+}
+
+/// Wind moves what is beyond a clamp as a cantilever that begins there, and in a steady wind it comes
+/// to rest as that.
+#[test]
+fn a_clamp_in_the_middle_divides_a_rod_in_wind() {
+    let grip = "grip = [{ vein = 1, at = 0.5, held = \"clamped\" }]";
+    for scheme in BOTH {
+        let (whole, beyond) = (blown(scheme, 2.0, 16, grip), blown(scheme, 1.0, 8, ""));
+        assert!(beyond[8].distance(DVec3::X) > 0.03, "{:?}", beyond[8]);
+        for i in 0..=8 {
+            let off = (whole[8 + i] - DVec3::X).distance(beyond[i]);
+            assert!(off < 1e-9, "{scheme:?}, {i}: {off:e}");
+        }
+    }
+    let steady = "wind = { velocity = [0.5, 0.8, -1.0], density = 1.2, drag = 2.0, width = 2.0 }";
+    let at_rest = |length: f64, grip: &str| {
+        let rod = base(
+            &format!("{ROD}\n{steady}\n{grip}"),
+            &format!("leaf.length={length:?}"),
+        );
+        let options = Options {
+            route: Route::Release,
+            ..to(1e-8)
+        };
+        tip(&settled(rod.scenario(), &options))
+    };
+    let (whole, beyond) = (at_rest(2.0, grip), at_rest(1.0, ""));
+    assert!(beyond.distance(DVec3::X) > 0.1, "{beyond}");
+    let off = (whole - DVec3::X).distance(beyond);
+    assert!(off < 2e-8, "{off:e}");
 }

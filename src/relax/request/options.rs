@@ -186,7 +186,6 @@ pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), Relax
         Method::SemiImplicit(_) if scenario.has_moments() => {
             "a leaf under load.tip_moment or load.point.moment"
         }
-        Method::SemiImplicit(_) if !scenario.grips.is_empty() => "a leaf held by [[grip]]",
         Method::SemiImplicit(_) => return Ok(()),
         Method::Explicit { .. } => "explicit relaxation",
         _ => "shooting",

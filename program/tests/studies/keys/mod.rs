@@ -23,7 +23,6 @@ const REFUSED: &str = "
 single-shooting shooting shooting-from-rest check chart | gripped | does not take grips
 relax explicit single-shooting shooting shooting-from-rest keep-unstable modes all margin trace map chart check fit page figures | windy gripped-in-wind | does not take wind
 check single-shooting shooting shooting-from-rest | gripped-in-wind | does not take grips
-release simulate-explicit simulate-semi-implicit motion-page motion-figures | gripped-in-wind | a leaf held by [[grip]] does not take wind
 single-shooting shooting | jaws pinned | a tip that is held (tip.held)
 single-shooting shooting | leaf.base_held | a leaf on hinges
 single-shooting shooting | leaf.base | veins that begin apart
