@@ -116,7 +116,7 @@ function plainly(plain) {
 
 /// Shows a leaf at rest.
 function show(known) {
-  const turned = view.gravity.some((x, k) => x !== known.view.gravity[k]);
+  const turned = JSON.stringify(view.directions) !== JSON.stringify(known.view.directions);
   Object.assign(view, known.view);
   decoded.clear();
   view.modes.forEach((mode) => (mode.decoded = undefined));

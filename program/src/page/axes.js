@@ -1,4 +1,4 @@
-// The box around the leaf: axes with ticks, gravity, captions and the colour scale, on the canvas below the leaf.
+// The box around the leaf: axes with ticks, gravity and wind, captions and the colour scale, on the canvas below the leaf.
 const AXIS_NAMES = ["x", "y", "z"];
 const font = (px) => `${px}px system-ui, "DejaVu Sans", sans-serif`;
 
@@ -109,11 +109,13 @@ function line(pen, p, q) {
   pen.stroke();
 }
 
-/// The direction of gravity as an arrow of fixed size in a corner of the panel; none if there is none.
-function drawGravity(pen, box, place, at) {
-  const size = Math.hypot(...view.gravity);
-  if (!(size > 0)) return;
-  const [a, b] = [place(box.middle), place(box.middle.map((x, k) => x + (0.25 * box.extent * view.gravity[k]) / size))];
+/// The directions of gravity and wind as arrows of fixed size beside each other, from a corner of the panel on.
+function drawDirections(pen, box, place, [x, y], step) {
+  view.directions.forEach((it, k) => drawDirection(pen, box, place, [x + k * step, y], it));
+}
+
+function drawDirection(pen, box, place, at, { name, direction }) {
+  const [a, b] = [place(box.middle), place(box.middle.map((x, k) => x + 0.25 * box.extent * direction[k]))];
   const way = [b[0] - a[0], b[1] - a[1]];
   // Compared with a direction across the line of sight.
   const whole = place.scale * 0.25 * box.extent;
@@ -142,7 +144,7 @@ function drawGravity(pen, box, place, at) {
   pen.font = font(12);
   pen.textAlign = "center";
   pen.textBaseline = "alphabetic";
-  pen.fillText("gravity", at[0], at[1] + 36);
+  pen.fillText(name, at[0], at[1] + 36);
 }
 
 /// The colour scale, or which vein has which colour.

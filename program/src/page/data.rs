@@ -26,8 +26,8 @@ pub struct View {
     pub summary: Vec<(&'static str, String)>,
     /// Names of the units of length, force and time, if there are any.
     pub units: [Option<String>; 3],
-    /// Gravity per length of vein.
-    pub gravity: [f64; 3],
+    /// Unit vectors along the weight of all veins and the wind at time 0, if there are any.
+    pub directions: Vec<Direction>,
     /// What grips hold.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub grips: Vec<Gripped>,
@@ -49,6 +49,15 @@ pub struct View {
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
+}
+
+/// The direction of a load.
+#[derive(Serialize)]
+pub struct Direction {
+    /// What it is called.
+    pub name: &'static str,
+    /// A unit vector.
+    pub direction: [f64; 3],
 }
 
 /// A stretch of a vein, or a point, that a grip holds.

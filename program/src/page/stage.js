@@ -218,7 +218,7 @@ function render() {
   });
 }
 
-/// Axes, gravity, captions and the scale of colours.
+/// Axes, gravity, wind, captions and the scale of colours.
 function drawUnder(width, height, ratio) {
   const pen = under.getContext("2d");
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -228,7 +228,7 @@ function drawUnder(width, height, ratio) {
   for (const panel of space.panels) {
     const place = placeIn(panel);
     if (find("axes").checked) drawAxes(pen, space.box, place, small);
-    if (panel === space.panels[0]) drawGravity(pen, space.box, place, small ? [width - 44, 32] : [44, height - 64]);
+    if (panel === space.panels[0]) drawDirections(pen, space.box, place, small ? [width - 44, 32] : [44, height - 64], small ? -76 : 76);
     if (panel.label) drawLabel(pen, panel, small);
   }
   const colors = quantity();

@@ -39,6 +39,28 @@ fn a_leaf_at_rest() {
     contains(&place.read("out/leaf/leaf.vtp"), &["NumberOfLines=\"9\""]);
 }
 
+/// The page shows where the weight pulls, by whatever key it is given, and where the wind blows.
+#[test]
+fn a_page_knows_the_directions_of_weight_and_wind() {
+    let place = Workplace::empty();
+    let leaf = r#"
+leaf = { rods = 1, length = 1.0, fan = [0.0] }
+section = { shape = "circle", diameter = 0.01, young = 1e5, mass_per_length = 1e-3 }
+load = { g = [0.0, -9.0, 0.0] }
+wind = { velocity = [0.0, 0.0, 2.0], density = 1e-3, drag = 1.0, width = 0.01 }
+"#;
+    fs::write(place.path("leaf.toml"), leaf).unwrap();
+    place
+        .run("relax leaf.toml --path release --write html")
+        .ends(0);
+    let page = place.read("out/leaf/view.html");
+    let directions = [
+        r#"{"name": "gravity", "direction": [0.0,-1.0,0.0]}"#,
+        r#"{"name": "wind", "direction": [0.0,0.0,1.0]}"#,
+    ];
+    contains(&page, &directions);
+}
+
 #[test]
 fn a_motion_and_what_it_lists() {
     let short =
