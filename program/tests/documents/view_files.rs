@@ -45,7 +45,7 @@ fn a_page_knows_the_directions_of_weight_and_wind() {
     let place = Workplace::empty();
     let leaf = r#"
 leaf = { rods = 1, length = 1.0, fan = [0.0] }
-section = { shape = "circle", diameter = 0.01, young = 1e5, mass_per_length = 1e-3 }
+section = { shape = "circle", diameter = 0.01, young = 1e5, mass_density = 12.0 }
 load = { g = [0.0, -9.0, 0.0] }
 wind = { velocity = [0.0, 0.0, 2.0], density = 1e-3, drag = 1.0, width = 0.01 }
 "#;
