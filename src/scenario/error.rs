@@ -19,7 +19,7 @@ pub struct ScenarioError {
     /// The rest of the message.
     pub problem: String,
     /// Errors about other entries that do not follow from this one, in the order of the format, as far
-    /// as they can be told.
+    /// as they can be told; the message has all in the order of their lines.
     pub others: Vec<ScenarioError>,
 }
 
@@ -37,8 +37,13 @@ impl ScenarioError {
 
     /// The whole message, where overrides are given by this option.
     pub fn told(&self, option: &str) -> String {
-        let all = [self].into_iter().chain(&self.others);
-        let all = all.map(|error| match &error.place {
+        let mut all: Vec<&ScenarioError> = [self].into_iter().chain(&self.others).collect();
+        // In the order of the lines of the file, then what it lacks, then what is set.
+        all.sort_by_key(|error| match error.place {
+            Place::File { line, .. } => line.unwrap_or(usize::MAX - 1),
+            Place::Set { .. } => usize::MAX,
+        });
+        let all = all.into_iter().map(|error| match &error.place {
             Place::Set { given } => format!("{option} {given}: {}", error.problem),
             place => format!("{place}: {}", error.problem),
         });

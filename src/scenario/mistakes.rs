@@ -117,6 +117,28 @@ mod tests {
         text.lines().filter_map(begin).collect()
     }
 
+    /// Errors are told in the order of their lines, whatever that of the format is, and then what
+    /// is missing.
+    #[test]
+    fn mistakes_are_in_the_order_of_lines() {
+        let text = "[solve]\ntolerance = 3\n[stiffness]\nbending_2 = -1.0\n[leaf]\nrods = 3\nlength = -1.0\n";
+        let lines = lines(&Scenario::from_toml(text).unwrap_err());
+        let numbers: Vec<_> = lines
+            .iter()
+            .map(|line| {
+                line.split(':')
+                    .next()
+                    .unwrap()
+                    .parse()
+                    .unwrap_or(usize::MAX)
+            })
+            .collect();
+        assert!(
+            numbers.starts_with(&[2, 4, 7]) && numbers.is_sorted(),
+            "{lines:?}"
+        );
+    }
+
     /// Asserts that there is one line about each of these keys, and no other.
     #[track_caller]
     fn are_about(told: &[String], keys: &[&str]) {
@@ -194,6 +216,6 @@ mod tests {
         let error = Scenario::from_toml("[leaf]\nrods = 2\n[solve]\ntolerance = 3").unwrap_err();
         let told = lines(&error);
         assert_eq!(told.len(), 2, "{told:?}");
-        assert!(told[0].contains("also missing: leaf.length"), "{told:?}");
+        assert!(told[1].contains("also missing: leaf.length"), "{told:?}");
     }
 }

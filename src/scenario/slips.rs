@@ -94,7 +94,16 @@ fn in_degrees(scenario: &Scenario) -> Option<String> {
     ];
     kinds.into_iter().find_map(|(key, of)| {
         let angles = scenario.rods.iter().map(of);
-        let angle = angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let angle = match &scenario.blade {
+            // The directions of its veins follow from the one angle that is given.
+            Some(blade) => blade.elevation,
+            None => angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?,
+        };
+        let key = if scenario.blade.is_some() {
+            "leaf.elevation"
+        } else {
+            key
+        };
         let turned = angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED);
         turned.then(|| format!("{key} is in radians, and {angle} is {}", turned_by(angle)))
     })
@@ -286,6 +295,30 @@ mod tests {
         for (length, g) in [("cm", 981.0), ("m", 9.81), ("cm", 160.0), ("ell", 9.81)] {
             assert_eq!(doubts(length, g), Vec::<String>::new());
         }
+    }
+
+    /// A blade is turned by one angle, of which those of its veins are no evidence.
+    #[test]
+    fn a_blade_turned_by_degrees_is_doubted() {
+        let doubts = |elevation: f64| {
+            let text = format!(
+                r#"
+                units = {{ length = "cm", force = "N" }}
+                leaf = {{ rods = 5, elevation = {elevation} }}
+                blade = {{ length = 20.0, width = {{ at = [0.0, 0.4, 1.0], value = [1.0, 2.0, 0.2] }}, thickness = 0.03, young = 1e5 }}"#
+            );
+            slips(&Scenario::from_toml(&text).unwrap())
+        };
+        for (elevation, said) in [
+            (45.0, "45 is more than a turn"),
+            (2.0, "2 is more than a right angle"),
+        ] {
+            assert_eq!(
+                doubts(elevation),
+                [format!("leaf.elevation is in radians, and {said}")]
+            );
+        }
+        assert_eq!(doubts(1.2), Vec::<String>::new());
     }
 
     /// A weight of another mass may keep a leaf from coming to rest.

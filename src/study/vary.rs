@@ -318,7 +318,10 @@ impl FromStr for Vary {
             let value = text.trim().parse().ok();
             let allowed = |value: &f64| *value == 0.0 || SIZES.contains(&value.abs());
             value.filter(allowed).ok_or_else(|| {
-                refuse("FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100")
+                refuse(match text.contains('\u{2212}') {
+                    true => "write numbers with a hyphen as minus sign",
+                    false => "FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100",
+                })
             })
         };
         let (from, to) = (number(from)?, number(to)?);
