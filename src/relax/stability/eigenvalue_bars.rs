@@ -45,6 +45,8 @@ pub struct Series {
     pub wanted: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     pub rounding: f64,
+    /// Whether the leaf can turn without resistance: an eigenvalue of zero is then no doubt.
+    pub turns: bool,
 }
 
 impl Series {
@@ -157,7 +159,7 @@ impl Series {
     }
 
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
-    /// finest grid. One that is zero to the tolerance may have either sign.
+    /// finest grid. Of a leaf that can turn one that is zero to the tolerance may have either sign.
     pub fn undecided(&self) -> Option<f64> {
         let unknown = |(k, it): (usize, Extrapolated)| {
             let size = it.value.abs();
@@ -168,7 +170,7 @@ impl Series {
             let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + NOISE * self.rounding;
             let decided = match size > error {
                 true => (it.value < 0.0) == (k < self.index),
-                false => error <= zero,
+                false => self.turns && error <= zero,
             };
             (!decided).then_some(size.max(error))
         };
@@ -215,6 +217,7 @@ mod tests {
             tolerance: 1e-6,
             wanted: 1e-6,
             rounding: 8e-6,
+            turns: false,
         };
         assert_eq!(found.negative(), None);
         assert_eq!(found.signs(), [Some(true), None]);

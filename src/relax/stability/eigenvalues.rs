@@ -57,8 +57,7 @@ const LEAST_LISTED: f64 = 2.5e-5;
 pub struct Lowest {
     pub modes: Vec<Mode>,
     /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
-    /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
-    /// free motion.
+    /// An eigenvalue of a leaf that can turn does not count where it is zero to the accuracy required.
     pub undecided: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
@@ -151,6 +150,7 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
                 false => tolerance.max((LISTED * tolerance).min(LEAST_LISTED)),
             },
             rounding: 0.0,
+            turns: !finest.leaf.turns(&finest.state).is_empty(),
         },
         finest: None,
         coarser: None,
