@@ -371,8 +371,13 @@ fn an_eigenvalue_that_splits_has_no_derivative() {
     assert!(bending.frequencies[2].is_some());
     let differenced = differenced(&base, &keys(&wanted)[1], &options);
     let lowest = weight.lowest_eigenvalue.unwrap();
-    let same = |(value, _): &(f64, f64)| (value - lowest).abs() < 1e-6;
-    assert!(differenced.iter().any(same), "{lowest} {differenced:?}");
+    let bar = weight.lowest_eigenvalue_error.unwrap();
+    // Differences come from more grids than the derivative does.
+    let same = |(value, _): &(f64, f64)| (value - lowest).abs() < bar.min(1e-4);
+    assert!(
+        differenced.iter().any(same),
+        "{lowest} within {bar:e} {differenced:?}"
+    );
     assert!(torsion.lowest_eigenvalue.unwrap().abs() < 1e-9);
 }
 

@@ -45,7 +45,8 @@ pub struct Series {
     pub wanted: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     pub rounding: f64,
-    /// Whether the leaf can turn without resistance: an eigenvalue of zero is then no doubt.
+    /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
+    /// doubt.
     pub turns: bool,
 }
 
@@ -159,7 +160,8 @@ impl Series {
     }
 
     /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
-    /// finest grid. Of a leaf that can turn one that is zero to the tolerance may have either sign.
+    /// finest grid. One that is zero to the tolerance may have either sign, and of a leaf that
+    /// can turn one that is zero to rounding.
     pub fn undecided(&self) -> Option<f64> {
         let unknown = |(k, it): (usize, Extrapolated)| {
             let size = it.value.abs();
@@ -167,10 +169,15 @@ impl Series {
                 // There is no other grid to compare with.
                 return (!self.single).then_some(size.max(self.unit(k)));
             };
-            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + NOISE * self.rounding;
+            let noise = if self.turns {
+                NOISE * self.rounding
+            } else {
+                0.0
+            };
+            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + noise;
             let decided = match size > error {
                 true => (it.value < 0.0) == (k < self.index),
-                false => self.turns && error <= zero,
+                false => error <= zero,
             };
             (!decided).then_some(size.max(error))
         };

@@ -57,7 +57,8 @@ const LEAST_LISTED: f64 = 2.5e-5;
 pub struct Lowest {
     pub modes: Vec<Mode>,
     /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
-    /// An eigenvalue of a leaf that can turn does not count where it is zero to the accuracy required.
+    /// An eigenvalue that is zero to the accuracy required does not count, nor one within rounding of
+    /// zero if the leaf can turn.
     pub undecided: Option<f64>,
     /// How many eigenvalues are negative, if all of these are larger than their errors.
     pub negative: Option<usize>,
