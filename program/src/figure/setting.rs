@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::report::numbers::short;
 use leafdyn::scenario::{Scenario, Schedule, Units};
+use serde::Serialize;
 
 /// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
 /// if it names one.
@@ -19,11 +20,11 @@ pub struct Setting {
 }
 
 /// A direction that is drawn as an arrow with its name.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Arrow {
+    pub name: &'static str,
     /// Of length one.
     pub direction: DVec3,
-    pub name: &'static str,
 }
 
 /// Names of the axes as fractions of L, with what they mean.

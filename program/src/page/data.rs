@@ -5,6 +5,7 @@ use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::figure::setting::Arrow;
 use crate::figure::veins::{node_stride, tamed};
 use leafdyn::relax::{Equilibrium, Shape};
 
@@ -26,8 +27,8 @@ pub struct View {
     pub summary: Vec<(&'static str, String)>,
     /// Names of the units of length, force and time, if there are any.
     pub units: [Option<String>; 3],
-    /// Unit vectors along the weight of all veins and the wind at time 0, if there are any.
-    pub directions: Vec<Direction>,
+    /// Directions of the weight of all veins and of the wind at time 0, as figures draw them.
+    pub directions: Vec<Arrow>,
     /// What grips hold.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub grips: Vec<Gripped>,
@@ -49,15 +50,6 @@ pub struct View {
     pub modes: Vec<ModeShape>,
     /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
-}
-
-/// The direction of a load.
-#[derive(Serialize)]
-pub struct Direction {
-    /// What it is called.
-    pub name: &'static str,
-    /// A unit vector.
-    pub direction: [f64; 3],
 }
 
 /// A stretch of a vein, or a point, that a grip holds.

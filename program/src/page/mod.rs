@@ -29,7 +29,7 @@ use crate::figure::setting::Setting;
 use crate::figure::svg::{self, hex};
 use crate::figure::veins::is_drawn;
 use crate::report::{Reported, json};
-pub use data::{Direction, Gripped, Leaf, View};
+pub use data::{Gripped, Leaf, View};
 use glam::DVec3;
 use leafdyn::scenario::{self, Hold, Scenario, Units};
 use leafdyn::simulate::Record;
@@ -134,12 +134,7 @@ pub fn bare(scenario: &Scenario) -> View {
             &scenario.units.time,
         ]
         .map(Clone::clone),
-        directions: (Setting::of(scenario).arrows(true, 0.0).into_iter())
-            .map(|arrow| Direction {
-                name: arrow.name,
-                direction: arrow.direction.to_array(),
-            })
-            .collect(),
+        directions: Setting::of(scenario).arrows(true, 0.0),
         grips: (scenario.grips.iter())
             .map(|grip| Gripped {
                 vein: grip.vein + 1,
