@@ -92,20 +92,17 @@ fn in_degrees(scenario: &Scenario) -> Option<String> {
         ("leaf.fan", |rod| rod.angle),
         ("leaf.elevation", |rod| rod.elevation),
     ];
-    kinds.into_iter().find_map(|(key, of)| {
-        let angles = scenario.rods.iter().map(of);
-        let angle = match &scenario.blade {
-            // The directions of its veins follow from the one angle that is given.
-            Some(blade) => blade.elevation,
-            None => angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?,
-        };
-        let key = if scenario.blade.is_some() {
-            "leaf.elevation"
-        } else {
-            key
-        };
+    let doubt = |key: &str, angle: f64| {
         let turned = angle.abs() > FRAC_PI_2 * (1.0 + ROUNDED);
         turned.then(|| format!("{key} is in radians, and {angle} is {}", turned_by(angle)))
+    };
+    if let Some(blade) = &scenario.blade {
+        // The directions of its veins follow from this angle and its outline.
+        return doubt("leaf.elevation", blade.elevation);
+    }
+    kinds.into_iter().find_map(|(key, of)| {
+        let angles = scenario.rods.iter().map(of);
+        doubt(key, angles.max_by(|a, b| a.abs().total_cmp(&b.abs()))?)
     })
 }
 
