@@ -70,6 +70,7 @@ pub use tissue::Tissue;
 pub use toml::{Table, Value};
 pub use turning::{Begin, Turning};
 pub use units::Units;
+pub(crate) use values::number_meant;
 pub use wind::Wind;
 
 use std::sync::Arc;

@@ -25,16 +25,21 @@ pub(super) fn number(value: &Value) -> Option<f64> {
     }
 }
 
+/// What people and word processors write for a minus sign: hyphens, dashes and the sign itself.
+const MINUS_SIGNS: [char; 7] = [
+    '\u{2010}', '\u{2011}', '\u{2012}', '\u{2013}', '\u{2014}', '\u{2015}', '\u{2212}',
+];
+
 /// How a text that a person would read as a number is written as one.
-pub(super) fn number_meant(text: &str) -> Option<String> {
-    let meant = text.trim().replace('\u{2212}', "-").replacen(',', ".", 1);
+pub(crate) fn number_meant(text: &str) -> Option<String> {
+    let meant = text.trim().replace(MINUS_SIGNS, "-").replacen(',', ".", 1);
     meant
         .parse::<f64>()
         .ok()
         .filter(|number| number.is_finite())?;
     let how = [
         (text.contains(','), "with a decimal point"),
-        (text.contains('\u{2212}'), "with a hyphen as minus sign"),
+        (text.contains(MINUS_SIGNS), "with a hyphen as minus sign"),
     ];
     let how: Vec<&str> = how
         .into_iter()
@@ -52,10 +57,8 @@ pub(super) fn number_meant_in(line: &str) -> Option<String> {
     let value = value.split('#').next().unwrap_or(value);
     // In a list a comma divides numbers.
     let marks = ['[', ']', '{', '}', '=', ' ', '\t', ','];
-    let in_list = value.split(marks).find(|part| part.contains('\u{2212}'));
-    let alone = value
-        .contains([',', '\u{2212}'])
-        .then(|| number_meant(value));
+    let in_list = value.split(marks).find(|part| part.contains(MINUS_SIGNS));
+    let alone = (value.contains(',') || value.contains(MINUS_SIGNS)).then(|| number_meant(value));
     alone.flatten().or_else(|| number_meant(in_list?))
 }
 
@@ -113,6 +116,8 @@ mod tests {
             1,5 => not valid TOML
             1,5 => : write 1.5, with a decimal point
             −1,5 => : write -1.5, with a decimal point and with a hyphen as minus sign
+            ‐1.5 => : write -1.5, with a hyphen as minus sign
+            –1.5 => : write -1.5, with a hyphen as minus sign
             '1,5' => leaf.length = '1,5': must be a number: write 1.5, with a decimal point
             '1.5' => must be a number: write 1.5, without quotes
             'long' => must be a number or a list of 1

@@ -38,7 +38,7 @@ use serde::{Serialize, Serializer};
 
 use crate::branch::value_between;
 use crate::scenario::units::{Dimension, PURE, TIME};
-use crate::scenario::{Form, Key, Part, Scenario, ScenarioError};
+use crate::scenario::{Form, Key, Part, Scenario, ScenarioError, number_meant};
 
 /// Default number of values.
 const COUNT: usize = 11;
@@ -315,13 +315,14 @@ impl FromStr for Vary {
         };
         let (from, to) = (range.split_once("..")).ok_or_else(|| refuse("has no .."))?;
         let number = |text: &str| {
-            let value = text.trim().parse().ok();
+            let value: Option<f64> = text.trim().parse().ok();
             let allowed = |value: &f64| *value == 0.0 || SIZES.contains(&value.abs());
             value.filter(allowed).ok_or_else(|| {
-                refuse(match text.contains('\u{2212}') {
-                    true => "write numbers with a hyphen as minus sign",
-                    false => "FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100",
-                })
+                let why = "FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100";
+                match (value, number_meant(text)) {
+                    (None, Some(how)) => refuse(&how),
+                    _ => refuse(why),
+                }
             })
         };
         let (from, to) = (number(from)?, number(to)?);

@@ -72,6 +72,8 @@ const REFUSED: &str = "
     map leaf.toml --vary coupling.y[5]=1..2 => --vary: with coupling.y[5]=1.0: coupling.y[5]: there
     map leaf.toml --set leaf.rods=0 --vary load.gravity[2]=1..2 => --set leaf.rods=0: leaf.rods
     chart leaf.toml --rods 3,0 => --rods: with leaf.rods=0: leaf.rods = 0: must be
+    trace leaf.toml --vary load.gravity[2]=−1..-2 => write -1, with a hyphen as minus sign
+    trace leaf.toml --vary load.gravity[2]=-1..‐2 => write -2, with a hyphen as minus sign
     trace leaf.toml --vary leaf.rods=3..9 => a whole number has nothing between
     trace leaf.toml --vary method.step=1e-3..1 => setting of a method
     trace leaf.toml --vary dynamics.density=1..2 => no equilibrium
