@@ -47,11 +47,11 @@ const ACCURACIES: (f64, f64) = (1e-7, 1.6e-4);
 /// requested ones so many are compared.
 const COMPARED: usize = 3;
 
-/// Frequencies that are listed without their shapes are accurate to this many times the
-/// tolerance of positions, or to the second number if that is less, but never asked to be
-/// better than the tolerance: by default eigenvalues have four digits.
-const LISTED: f64 = 25.0;
-const LEAST_LISTED: f64 = 2.5e-5;
+/// Largest relative error of frequencies that are listed without their shapes, over the tolerance
+/// and in itself, but never asked to be less than the tolerance: by default eigenvalues have four
+/// digits.
+const LISTED_OVER_TOLERANCE: f64 = 25.0;
+const LARGEST_LISTED: f64 = 2.5e-5;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
@@ -140,16 +140,20 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
     let left_out = above.map_or(0, |(others, _)| others);
+    let (wanted, most_unknowns) = match options.mode_shapes || list.exact {
+        true => (tolerance, MANY_MORE_UNKNOWNS),
+        false => {
+            let listed = (LISTED_OVER_TOLERANCE * tolerance).min(LARGEST_LISTED);
+            (tolerance.max(listed), FEW_UNKNOWNS)
+        }
+    };
     let mut nested = Nested {
         series: Series {
             index: found.index.unwrap_or(0).saturating_sub(left_out),
             single: found.clearly_stable || problem.segments().is_some(),
             grids: Vec::new(),
             tolerance,
-            wanted: match options.mode_shapes || list.exact {
-                true => tolerance,
-                false => tolerance.max((LISTED * tolerance).min(LEAST_LISTED)),
-            },
+            wanted,
             rounding: 0.0,
             turns: !finest.leaf.turns(&finest.state).is_empty(),
         },
@@ -161,10 +165,6 @@ pub fn lowest(problem: &Problem, found: &NestedEquilibrium, list: List) -> Optio
     let compares = requested && 2 * unknowns(&finest.leaf) <= FEW_UNKNOWNS;
     let enough = |series: &Series| {
         (!sharp || series.accurate()) && (!compares || series.grids.len() >= COMPARED)
-    };
-    let most_unknowns = match options.mode_shapes || list.exact {
-        true => MANY_MORE_UNKNOWNS,
-        false => FEW_UNKNOWNS,
     };
     let sufficient_grids = sufficient_grids(options, found);
     let skipped = sufficient_grids.saturating_sub(GRIDS);
