@@ -146,9 +146,9 @@ fn first_beside(
         (beyond <= WITHIN).then_some(point)
     };
     let mut nearest = None;
-    for away in AWAY {
+    for (k, away) in AWAY.into_iter().enumerate() {
         let Some(point) = at(away) else {
-            if nearest.is_none() && away == AWAY[0] {
+            if k == 0 {
                 // Over a short range the parameter changes by more than all of it there.
                 let nearer = (1..NEARER_TRIES).map(|k| away * NEARER.powi(k));
                 let found = nearer.into_iter().find_map(&mut at);
