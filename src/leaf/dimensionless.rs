@@ -177,6 +177,20 @@ impl Leaf {
         self.scenario.wind.is_some()
     }
 
+    /// The leaf with its tips apart and without the coupling of its veins; each tip bears an equal
+    /// part of the force on the joint one. Tissue, which has no force between veins in their rest
+    /// shapes, still ties them.
+    pub fn apart(&self) -> Leaf {
+        let mut apart = self.clone();
+        if self.joined() {
+            apart.loads.tip_force /= self.scenario.rods.len() as f64;
+        }
+        let scenario = Arc::make_mut(&mut apart.scenario);
+        scenario.joined = false;
+        scenario.coupling.fill([0.0; 3]);
+        apart
+    }
+
     /// Number of rods: of the whole leaf, or of the half.
     pub fn rods(&self) -> usize {
         let rods = self.scenario.rods.len();

@@ -98,6 +98,17 @@ impl DiscreteLeaf {
         discrete
     }
 
+    /// This leaf with its veins apart: [`Leaf::apart`].
+    pub fn apart(&self) -> Self {
+        let leaf = self.leaf.apart();
+        DiscreteLeaf {
+            loads: leaf.loads,
+            leaf,
+            coupling: vec![DVec3::ZERO; self.coupling.len()],
+            ..self.clone()
+        }
+    }
+
     /// The natural leaf, unstrained rods: v = v0, u = u0, each from its base.
     pub fn natural(&self) -> State {
         self.unstrained(true)

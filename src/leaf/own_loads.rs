@@ -50,7 +50,7 @@ impl DiscreteLeaf {
     }
 
     /// Own load on node `i` of rod `j`.
-    pub(super) fn own_load(&self, j: usize, i: usize) -> DVec3 {
+    pub fn own_load(&self, j: usize, i: usize) -> DVec3 {
         let load = self.own_loads.get(j * (self.segments() + 1) + i);
         load.map_or(DVec3::ZERO, |load| self.own_part() * *load)
     }

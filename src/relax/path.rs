@@ -1,9 +1,10 @@
 //! The path on which a leaf is loaded, and which defines the equilibrium that a relaxation finds.
 //!
 //! The veins of the natural leaf are in their rest shapes, apart and unloaded. Slowly, so that the
-//! leaf is at rest all the time, first the loads are put on in proportion, the tips keeping their
-//! distances from each other, then the tips are moved
-//! together while the tissue between the veins is put on. As long as this
+//! leaf is at rest all the time, first the loads are put on in proportion, each vein for itself and
+//! bearing an equal part of the force on the joint tip, then the tips are moved together while the
+//! coupling of the veins is put on. Tissue is without force between veins in their rest shapes: it
+//! belongs to the natural leaf, and ties the veins from the beginning. As long as this
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
 //! method. Where stability is lost the leaf moves on, down its energy (`loading::snap`).
 //!
@@ -30,9 +31,9 @@ words! {
 words! {
     /// A stage of the path.
     pub enum Stage {
-        /// The loads are put on.
+        /// The loads are put on the veins apart.
         Loading = "loading",
-        /// The tips are moved together, and the tissue is put on.
+        /// The tips are moved together, and the coupling is put on.
         Joining = "joining",
     }
 }

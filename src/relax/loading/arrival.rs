@@ -4,9 +4,10 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System, half_of, whole_of};
 use crate::newton::{Stop, Work};
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::grids::{follow, solve};
+use crate::relax::loading::partial::{resolves_loads, veins_cannot_buckle};
 use crate::relax::loading::walk::Walk;
 use crate::relax::nested::{Failure, Found, History, NestedEquilibrium, along};
-use crate::relax::path::{Event, Path};
+use crate::relax::path::{Event, Path, Stage};
 use crate::relax::request::options::Progress;
 use crate::relax::request::problem::Problem;
 use crate::relax::saddle;
@@ -51,7 +52,7 @@ pub fn load_slowly<'a>(
     effort: &mut Effort,
 ) -> Found {
     let leaf = problem.leaf;
-    let mut grid = coarsest_grid(leaf, COARSEST);
+    let mut grid = coarsest_grid(leaf);
     let mut path = problem.path();
     loop {
         let Arrived {
@@ -115,8 +116,17 @@ fn path_is_stable(path: &Option<Path>) -> bool {
     (path.as_ref()).is_some_and(|path| path.events().is_empty())
 }
 
-fn coarsest_grid(leaf: &Leaf, segments: usize) -> Grid {
+fn grid_of(leaf: &Leaf, segments: usize) -> Grid {
     Grid::new(segments.max(leaf.kinks().len() + 1), leaf.kinks())
+}
+
+/// The coarsest grid on which the leaf is loaded slowly.
+fn coarsest_grid(leaf: &Leaf) -> Grid {
+    let mut grid = grid_of(leaf, COARSEST);
+    while grid.segments() < FINEST && !resolves_loads(&DiscreteLeaf::new(leaf, grid.clone())) {
+        grid = grid.refined();
+    }
+    grid
 }
 
 /// A leaf whose path could not be followed is released from arcs.
@@ -125,7 +135,7 @@ fn release_instead(problem: &Problem, failure: Failure, effort: &mut Effort) -> 
     if problem.out_of_time() || !problem.loads_slowly() {
         return Err(Box::new(failure));
     }
-    let grid = coarsest_grid(problem.leaf, problem.segments().unwrap_or(COARSEST));
+    let grid = grid_of(problem.leaf, problem.segments().unwrap_or(COARSEST));
     effort.spare_system = None;
     along(solve(problem, grid, effort), Some(Path::Released))
 }
@@ -146,7 +156,7 @@ pub fn arrive(
 ) -> Result<Arrived, Box<Failure>> {
     let mut before: Option<Level> = None;
     loop {
-        let (level, events, end) = walk(problem, grid.clone(), effort);
+        let (level, events, end) = walk(problem, grid.clone(), Stage::Joining, effort);
         let finer = grid.refined();
         let spent = walks_left(effort) == 0 || problem.out_of_time();
         let last = finer.segments() > FINEST || spent;
@@ -224,10 +234,28 @@ fn walks_left(effort: &Effort) -> usize {
     BUDGET_OF_WALKS.saturating_sub(effort.walked)
 }
 
-/// Walks on one grid.
+/// Whether the veins, apart, take their loads without losing their stability. A leaf that was
+/// came to rest at once, as was `found`, does not tell.
+pub fn takes_loads_stably(
+    problem: &Problem,
+    found: &NestedEquilibrium,
+    effort: &mut Effort,
+) -> bool {
+    let bounded = |level: &Level| level.leaf.tied() || veins_cannot_buckle(&level.leaf);
+    if found.levels.first().is_some_and(bounded) {
+        return true;
+    }
+    let grid = coarsest_grid(problem.leaf);
+    let (_, events, end) = walk(problem, grid, Stage::Loading, effort);
+    effort.reached = None;
+    end.is_ok() && events.is_empty()
+}
+
+/// Walks on one grid to the end of a stage.
 fn walk(
     problem: &Problem,
     grid: Grid,
+    last: Stage,
     effort: &mut Effort,
 ) -> (Level, Vec<Event>, Result<(), Stop>) {
     let leaf = DiscreteLeaf::new(problem.leaf, grid).softened(WALKING_COMPLIANCE);
@@ -249,7 +277,7 @@ fn walk(
         (&problem.options.limit, most),
     );
     walk.leaning = problem.options.leaning;
-    let end = walk.run();
+    let end = walk.run(last);
     let events = std::mem::take(&mut walk.events);
     let reached = (walk.stage, walk.part);
     let evaluations = walk.work.force_evaluations - before;

@@ -2,16 +2,17 @@
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::relax::path::Stage;
+use crate::rod::Section;
 use crate::rotation;
 use glam::DVec3;
 
 /// A leaf on its path. The natural leaf has every vein in its rest shape, apart and unloaded.
-/// First the loads are put on, then the tips are moved together and the tissue between the veins
-/// is put on; in both stages in proportion to a part from 0 to 1.
+/// First the loads are put on the veins apart, then the tips are moved together and the coupling of
+/// the veins is put on; in both stages in proportion to a part from 0 to 1.
 pub struct Loading<'a> {
     /// The leaf at the end of the path.
     whole: &'a DiscreteLeaf,
-    /// The leaf at the present part.
+    /// The leaf at the present part: its veins are apart in the first stage.
     pub leaf: DiscreteLeaf,
     tips: Tips,
     stage: Stage,
@@ -85,8 +86,8 @@ impl<'a> Loading<'a> {
             true => Tips::Joining(Vec::new()),
             false => Tips::Free,
         };
-        let mut leaf = whole.clone();
-        leaf.load_in_part(whole, [0.0; 2]);
+        let mut leaf = whole.apart();
+        leaf.load_factor = 0.0;
         let loading = Loading {
             whole,
             leaf,
@@ -112,7 +113,12 @@ impl<'a> Loading<'a> {
     /// Begins a stage in a state.
     pub fn begin(&mut self, stage: Stage, state: &State) {
         (self.stage, self.part) = (stage, 0.0);
-        if let (Stage::Joining, Tips::Joining(offsets)) = (stage, &mut self.tips) {
+        if stage == Stage::Loading {
+            return;
+        }
+        self.leaf = self.whole.clone();
+        self.leaf.load_in_part(self.whole, [1.0, 0.0]);
+        if let Tips::Joining(offsets) = &mut self.tips {
             let tips: Vec<DVec3> = state.tips().collect();
             let bases: Vec<DVec3> = (0..state.rods()).map(|j| state.x[state.base(j)]).collect();
             *offsets = Offset::all(&bases, &tips);
@@ -147,4 +153,82 @@ impl<'a> Loading<'a> {
             }
         }
     }
+}
+
+/// The part of its bending energy that is set against the moments of a vein in
+/// [`veins_cannot_buckle`]: about the best where the bound decides.
+const AGAINST_MOMENTS: f64 = 0.3;
+
+/// Factor on the loads there, and the largest strain of stretch or shear by these: the bound is that
+/// of rods that neither stretch nor shear.
+const SAFETY: f64 = 1.2;
+const LARGEST_STRAIN: f64 = 0.05;
+
+/// Whether no vein, apart from the others, can lose its stability under any part of its loads, by
+/// a bound that asks for no equilibrium.
+///
+/// For rotations theta about the axes of the sections the second variation of a vein's energy is
+/// the integral of B |D theta|^2 - m (theta x D theta) - N (theta x (theta x d1)), with its smallest
+/// stiffness B, the moment m and the force N that it carries. The force is that of the dead loads
+/// beyond, whatever the shape, and |m| is at most its integral up to the tip. With y = |theta|, whose
+/// slope is at most |D theta|, the second variation is thus positive where
+/// (1 - a) B y'^2 - (|N| + m^2/(4 a B)) y^2 is, for any a between 0 and 1: as long as the solution of
+/// ((1 - a) B y')' + (|N| + m^2/(4 a B)) y = 0 that leaves the clamp does not turn back before the
+/// tip (Jacobi).
+pub fn veins_cannot_buckle(leaf: &DiscreteLeaf) -> bool {
+    let stands = |j: usize| {
+        let mut moment = 0.0;
+        let mut segments: Vec<[f64; 3]> = Vec::with_capacity(leaf.segments());
+        for (section, carried) in carried_forces(leaf, j) {
+            let force = SAFETY * carried;
+            if force * section.compliance.max_element() > LARGEST_STRAIN {
+                return false;
+            }
+            let length = section.ds * section.rest_strain.length();
+            moment += force * length;
+            let stiffness = section.couple_stiffness.min_element();
+            let against = force + moment * moment / (4.0 * AGAINST_MOMENTS * stiffness);
+            segments.push([length, (1.0 - AGAINST_MOMENTS) * stiffness, against]);
+        }
+        // y and (1 - a) B y', half of a segment each in turn.
+        let (mut y, mut z) = (0.0, 1.0);
+        for [length, stiffness, against] in segments.into_iter().rev() {
+            y += 0.5 * length * z / stiffness;
+            z -= length * against * y;
+            y += 0.5 * length * z / stiffness;
+            if z <= 0.0 {
+                return false;
+            }
+        }
+        true
+    };
+    !leaf.leaf.hinged() && (0..leaf.rods()).all(stands)
+}
+
+/// The largest P ds^2 / B of a segment with the stiffness B that carries the force P, as a vein
+/// bends within sqrt(B/P): where it is larger, critical loads are wrong by several per cent.
+const RESOLVED: f64 = 0.5;
+
+/// Whether the segments of a leaf are short enough for the forces of the veins apart.
+pub fn resolves_loads(leaf: &DiscreteLeaf) -> bool {
+    let short = |(section, carried): (&Section, f64)| {
+        carried * section.ds * section.ds <= RESOLVED * section.couple_stiffness.min_element()
+    };
+    (0..leaf.rods()).all(|j| carried_forces(leaf, j).all(short))
+}
+
+/// The sections of a vein apart, from the tip to the base, with the forces that they carry: whatever
+/// its shape, those of the dead loads beyond.
+fn carried_forces(leaf: &DiscreteLeaf, j: usize) -> impl Iterator<Item = (&Section, f64)> {
+    let (n, share) = (leaf.segments(), leaf.leaf.share(j));
+    let tips = match leaf.leaf.joined() {
+        true => leaf.leaf.scenario().rods.len() as f64,
+        false => 1.0,
+    };
+    let weight = leaf.leaf.length(j) * share * leaf.loads.gravity;
+    let mut carried = leaf.loads.tip_force * (share / tips);
+    (0..n).rev().map(move |i| {
+        carried += leaf.grid.weight(i + 1) * weight + leaf.own_load(j, i + 1);
+        (leaf.section(j, i), carried.length())
+    })
 }

@@ -92,7 +92,7 @@ impl<'w> Walk<'w> {
     ) -> Self {
         let (loading, natural) = Loading::new(whole);
         Walk {
-            system: System::new(whole),
+            system: System::new(&loading.leaf),
             work,
             limit,
             progress,
@@ -108,11 +108,19 @@ impl<'w> Walk<'w> {
         }
     }
 
-    /// Walks to the end, if it can; the last state and what happened on the way are kept.
-    pub fn run(&mut self) -> Result<(), Stop> {
+    /// Walks to the end of a stage, if it can; the last state and what happened on the way are kept.
+    pub fn run(&mut self, last: Stage) -> Result<(), Stop> {
         for stage in self.loading.stages() {
+            if stage == Stage::Joining && last == Stage::Loading {
+                break;
+            }
             let (_, state) = self.known.pop().expect("the last state");
             self.loading.begin(stage, &state);
+            if stage == Stage::Joining {
+                // Its tips move together, and its veins are coupled.
+                self.system = System::new(&self.loading.leaf);
+                self.solver = Definite::default();
+            }
             self.known.clear();
             self.known.push((0.0, state));
             (self.stage, self.part) = (stage, 0.0);
