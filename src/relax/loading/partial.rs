@@ -11,7 +11,7 @@ use glam::DVec3;
 /// the veins is put on; in both stages in proportion to a part from 0 to 1.
 pub struct Loading<'a> {
     /// The leaf at the end of the path.
-    whole: &'a DiscreteLeaf,
+    pub whole: &'a DiscreteLeaf,
     /// The leaf at the present part: its veins are apart in the first stage.
     pub leaf: DiscreteLeaf,
     tips: Tips,

@@ -117,8 +117,8 @@ impl<'w> Walk<'w> {
             let (_, state) = self.known.pop().expect("the last state");
             self.loading.begin(stage, &state);
             if stage == Stage::Joining {
-                // Its tips move together, and its veins are coupled.
-                self.system = System::new(&self.loading.leaf);
+                // Its tips move together, and its veins will be coupled.
+                self.system = System::new(self.loading.whole);
                 self.solver = Definite::default();
             }
             self.known.clear();
