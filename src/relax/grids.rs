@@ -5,6 +5,7 @@ use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::newton::{Newton, Stop, Work};
 use crate::relax::accuracy::richardson::distance;
 use crate::relax::nested::{Found, NestedEquilibrium};
+use crate::relax::path::Path;
 use crate::relax::request::problem::Problem;
 use crate::relax::saddle::ANY_SIGN;
 use crate::relax::settle::effort::{BUDGET, Effort};
@@ -32,10 +33,21 @@ const NEARBY_ITERATIONS: usize = 12;
 const NEARBY_ACCURACY: f64 = 1e-3;
 const NEARBY: f64 = 0.02;
 
-/// From the start to rest, on as many grids as the tolerance needs.
-pub fn solve(problem: &Problem, grid: Grid, effort: &mut Effort) -> Found {
-    let found = settle_from_start(problem, grid, effort)?;
-    refine(problem, found, effort)
+/// From the start to rest, on as many grids as the tolerance needs. A held leaf whose rest on a coarse
+/// grid leads to none on finer ones is moved to its holders on these.
+pub fn solve(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> Found {
+    loop {
+        let found = settle_from_start(problem, grid, effort)?;
+        let finer = found.levels[0].leaf.grid.refined();
+        let again = problem.leaf.is_held() && problem.segments().is_none();
+        match refine(problem, found, effort) {
+            Err(_) if again && finer.segments() <= FINEST_COMPARED && effort.spent <= BUDGET => {
+                effort.spare_system = None;
+                grid = finer;
+            }
+            found => return found,
+        }
+    }
 }
 
 /// The same from initial guesses on nested grids, each close to an equilibrium.
@@ -176,7 +188,15 @@ fn settle_from_start(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> 
     loop {
         let from_start = (grid.clone(), InitialGuess::Start);
         let settled = settle(problem, &mut found.history, from_start, effort);
-        let Settled { level, rest, moved } = settled;
+        let Settled {
+            level,
+            rest,
+            moved,
+            events,
+        } = settled;
+        if !problem.keeps_unstable() {
+            found.path = events.map(|events| Path::Held { events });
+        }
         let finer = grid.refined();
         let fixed = problem.segments().is_some();
         let last = fixed || finer.segments() > FINEST_COMPARED || problem.out_of_time();

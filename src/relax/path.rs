@@ -8,6 +8,9 @@
 //! path of equilibria is stable it is the only answer, whatever the grid, the tolerance and the
 //! method. Where stability is lost the leaf moves on, down its energy (`loading::snap`).
 //!
+//! A leaf that is held is moved to its holders instead, under its loads (`settle::grip`): that is its
+//! path.
+//!
 //! The loads come first because straight veins of unequal chords that are compressed before
 //! they are bent buckle at once, to either side; after their loads they are bent already.
 
@@ -35,6 +38,8 @@ words! {
         Loading = "loading",
         /// The tips are moved together, and the coupling is put on.
         Joining = "joining",
+        /// What is held is moved to its place.
+        Moving = "moving",
     }
 }
 
@@ -73,6 +78,11 @@ pub enum Path {
         /// Whether two grids lead to the same equilibrium.
         confirmed: bool,
     },
+    /// Moved to its holders; stably if nothing happened.
+    Held {
+        /// What happened.
+        events: Vec<Event>,
+    },
     /// Released.
     Released,
 }
@@ -87,7 +97,7 @@ impl Path {
     /// What happened on it.
     pub fn events(&self) -> &[Event] {
         match self {
-            Path::Loaded { events, .. } => events,
+            Path::Loaded { events, .. } | Path::Held { events } => events,
             Path::Released => &[],
         }
     }
@@ -106,11 +116,11 @@ impl Path {
     /// The word for it in files.
     pub fn word(&self) -> &'static str {
         let snapped = |event: &Event| event.happening == Happening::Snapped;
-        match self {
-            Path::Released => "released",
-            Path::Loaded { events, .. } if events.is_empty() => "stable-throughout",
-            Path::Loaded { events, .. } if events.iter().any(snapped) => "snapped",
-            Path::Loaded { .. } => "branched",
+        match self.events() {
+            _ if *self == Path::Released => "released",
+            [] => "stable-throughout",
+            events if events.iter().any(snapped) => "snapped",
+            _ => "branched",
         }
     }
 }

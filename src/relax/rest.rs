@@ -10,7 +10,7 @@ use crate::relax::request::method::Method;
 use crate::relax::request::options::{
     Options, Progress, RelaxError, check_tolerance, points_somewhere, rests_in_wind,
 };
-use crate::relax::request::problem::Problem;
+use crate::relax::request::problem::{COARSEST, Problem};
 use crate::relax::result::equilibrium::{Equilibrium, Outcome};
 use crate::relax::result::plausible;
 use crate::relax::result::report;
@@ -48,7 +48,11 @@ pub(crate) fn relax_on_grids(
     let method = options.method;
     // Four segments are too few to be divided among panels, and for the layers of tissue.
     let few = shape_alone && leaf.kinks().is_empty() && !leaf.has_tissue();
-    let least = least(method, tolerance, few);
+    // What a held leaf comes to depends on the way of its holders, which few segments would change.
+    let least = match leaf.is_held() {
+        true => COARSEST,
+        false => least(method, tolerance, few),
+    };
     let first = check_segments(&leaf, method.segments(), least)?;
     let half = reducible(method).then(|| leaf.half()).flatten();
     let problem = Problem {

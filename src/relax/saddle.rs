@@ -254,6 +254,28 @@ pub fn push_off(
     }
 }
 
+/// Energies of mirror images agree to this part, of the larger one or of one (A/L); images are
+/// farther apart than this (lengths, radians).
+const SAME_ENERGY: f64 = 1e-3;
+const IMAGES_APART: f64 = 0.05;
+
+/// Of the sides of a saddle to which a leaf turned, with their energies: that of less energy, or the
+/// first of two that are equal, and whether there is another one as good.
+pub fn lower_side(sides: [Option<(f64, State)>; 2]) -> Option<(State, bool)> {
+    match sides {
+        [Some((e1, one)), Some((e2, other))] => {
+            let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
+            let apart = one.distance(&other) > IMAGES_APART;
+            match e1 <= e2 || same {
+                true => Some((one, same && apart)),
+                false => Some((other, false)),
+            }
+        }
+        [Some((_, one)), None] | [None, Some((_, one))] => Some((one, false)),
+        [None, None] => None,
+    }
+}
+
 /// The saddle at a state, in the units of the scenario.
 pub fn saddle_of(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
     let scale = leaf.leaf.scale;

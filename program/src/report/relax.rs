@@ -124,7 +124,10 @@ fn way(path: &Path) -> String {
         Path::Loaded { events, .. } if events.is_empty() => {
             "stable throughout, from the unloaded veins".into()
         }
-        Path::Loaded { events, .. } => {
+        Path::Held { events } if events.is_empty() => {
+            "stable throughout, while it was moved to where it is held".into()
+        }
+        Path::Loaded { events, .. } | Path::Held { events } => {
             let events: Vec<String> = events.iter().map(Event::to_string).collect();
             events.join(", then ")
         }

@@ -130,7 +130,7 @@ impl<'a> Loading<'a> {
     pub fn carry(&mut self, [from, part]: [f64; 2], state: &mut State) {
         let shares = match self.stage {
             Stage::Loading => [part, 0.0],
-            Stage::Joining => [1.0, part],
+            Stage::Joining | Stage::Moving => [1.0, part],
         };
         self.leaf.load_in_part(self.whole, shares);
         self.part = part;

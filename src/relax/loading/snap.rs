@@ -41,9 +41,6 @@ const AT_REST: f64 = 1e-3;
 /// Saddles that are left in one motion.
 const SADDLES: usize = 6;
 
-/// Energies of mirror images agree to this part, of the larger one or of one (A/L).
-const SAME_ENERGY: f64 = 1e-3;
-
 /// A leaf that moves no farther (lengths, radians) has not snapped.
 const NEARBY: f64 = 0.05;
 
@@ -69,19 +66,7 @@ impl Walk<'_> {
                 Err(stop) => stopped = stop,
             }
         }
-        let [one, other] = found;
-        let (state, equally_open) = match (one, other) {
-            (Some((e1, one)), Some((e2, other))) => {
-                let same = (e1 - e2).abs() <= SAME_ENERGY * e1.abs().max(e2.abs()).max(1.0);
-                let apart = one.distance(&other) > NEARBY;
-                match e1 <= e2 || same {
-                    true => (one, same && apart),
-                    false => (other, false),
-                }
-            }
-            (Some((_, one)), None) | (None, Some((_, one))) => (one, false),
-            (None, None) => return Err(stopped),
-        };
+        let (state, equally_open) = saddle::lower_side(found).ok_or(stopped)?;
         self.next = state;
         self.note(part, Happening::Branched { equally_open });
         Ok(())

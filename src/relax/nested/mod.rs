@@ -109,9 +109,10 @@ impl Failure {
     }
 }
 
-/// What was found on this path.
+/// What was found on this path, or, without one, on its own.
 pub fn along(found: Found, path: Option<Path>) -> Found {
     match found {
+        found if path.is_none() => found,
         Ok(found) => Ok(found.along(path)),
         Err(failure) => Err(Box::new(failure.along(path))),
     }

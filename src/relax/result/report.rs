@@ -111,15 +111,14 @@ pub fn neutral_directions(scenario: &Scenario, rods: &[RodShape]) -> usize {
 /// belongs to it.
 fn path(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
     let mut path = found.path.clone()?;
-    if let Path::Loaded { events, .. } = &mut path
+    if let Path::Loaded { events, .. } | Path::Held { events } = &mut path
         && found.history.saddle.is_some()
     {
-        let joins = leaf.joined() && leaf.rods() > 1;
         events.push(Event {
-            stage: if joins {
-                Stage::Joining
-            } else {
-                Stage::Loading
+            stage: match leaf.joined() && leaf.rods() > 1 {
+                _ if leaf.is_held() => Stage::Moving,
+                true => Stage::Joining,
+                false => Stage::Loading,
             },
             part: 1.0,
             happening: Happening::Branched {

@@ -4,6 +4,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::newton::{Definite, Newton, Stop};
 use crate::relax::nested::History;
 use crate::relax::nested::error::is_large;
+use crate::relax::path::Event;
 use crate::relax::request::method::{Method, SemiImplicit};
 use crate::relax::request::options::Progress;
 use crate::relax::request::problem::Problem;
@@ -61,6 +62,8 @@ pub struct Settled {
     /// Whether it had to move through states of non-convex energy, instead of settling in the
     /// valley of the initial guess.
     pub moved: bool,
+    /// Where a leaf that was moved to its holders lost its stability; `None` if it was not.
+    pub events: Option<Vec<Event>>,
 }
 
 /// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
@@ -103,13 +106,18 @@ fn settle_upright(
     };
     let dead_moment = leaf.has_moments();
     let mut moved = false;
-    match grip {
+    let mut events = None;
+    if grip {
         // Dead moments act once it is held: only without them the path has an energy to follow.
-        true if dead_moment => {
-            (state, _, moved) = move_grips(problem, &leaf.without_moments(), state, effort);
-        }
-        true => (state, near_rest, moved) = move_grips(problem, &leaf, state, effort),
-        false => leaf.hold(&mut state),
+        let held = match dead_moment {
+            true => move_grips(problem, &leaf.without_moments(), state, effort),
+            false => move_grips(problem, &leaf, state, effort),
+        };
+        (state, moved) = (held.state, held.moved);
+        near_rest = held.near_rest && !dead_moment;
+        events = Some(held.events).filter(|_| leaf.leaf.has_potential());
+    } else {
+        leaf.hold(&mut state);
     }
     let explicit = matches!(problem.options.method, Method::Explicit { .. });
     let windy = leaf.leaf.in_wind();
@@ -130,6 +138,7 @@ fn settle_upright(
         effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
         return Settled {
             moved: moved || settled.moved,
+            events,
             ..settled
         };
     }
@@ -162,7 +171,12 @@ fn settle_upright(
         history.remaining = history.remaining.max(rest.unwrap_or(0.0));
     }
     let level = Level { leaf, state };
-    Settled { level, rest, moved }
+    Settled {
+        level,
+        rest,
+        moved,
+        events,
+    }
 }
 
 /// The start of a leaf without an initial guess.
@@ -258,7 +272,12 @@ fn settle_semi_implicit(
     let Relaxation { state, moved, .. } = relaxation;
     history.contraction = relaxation.solver.contraction;
     let level = Level { leaf, state };
-    Settled { level, rest, moved }
+    Settled {
+        level,
+        rest,
+        moved,
+        events: None,
+    }
 }
 
 /// Reports the steps on a grid of `grid` segments.
