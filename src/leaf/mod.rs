@@ -36,3 +36,4 @@ pub use grid::Grid;
 pub use mirror::{are_mirrored, half_of, is_mirrored, whole_fields, whole_of};
 pub use state::{Field, Increment, State, add, shift, turn};
 pub use system::{Solved, Sums, System};
+pub use tissue::HalfTurn;

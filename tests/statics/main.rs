@@ -23,6 +23,7 @@ mod linear_theory;
 mod loads;
 mod measured_leaves;
 mod moment_sensitivities;
+mod no_equilibrium;
 mod objectivity;
 mod order;
 mod path;
