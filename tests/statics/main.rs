@@ -36,6 +36,7 @@ mod rollup;
 mod section;
 mod sensitivities;
 mod soft_leaves;
+mod stated_bars;
 mod stiffness;
 mod stress;
 mod taut_rods;
