@@ -37,6 +37,7 @@ mod rollup;
 mod section;
 mod sensitivities;
 mod soft_leaves;
+mod stated_bars;
 mod stiffness;
 mod stress;
 mod taut_rods;

@@ -69,7 +69,8 @@ pub fn equilibrium(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
-        stress: Stresses::of(scenario, &stations, &rods).map(|it| it.on_grids(scenario, found)),
+        stress: Stresses::of(scenario, &stations, &rods)
+            .map(|it| it.on_grids(scenario, &stations, found)),
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
