@@ -96,11 +96,17 @@ pub fn fit(
         candidates: candidates.unwrap_or_default(),
         tolerance,
         limit: Default::default(),
+        most_evaluations: None,
     };
     let found = run(py, progress, move |monitor| {
         request.limit = monitor.limit();
         study::fit(&request, &mut |now| {
-            let FitStep { step, sum, .. } = *now;
+            let FitStep {
+                step, sum, budget, ..
+            } = *now;
+            if budget.is_some() {
+                return;
+            }
             monitor.report_or_end(step as f64, None, || {
                 format!("step {step}, sum of squares {sum:.6e}")
             });

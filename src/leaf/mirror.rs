@@ -164,6 +164,29 @@ pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields
     (0..count).map(rod).collect()
 }
 
+/// Changes of position, rotation, force and moment of the rods of the whole leaf, from those of its half.
+pub fn whole_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
+    if !half.mirrored {
+        return rods;
+    }
+    let count = half.scenario().rods.len();
+    let rod = |j: usize| {
+        let own = j.min(count - 1 - j);
+        let (image, share) = (own != j, half.share(own));
+        let axial = if image { -1.0 } else { 1.0 };
+        let node = |&[x, turn, n, m]: &[DVec3; 4]| {
+            [
+                reflect(x, image),
+                axial * reflect(turn, image),
+                reflect(n / share, image),
+                axial * reflect(m / share, image),
+            ]
+        };
+        rods[own].iter().map(node).collect()
+    };
+    (0..count).map(rod).collect()
+}
+
 /// A rotation axis changes sign in the mirror, except its normal component.
 fn turned(q: DQuat, image: bool) -> DQuat {
     match image {

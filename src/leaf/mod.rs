@@ -33,6 +33,7 @@ pub use discrete::DiscreteLeaf;
 pub use factorised::Factorised;
 pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
-pub use mirror::{are_mirrored, half_of, is_mirrored, whole_fields, whole_of};
+pub use mirror::{are_mirrored, half_of, is_mirrored, whole_changes, whole_fields, whole_of};
 pub use state::{Field, Increment, State, add, shift, turn};
 pub use system::{Solved, Sums, System};
+pub use tissue::HalfTurn;

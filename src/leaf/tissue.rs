@@ -6,11 +6,72 @@ use super::loads::NodeLoad;
 use super::state::{Increment, State, shift, turn};
 use super::system::System;
 use crate::largest::largest;
+use crate::numbers::two_digits;
 use crate::rod::{Ends, Strip};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
+/// Sections of two neighbouring veins that tissue ties, turned against each other by half a turn.
+/// The law of the tissue depends on the shorter one of both rotations between them, and jumps there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfTurn {
+    /// The first of both veins, from 0.
+    pub gap: usize,
+    /// Where they are, as a fraction of the length.
+    pub sigma: f64,
+}
+
+impl HalfTurn {
+    /// The subject and the predicate of a sentence on it.
+    pub fn sentence(&self) -> String {
+        format!(
+            "the sections of veins {} and {} are turned against each other by half a turn at {} of their length, \
+             where the law of the tissue between them jumps from one sense of rotation to the other",
+            self.gap + 1,
+            self.gap + 2,
+            two_digits(self.sigma)
+        )
+    }
+}
+
+/// Angle between two sections, in radians, by which half a turn exceeds theirs at most where an
+/// iteration that ended is taken to have ended at half a turn: such iterations go back and forth
+/// between both sides of the jump.
+const AT_HALF_TURN: f64 = 0.01;
+
 impl DiscreteLeaf {
+    /// For every strip, whether the quaternions of its nodes are on the same side: in a continuous
+    /// motion this changes only where their rotation against each other passes half a turn.
+    pub fn alignments(&self, state: &State) -> Vec<bool> {
+        let strips = self.each_strip();
+        strips
+            .map(|(g, i, _)| cosine_of_half(state, g, i) >= 0.0)
+            .collect()
+    }
+
+    /// The first place where sections have passed half a turn against each other in a continuous
+    /// motion that began with these alignments.
+    pub fn half_turn_since(&self, alignments: &[bool], state: &State) -> Option<HalfTurn> {
+        let mut strips = self.each_strip().zip(alignments);
+        let passed = strips.find(|((g, i, strip), aligned)| {
+            (cosine_of_half(state, *g, *i) >= 0.0) != **aligned && strip.acts()
+        });
+        passed.map(|((g, i, _), _)| self.half_turn(g, i))
+    }
+
+    /// The place where sections are turned against each other by half a turn, nearly.
+    pub fn half_turn_near(&self, state: &State) -> Option<HalfTurn> {
+        let acting = self.each_strip().filter(|(.., strip)| strip.acts());
+        let cosines = acting.map(|(g, i, _)| (cosine_of_half(state, g, i).abs(), g, i));
+        let (cosine, g, i) = cosines.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (cosine < (0.5 * AT_HALF_TURN).sin()).then(|| self.half_turn(g, i))
+    }
+
+    fn half_turn(&self, gap: usize, node: usize) -> HalfTurn {
+        let sigma = self.grid.sigma()[node];
+        HalfTurn { gap, sigma }
+    }
+
     /// The strips of this leaf on its grid, gap after gap, base to tip: without force between rods
     /// that each have their rest shape, the `natural` leaf. Weighted as the coupling, but also at a
     /// joint tip, where they resist rotations.
@@ -237,6 +298,12 @@ fn stiffness(strip: &Strip, ends: &Ends) -> SMatrix<f64, 12, 12> {
         (1, 0) => hessian.across[c][r - 6],
         (a, _) => hessian.own[a][r.min(c) % 6][r.max(c) % 6],
     })
+}
+
+/// The cosine of half the angle between the sections of a strip, negative where their quaternions
+/// are on opposite sides.
+fn cosine_of_half(state: &State, g: usize, i: usize) -> f64 {
+    state.q[state.base(g) + i].dot(state.q[state.base(g + 1) + i])
 }
 
 /// The two nodes of a strip.

@@ -13,6 +13,7 @@ use super::system::System;
 use crate::rotation::outer;
 use crate::scenario::{Begin, Turning};
 use glam::DVec3;
+use std::borrow::Cow;
 
 /// Stiffness of the spring, A/L^3, or A/L against a rotation.
 const SPRING: f64 = 100.0;
@@ -125,6 +126,15 @@ impl DiscreteLeaf {
                 forces.iter_mut().for_each(|force| *force = turn * *force);
             }
         }
+    }
+
+    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::lean_down`].
+    pub fn leaning<'s>(&self, state: &'s State) -> Cow<'s, State> {
+        let mut state = Cow::Borrowed(state);
+        if self.turnings().next().is_some() {
+            self.lean_down(state.to_mut());
+        }
+        state
     }
 
     /// The turns at unit rate of veins that can: increments of the nodes of all rods.

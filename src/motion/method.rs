@@ -1,6 +1,6 @@
 //! The interface of all methods of time integration.
 
-use crate::leaf::State;
+use crate::leaf::{HalfTurn, State};
 use glam::DVec3;
 
 /// Angular and linear velocity of a node, along the lab axes.
@@ -101,6 +101,14 @@ pub enum Stopped {
         /// Segments per rod.
         segments: usize,
     },
+    /// Sections of neighbouring veins passed half a turn against each other.
+    #[error("at t = {time:.6e} {}; the motion cannot be followed beyond: end it before", half_turn.sentence())]
+    HalfTurn {
+        /// Time.
+        time: f64,
+        /// Where.
+        half_turn: HalfTurn,
+    },
     /// No time step is short enough.
     #[error("at t = {time:.6e} no time step is short enough to go on; {advice}")]
     StepTooShort {
@@ -117,6 +125,7 @@ impl Stopped {
         match self {
             Stopped::Diverged { .. } => "diverged",
             Stopped::Unresolved { .. } => "unresolved",
+            Stopped::HalfTurn { .. } => "half-turn",
             Stopped::StepTooShort { .. } => "step-too-short",
         }
     }
@@ -126,6 +135,7 @@ impl Stopped {
         match &mut self {
             Stopped::Diverged { time, .. }
             | Stopped::Unresolved { time, .. }
+            | Stopped::HalfTurn { time, .. }
             | Stopped::StepTooShort { time, .. } => *time *= unit,
         }
         self

@@ -59,6 +59,11 @@ impl Strip {
         }
     }
 
+    /// Whether it resists anything.
+    pub fn acts(&self) -> bool {
+        self.stiffness != DVec3::ZERO || self.fold != 0.0
+    }
+
     /// The difference from another strip.
     pub fn minus(&self, other: &Strip) -> Strip {
         Strip {

@@ -68,7 +68,7 @@ pub use tip::{Clamp, HeldTip};
 pub use tissue::Tissue;
 /// Values as they can be written.
 pub use toml::{Table, Value};
-pub use turning::{Begin, Turning};
+pub use turning::{Begin, Turning, UnbalancedMoment};
 pub use units::Units;
 pub(crate) use values::number_meant;
 pub use wind::Wind;

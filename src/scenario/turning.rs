@@ -23,6 +23,10 @@ const ACROSS: f64 = 1e-8;
 /// Numbers that differ by less than this part are the same.
 const ROUNDING: f64 = 1e-12;
 
+/// A vein that is not round spins without resistance only where it is straight. Where it is bent
+/// by more than this part of what else counts as near, its stiffer side rolls over.
+const STRAIGHT: f64 = 1e-3;
+
 /// Profiles are compared at so many equal distances, and at their kinks.
 const COMPARED: usize = 16;
 
@@ -40,6 +44,15 @@ pub struct Turning {
     pub own: f64,
     /// Whether they turn so also where they are bent.
     pub bent: bool,
+}
+
+/// Moments about a line about which nothing holds a group of veins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnbalancedMoment {
+    /// Which line.
+    pub line: &'static str,
+    /// The sum of the moments about it.
+    pub moment: f64,
 }
 
 /// The rotations in which a vein begins.
@@ -88,15 +101,15 @@ impl Turning {
     /// `near` from the axis through `point`; or, where a vein spins, its sections, if it is round or no
     /// point is so far from the line between its ends.
     pub fn moves(&self, points: &[DVec3], point: DVec3, near: f64) -> bool {
-        let off = |from: DVec3, axis: DVec3| {
+        let off = |from: DVec3, axis: DVec3, near: f64| {
             let mut points = points.iter();
             points.any(|at| (*at - from).reject_from_normalized(axis).length() > near)
         };
         match (self.axis == DVec3::ZERO, points) {
-            (false, _) => off(point, self.axis),
+            (false, _) => off(point, self.axis, near),
             (true, [base, .., tip]) => {
                 let chord = (*tip - *base).normalize_or(DVec3::X);
-                self.bent || !off(*base, chord)
+                self.bent || !off(*base, chord, STRAIGHT * near)
             }
             (true, _) => self.bent,
         }
@@ -172,17 +185,8 @@ impl Scenario {
     /// where it is held or, if there is only one, along its loads.
     fn rigid_turn(&self, group: &Range<usize>) -> Option<Turning> {
         let apart = self.held_apart(group)?;
-        let near = ROUNDING * super::longest(&self.rods);
-        let on_line = |axis: DVec3| {
-            let mut apart = apart.iter();
-            apart.all(|it| it.reject_from_normalized(axis).length() <= near)
-        };
-        let loads = self.loads_on(group);
-        let axis = self.line_of(group, &apart)?;
-        let turns = on_line(axis)
-            && loads.iter().all(|load| is_along(*load, axis))
-            && self.coupling_is_isotropic(group, axis);
-        turns.then(|| Turning {
+        let axis = self.axis_between_hinges(group, &apart)?;
+        (!self.has_moments_on(group)).then(|| Turning {
             rods: group.clone(),
             point: self.rods[group.start].base_position(),
             axis,
@@ -191,13 +195,59 @@ impl Scenario {
         })
     }
 
+    /// The axis about which a group of tied veins on hinges, which is held in places that are so far
+    /// `apart`, can turn as a rigid body while its forces do no work.
+    fn axis_between_hinges(&self, group: &Range<usize>, apart: &[DVec3]) -> Option<DVec3> {
+        let near = ROUNDING * super::longest(&self.rods);
+        let on_line = |axis: DVec3| {
+            let mut apart = apart.iter();
+            apart.all(|it| it.reject_from_normalized(axis).length() <= near)
+        };
+        let loads = self.loads_on(group);
+        let axis = self.line_of(group, apart)?;
+        let turns = on_line(axis)
+            && loads.iter().all(|load| is_along(*load, axis))
+            && self.coupling_is_isotropic(group, axis);
+        turns.then_some(axis)
+    }
+
+    /// The moments on a leaf that cannot rest: on a group of veins that turns as a rigid body while
+    /// no force does work, they sum up to something about the axis.
+    pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
+        if self.base_held != Hold::Pinned || self.wind.is_some() {
+            return None;
+        }
+        self.tied_groups().into_iter().find_map(|group| {
+            let apart = self.held_apart(&group)?;
+            let moments = self.moments_on(&group);
+            let whole: DVec3 = moments.iter().sum();
+            let size: f64 = moments.iter().map(|moment| moment.length()).sum();
+            let (line, moment) = match self.line_of(&group, &apart) {
+                Some(_) => {
+                    let axis = self.axis_between_hinges(&group, &apart)?;
+                    let held = apart
+                        .iter()
+                        .any(|place| is_along(*place, axis) && *place != DVec3::ZERO);
+                    let line = if held {
+                        "the line through its holders"
+                    } else {
+                        "the line along its loads through its hinge"
+                    };
+                    (line, whole.dot(axis))
+                }
+                None => ("any line through its hinge", whole.length()),
+            };
+            (moment.abs() > ROUNDING * size).then_some(UnbalancedMoment { line, moment })
+        })
+    }
+
     /// The places where a group of veins is held, from that of its first hinge; `None` if clamps hold
-    /// it, or moments act, or grips, whose places depend on the shapes at rest.
+    /// it, or grips, whose places depend on the shapes at rest.
     fn held_apart(&self, group: &Range<usize>) -> Option<Vec<DVec3>> {
         let tip = self.held_tip.as_ref();
         let gripped = self.grips.iter().any(|grip| group.contains(&grip.vein));
         let clamped = tip.is_some_and(|held| held.clamps.is_some());
-        if gripped || clamped || self.has_moments_on(group) {
+        if gripped || clamped {
             return None;
         }
         let tip = tip.map(|held| DVec3::from_array(held.position));
@@ -219,7 +269,8 @@ impl Scenario {
     pub fn turns_freely(&self) -> bool {
         let free = |group: Range<usize>| {
             let apart = self.held_apart(&group);
-            apart.is_some_and(|apart| self.line_of(&group, &apart).is_none())
+            let points = |apart: Vec<DVec3>| self.line_of(&group, &apart).is_some();
+            !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
         };
         let hinged = self.base_held == Hold::Pinned && self.wind.is_none();
         hinged && self.tied_groups().into_iter().any(free)
@@ -239,9 +290,14 @@ impl Scenario {
 
     /// Whether dead moments, which have no potential, act on a group of veins.
     fn has_moments_on(&self, group: &Range<usize>) -> bool {
-        let mut points = self.points.iter();
-        let turned = points.any(|it| group.contains(&it.vein) && it.moment != [0.0; 3]);
-        turned || self.tip_moment != [0.0; 3]
+        self.moments_on(group).iter().any(|it| *it != DVec3::ZERO)
+    }
+
+    /// The dead moments on a group of veins.
+    fn moments_on(&self, group: &Range<usize>) -> Vec<DVec3> {
+        let points = self.points.iter().filter(|it| group.contains(&it.vein));
+        let moments = points.map(|it| it.moment).chain([self.tip_moment]);
+        moments.map(DVec3::from_array).collect()
     }
 
     /// All loads on a group of veins, where they may be largest.

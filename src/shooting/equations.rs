@@ -198,6 +198,11 @@ impl<'a> Equations<'a> {
         self.coupling[g] != DVec3::ZERO || self.tissue.is_some()
     }
 
+    /// Whether tissue ties neighbouring rods.
+    pub fn is_tied(&self) -> bool {
+        self.tissue.is_some()
+    }
+
     /// The linearised loads by the tissue of gap `g`, if there is any.
     pub fn tissue_tangent(&self, g: usize, sigma: f64, y: &[f64]) -> Option<Tangent> {
         let tissue = self.tissue.as_ref()?;

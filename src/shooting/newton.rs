@@ -55,6 +55,20 @@ const NOISE: f64 = 1e3;
 /// reported as a bifurcation nearby.
 const NEARLY_SINGULAR: f64 = 1e-7;
 
+/// Corrections of a leaf at rest below this that a full step does not reduce are what rounding makes
+/// of perturbations that grow: no part of a step and no other linearisation reduces them.
+const ROUNDED: f64 = 1e-5;
+
+/// Cost of linearisations, in rods times steps of the integration, beyond which Newton's method from a
+/// leaf at rest has to converge as it does near a solution: about two seconds on one core.
+const MOST_LINEARIZED: usize = 60_000;
+
+/// The cost of the tissue of a gap in that of a rod.
+const TISSUE: usize = 20;
+
+/// Contraction by a full step near a solution.
+const CONVERGING: f64 = 0.25;
+
 /// Unless perturbations grow by more than this over an interval, which
 /// alone makes the equations nearly singular.
 const LARGEST_GROWTH: f64 = 100.0 * GROWTH;
@@ -71,6 +85,7 @@ fn no_progress(correction: f64) -> Reason {
         correction,
         growth: 0.0,
         fixed: false,
+        from_leaf: false,
     }
 }
 
@@ -81,6 +96,12 @@ pub struct Newton<'e, 'a, 'p> {
     pub nodes: Nodes,
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
+    /// Whether the start is a leaf at rest.
+    pub from_leaf: bool,
+    /// Steps of the last integration, over all intervals.
+    steps: usize,
+    /// Cost of all linearisations.
+    linearized: usize,
     /// Which of the turns without resistance move something.
     moved: Vec<bool>,
     /// The last linearisation.
@@ -128,6 +149,9 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             units: Units::new(equations, near),
             nodes,
             only_near: false,
+            from_leaf: false,
+            steps: 0,
+            linearized: 0,
             moved: (equations.turnings().iter())
                 .map(|turning| turns_something(equations, near, turning))
                 .collect(),
@@ -188,6 +212,9 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                         break (trial, next, 0.0);
                     }
                 }
+                if self.costs_too_much() || self.from_leaf && fresh && size <= ROUNDED {
+                    break 'iterations;
+                }
                 if !fresh {
                     residuals = self.linearize(tolerance)?;
                     fresh = true;
@@ -215,6 +242,10 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             if self.only_near && ratio > NEAR {
                 break;
             }
+            let converges = factor == 1.0 && ratio <= CONVERGING;
+            if self.costs_too_much() && !converges {
+                break;
+            }
             let keep = factor == 1.0 && ratio <= KEEP;
             residuals = if keep {
                 next
@@ -224,6 +255,22 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             fresh = !keep;
         }
         Err(no_progress(size))
+    }
+
+    /// Whether another linearisation from a leaf at rest would cost too much.
+    fn costs_too_much(&self) -> bool {
+        self.from_leaf && self.linearized + self.cost() > MOST_LINEARIZED
+    }
+
+    /// The cost of a linearisation along the last integration.
+    fn cost(&self) -> usize {
+        let rods = self.equations.rods();
+        let gaps = if self.equations.is_tied() {
+            rods - 1
+        } else {
+            0
+        };
+        self.steps * (rods + TISSUE * gaps)
     }
 
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Reason> {
@@ -239,6 +286,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
+        self.linearized += self.cost();
         self.condensed = CondensedEquations::new(self.equations, &self.units, maps, &self.turns());
         match self.condensed {
             Some(_) => Ok(residuals),
@@ -340,8 +388,9 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             return Err(Reason::OutOfTime);
         }
         let integrated = integrate(self.equations, nodes, tolerance, linear)?;
+        self.steps = integrated.iter().map(|interval| interval.count).sum();
+        self.log.work.steps += self.steps;
         for interval in &integrated {
-            self.log.work.steps += interval.count;
             self.log.work.slopes += interval.evaluations;
         }
         Ok(integrated)

@@ -169,6 +169,8 @@ pub enum Reason {
         sigma: f64,
         /// Whether the number of intervals was given.
         fixed: bool,
+        /// Whether the start was a leaf at rest.
+        from_leaf: bool,
     },
     /// Newton's method does not converge.
     NoConvergence {
@@ -178,6 +180,16 @@ pub enum Reason {
         growth: f64,
         /// Whether the number of intervals was given.
         fixed: bool,
+        /// Whether the start was a leaf at rest.
+        from_leaf: bool,
+    },
+    /// From a leaf at rest corrections do not decrease as they do near a solution: rounding, in
+    /// perturbations that grow, leaves no smaller ones.
+    Rounding {
+        /// The last correction, relative.
+        correction: f64,
+        /// Decimal logarithm of the growth of perturbations from base to tip.
+        growth: f64,
     },
     /// The equations are singular.
     Singular(Neutral),
@@ -206,15 +218,22 @@ impl From<Unbounded> for Reason {
         Reason::Unbounded {
             sigma,
             fixed: false,
+            from_leaf: false,
         }
     }
 }
 
 impl Reason {
-    /// Whether more intervals may help is known where their number is.
-    pub(in crate::shooting) fn with_intervals(mut self, given: bool) -> Self {
-        if let Reason::Unbounded { fixed, .. } | Reason::NoConvergence { fixed, .. } = &mut self {
-            *fixed = given;
+    /// What may help is known where the number of intervals and the start are.
+    pub(in crate::shooting) fn in_context(mut self, given: bool, leaf: bool) -> Self {
+        if let Reason::Unbounded {
+            fixed, from_leaf, ..
+        }
+        | Reason::NoConvergence {
+            fixed, from_leaf, ..
+        } = &mut self
+        {
+            (*fixed, *from_leaf) = (given, leaf);
         }
         self
     }
@@ -228,6 +247,12 @@ impl Reason {
                 growth,
                 ..
             } if growth > TOO_MUCH_GROWTH => "use more intervals",
+            Reason::Unbounded {
+                from_leaf: true, ..
+            } => "more intervals than are allowed would be needed",
+            Reason::NoConvergence {
+                from_leaf: true, ..
+            } => "lower the load",
             _ => "lower the load, or start from the relaxed leaf",
         }
     }
@@ -250,6 +275,11 @@ impl fmt::Display for Reason {
             Reason::NoConvergence { correction, .. } => write!(
                 f,
                 "Newton's method stops at corrections of {correction:.1e}: {advice}"
+            ),
+            Reason::Rounding { correction, growth } => write!(
+                f,
+                "shooting cannot resolve this leaf: perturbations grow 10^{growth:.0} times from base to tip, and \
+                 from the leaf at rest corrections of {correction:.1e} do not decrease"
             ),
             Reason::Singular(neutral) => write!(
                 f,

@@ -121,7 +121,8 @@ fn solve_once(
         part: 1.0,
         progress,
     };
-    let modelled = check_models(scenario, matches!(start, Start::Leaf { .. }));
+    let from_leaf = matches!(start, Start::Leaf { .. });
+    let modelled = check_models(scenario, from_leaf);
     let found = match (modelled, start) {
         (Err(missing), _) => Err(Interrupted {
             reason: missing.into(),
@@ -135,22 +136,24 @@ fn solve_once(
     };
     let end = match found {
         Err(end) => end,
-        Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut log) {
-            Ok(solution) => {
-                let work = log.work;
-                return Ok(Solution { work, ..solution });
+        Ok(near) => {
+            match solve_near(&equations, (&near, from_leaf), tolerance, options, &mut log) {
+                Ok(solution) => {
+                    let work = log.work;
+                    return Ok(Solution { work, ..solution });
+                }
+                Err(reason) => Interrupted {
+                    reason,
+                    part: 1.0,
+                    near,
+                },
             }
-            Err(reason) => Interrupted {
-                reason,
-                part: 1.0,
-                near,
-            },
-        },
+        }
     };
     let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
     let near = Trajectory::new(&equations, options.stations.to_vec(), states.collect());
     Err(Failure {
-        reason: end.reason.with_intervals(options.intervals.is_some()),
+        reason: (end.reason).in_context(options.intervals.is_some(), from_leaf),
         part: end.part,
         rods: near.shape(&equations),
         work: log.work,
@@ -159,13 +162,15 @@ fn solve_once(
 
 fn solve_near(
     equations: &Equations,
-    near: &Trajectory,
+    (near, from_leaf): (&Trajectory, bool),
     tolerance: f64,
     options: &Options,
     log: &mut Log,
 ) -> Result<Solution, Reason> {
     let stations = options.stations;
     let mut newton = Newton::from_trajectory(equations, near, options.intervals, log)?;
+    // Over intervals that are given perturbations may grow too much for another reason.
+    newton.from_leaf = from_leaf && options.intervals.is_none();
     let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
         newton.solve(tolerance)?;
         let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);

@@ -30,6 +30,7 @@ mod refinement;
 mod start;
 mod stills;
 
+pub use crate::leaf::HalfTurn;
 pub use crate::motion::{Energy, Stopped};
 pub use choice::{Choice, Reason};
 pub use cost::Cost;

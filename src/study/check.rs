@@ -13,7 +13,7 @@ use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, Se
 use crate::scenario::Scenario;
 use crate::shape::Difference;
 use crate::shooting;
-use crate::shooting::{Solution, Start};
+use crate::shooting::{Reason, Solution, Start};
 use crate::words;
 use shot::relaxation;
 
@@ -51,6 +51,9 @@ pub enum Verdict {
     Differ,
     /// There are not two solutions to compare, with the reason.
     NotCompared(String),
+    /// Shooting finds no solution of its own, only that nothing it can resolve contradicts the relaxed
+    /// leaf, with the reason.
+    NotIndependent(String),
 }
 
 words! {
@@ -161,7 +164,15 @@ impl Check {
                 let why = why.unwrap_or_default();
                 return Verdict::NotCompared(format!("the relaxation did not come to rest{why}"));
             }
-            Some(Err(failure)) => return Verdict::NotCompared(failure.reason.to_string()),
+            Some(Err(failure)) => {
+                let why = failure.reason.to_string();
+                return match failure.reason {
+                    Reason::Rounding { .. } | Reason::Unbounded { fixed: false, .. } => {
+                        Verdict::NotIndependent(why)
+                    }
+                    _ => Verdict::NotCompared(why),
+                };
+            }
             Some(Ok(solution)) => solution,
         };
         if solution.error.position > self.allowed() {

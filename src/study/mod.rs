@@ -28,7 +28,7 @@ pub use chart::{
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use equilibria::{Equilibria, Found, IN_VAIN, equilibria};
 pub use fit::{
-    Comparison, Data, DataFile, Experiment, Fit, FitAlternative, FitCandidate, FitError,
+    Comparison, Data, DataFile, Experiment, Fit, FitAlternative, FitBudget, FitCandidate, FitError,
     FitExperiment, FitLeaf, FitOutcome, FitParameter, FitRequest, FitResidual, FitStep,
     FitSystematic, FitWork, Free, FreeNumber, Measured, MeasuredColumn, MeasuredQuantity,
     OffsetColumn, Origin, Reading, RowChoice, RowCondition, Traced, fit,

@@ -112,6 +112,11 @@ fn every_dialect_is_read_and_named() {
             "cells divided by semicolons, decimal commas | a row of units (N, mm; nothing is converted)",
         ),
         (
+            "units that nobody knows, beside one that is known",
+            german.replacen('\n', "\nN;Skt.\n", 1).into(),
+            "cells divided by semicolons, decimal commas | a row of units (N, Skt.; nothing is converted)",
+        ),
+        (
             "blank rows",
             format!("{plain},\n,\n").into(),
             " | 2 blank rows",

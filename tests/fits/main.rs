@@ -1,5 +1,6 @@
 //! Stiffnesses from measurements.
 
+mod budget;
 mod coverage;
 mod dialects;
 mod dialects_written;

@@ -4,6 +4,7 @@ mod damping;
 mod energy;
 mod error_bars;
 mod grips;
+mod half_turn;
 mod hinges;
 mod moments;
 mod momentum;

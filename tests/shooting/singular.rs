@@ -147,19 +147,29 @@ fn what_moves_and_why_it_failed_is_put_into_words() {
         assert_eq!(why, format!("{because}: {text}"));
     }
     let (sigma, correction, more) = (0.25, 2.5e-3, "use more intervals");
-    let unbounded = |fixed| Reason::Unbounded { sigma, fixed }.to_string();
+    let unbounded = |fixed, from_leaf| {
+        Reason::Unbounded {
+            sigma,
+            fixed,
+            from_leaf,
+        }
+        .to_string()
+    };
     let grows =
         "integrated from the start, the leaf grows out of all bounds at 0.250 of its length";
-    assert_eq!(unbounded(true), format!("{grows}: {more}"));
+    assert_eq!(unbounded(true, true), format!("{grows}: {more}"));
     // The program chose the number.
     let other = "lower the load, or start from the relaxed leaf";
-    assert!(unbounded(false).ends_with(&format!("of its length: {other}")));
+    assert!(unbounded(false, false).ends_with(&format!("of its length: {other}")));
+    // What began there is not sent there.
+    assert!(unbounded(false, true).ends_with("more intervals than are allowed would be needed"));
     let stuck = |growth| {
         let fixed = true;
         Reason::NoConvergence {
             correction,
             growth,
             fixed,
+            from_leaf: false,
         }
         .to_string()
     };

@@ -3,6 +3,7 @@
 //! is not, and that is said.
 
 use leafdyn::internals::shooting::{Reason, Solution};
+use leafdyn::study::{CheckOptions, Verdict, check};
 use leafdyn_testing::*;
 
 /// A figure with five veins that are softer still, under other loads.
@@ -40,6 +41,7 @@ fn under_tension_only_many_intervals_succeed() {
             Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
             Reason::Unbounded { sigma, .. } => assert!((0.0..1.0).contains(&sigma)),
             Reason::Singular(_)
+            | Reason::Rounding { .. }
             | Reason::TooMuch(_)
             | Reason::OutOfTime
             | Reason::Unmodelled(_) => {
@@ -74,4 +76,34 @@ fn a_success_is_never_false() {
         }
     }
     assert!((3..10).contains(&succeeded), "{succeeded}");
+}
+
+/// A blade as slender as paper: from the leaf at rest shooting cannot confirm what it resolves no better,
+/// says so after few linearisations, and calls nothing an agreement.
+#[test]
+fn a_slender_blade_is_not_confirmed() {
+    let blade = |thickness: f64| {
+        let text = format!(
+            r#"
+            name = "blade"
+            leaf = {{ rods = 3, joined = false }}
+            blade = {{ length = 1.0, width = 0.1, thickness = {thickness}, young = 1e4, poisson = 0.3, edges = true, mass_density = 2.0 }}
+            load = {{ g = [0.0, 0.0, -1e-4] }}"#
+        );
+        let found = check(&parse(&text), &CheckOptions::default(), &mut |_| {}).unwrap();
+        let work = found.shot.as_ref().unwrap().found.as_ref();
+        let work = work.map_or_else(|failure| failure.work, |shot| shot.work);
+        (found.verdict, work.linearizations)
+    };
+    let (verdict, _) = blade(0.002);
+    assert_eq!(verdict, Verdict::Agree);
+    let (verdict, linearizations) = blade(0.0005);
+    let Verdict::NotIndependent(why) = verdict else {
+        panic!("{verdict:?}");
+    };
+    assert!(
+        why.contains("shooting cannot resolve this leaf: perturbations grow 10^1"),
+        "{why}"
+    );
+    assert!(linearizations <= 2, "{linearizations}");
 }

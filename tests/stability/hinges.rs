@@ -209,3 +209,29 @@ fn the_boundary_of_a_column_is_reissners() {
         assert_eq!([point.index_before, point.index_behind], [0, 1]);
     }
 }
+
+/// A bent rod on a hinge turns about the force on its tip without resistance: a branch has the
+/// equilibrium of every circle that a relaxation has, whichever way it goes.
+#[test]
+fn branches_of_a_leaf_that_can_turn_meet_its_relaxations() {
+    let text = r#"
+        leaf = { rods = 1, length = 1.0, fan = [0.0], base_held = "pinned" }
+        rest = { bend_2 = -2.0, bend_3 = -0.4 }
+        load = { tip_force = [-3.0, 3.7, 0.0] }
+        stiffness = { torsion = 0.6, bending_2 = 2.0, bending_3 = 0.5, axial = inf, shear_2 = inf, shear_3 = inf }
+    "#;
+    for [from, to] in [[-3.0, -1.0], [-1.0, -3.0]] {
+        let vary = format!("load.tip_force[0]={from}..{to}");
+        let trace = follow(text, &format!("load.tip_force[0]={from}"), &vary, false);
+        let points = &trace.branches[0].points;
+        assert_eq!(points.last().unwrap().value, to);
+        for point in points {
+            let entries = [format!("load.tip_force[0]={:?}", point.value)];
+            let leaf = Scenario::from_toml_with(text, "rod", &entries).unwrap();
+            let rest = settle(&leaf, 1e-9);
+            let off = point.tips[0].distance(tip(&rest));
+            let told = point.error.unwrap() + estimate(&rest);
+            assert!(off <= told, "{}: {off:e} of {told:e}", point.value);
+        }
+    }
+}

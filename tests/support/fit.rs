@@ -47,6 +47,7 @@ pub fn request(base: Base, data: &[&str], free: &[&str]) -> FitRequest {
         candidates: Vec::new(),
         tolerance: None,
         limit: Default::default(),
+        most_evaluations: None,
     }
 }
 

@@ -322,8 +322,13 @@ pub fn timeless(mut object: Value) -> Value {
 
 /// Interrupts a run as Ctrl-C does.
 pub fn interrupt(child: &Child) {
+    send(child, "INT");
+}
+
+/// Sends a run the signal of this name.
+pub fn send(child: &Child, signal: &str) {
     let mut kill = Command::new("kill");
-    let kill = kill.arg("-INT").arg(child.id().to_string());
+    let kill = kill.arg(format!("-{signal}")).arg(child.id().to_string());
     assert!(kill.status().unwrap().success());
 }
 

@@ -30,7 +30,9 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let title = format!("{}: {}", check.relaxed.scenario, headline(&check.verdict));
     // Why the solutions could not be compared.
     let reason = match &check.verdict {
-        Verdict::NotCompared(why) => Font::embedded().wrapped(why, TEXT_SIZE, WIDTH - LEFT - RIGHT),
+        Verdict::NotCompared(why) | Verdict::NotIndependent(why) => {
+            Font::embedded().wrapped(why, TEXT_SIZE, WIDTH - LEFT - RIGHT)
+        }
         _ => Vec::new(),
     };
     let key_line = NOTE_BASE + LINE * (reason.len() + 1) as f64;

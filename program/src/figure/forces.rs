@@ -3,17 +3,11 @@
 use crate::figure::drawing::{Anchor, Drawing, INK, NOTE, Stroke, polygon};
 use crate::figure::font::Font;
 use crate::figure::layout::{Cell, TICK_SIZE};
+use crate::figure::marks::{Action, LoadMark, load_marks};
 use crate::report::numbers::short;
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 
-/// Length of the arrow of the largest force, as a part of the rod's largest extent, and the shortest
-/// arrow, as a part of that.
-const LONGEST: f64 = 0.16;
-const SHORTEST: f64 = 0.35;
-/// Length of the arrow of the largest force along the rod, likewise, and how many there are.
-const ALONG: f64 = 0.07;
-const COUNT: usize = 9;
 /// Length and half the width of the heads of arrows, in pixels.
 const HEAD: [f64; 2] = [10.0, 4.2];
 const SMALL_HEAD: [f64; 2] = [6.0, 2.6];
@@ -40,43 +34,25 @@ pub fn forces(
 ) -> Vec<Force> {
     let unit = scenario.units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-    let g = DVec3::from_array(scenario.g);
-    let points = scenario.points.iter();
-    let points = points.map(|it| (it.at, DVec3::from_array(it.force) + it.mass * g));
-    let tip = (1.0, DVec3::from_array(scenario.tip_force));
-    let single: Vec<(f64, DVec3)> = points.chain([tip]).collect();
-    let along = scenario.distributed.iter().flatten().take(1);
-    let along: Vec<(f64, DVec3)> = along
-        .flat_map(|force| {
-            let of = |s: f64| DVec3::from_array(force.each_ref().map(|profile| profile.at(s)));
-            (0..COUNT)
-                .map(move |k| k as f64 / (COUNT - 1) as f64)
-                .map(move |s| (s, of(s)))
+    let marks = load_marks(scenario, None).into_iter();
+    let arrow = |mark: LoadMark| {
+        let (place, tangent) = at(mark.at)?;
+        let along = mark.action == Action::Distributed;
+        // One that pushes against the rod ends at the point, any other begins there.
+        let pushes = mark.direction.dot(tangent) < -0.5;
+        let start = if pushes || along { -1.0 } else { 0.0 };
+        let reach = mark.length * extent * mark.direction;
+        Some(Force {
+            ends: [start, start + 1.0].map(|part| place + part * reach),
+            head: if along { SMALL_HEAD } else { HEAD },
+            label: match along {
+                true => String::new(),
+                false => format!("force {}{unit}", short(mark.size)),
+            },
         })
-        .collect();
-    let arrows = |forces: &[(f64, DVec3)], longest: f64, head: [f64; 2], named: bool| {
-        let largest = forces.iter().map(|(_, force)| force.length());
-        let largest = largest.fold(0.0, f64::max);
-        let arrow = |&(s, force): &(f64, DVec3)| {
-            let (place, tangent) = at(s)?;
-            let direction = force.try_normalize()?;
-            let least = if named { SHORTEST } else { 0.0 };
-            let size = (force.length() / largest).max(least) * longest * extent;
-            // One that pushes against the rod ends at the point, any other begins there.
-            let pushes = direction.dot(tangent) < -0.5;
-            let start = if pushes || !named { -1.0 } else { 0.0 };
-            let label = format!("force {}{unit}", short(force.length()));
-            Some(Force {
-                ends: [start, start + 1.0].map(|part| place + part * size * direction),
-                head,
-                label: if named { label } else { String::new() },
-            })
-        };
-        forces.iter().filter_map(arrow).collect::<Vec<_>>()
     };
-    let mut all = arrows(&along, ALONG, SMALL_HEAD, false);
-    all.extend(arrows(&single, LONGEST, HEAD, true));
-    all
+    let forces = marks.filter(|mark| mark.action != Action::Moment);
+    forces.filter_map(arrow).collect()
 }
 
 impl Force {

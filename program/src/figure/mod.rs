@@ -27,6 +27,7 @@ mod layout;
 mod leaf;
 mod map;
 mod markers;
+pub mod marks;
 mod modes;
 mod moments;
 mod page;

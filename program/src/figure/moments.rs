@@ -1,8 +1,8 @@
 //! Dead moments on a rod as curved arrows about their axes, by the right-hand rule.
 
 use crate::figure::drawing::{Drawing, INK, Stroke, polygon, polyline};
+use crate::figure::marks::{Action, LoadMark};
 use glam::{DVec2, DVec3};
-use leafdyn::scenario::Scenario;
 use std::f64::consts::PI;
 
 /// Radius of an arrow, as a part of the leaf's largest extent.
@@ -21,24 +21,17 @@ pub struct Moment {
     pub size: f64,
 }
 
-/// The moments on a leaf, that on its tip among them; `at` gives the point at a fraction of the rod.
-pub fn moments(
-    scenario: &Scenario,
-    on_tip: [f64; 3],
-    at: impl Fn(f64) -> Option<DVec3>,
-) -> Vec<Moment> {
-    let points = scenario.points.iter();
-    let all = points.map(|point| (point.at, point.moment));
-    let all = all.chain([(1.0, on_tip)]);
-    all.filter_map(|(sigma, moment)| {
-        let moment = DVec3::from_array(moment);
+/// The moments on a leaf, of those that load it; `at` gives the point at a fraction of its only rod.
+pub fn moments(marks: &[LoadMark], at: impl Fn(f64) -> Option<DVec3>) -> Vec<Moment> {
+    let moments = marks.iter().filter(|mark| mark.action == Action::Moment);
+    let moment = |mark: &LoadMark| {
         Some(Moment {
-            axis: moment.try_normalize()?,
-            size: moment.length(),
-            at: at(sigma)?,
+            axis: mark.direction,
+            size: mark.size,
+            at: at(mark.at)?,
         })
-    })
-    .collect()
+    };
+    moments.filter_map(moment).collect()
 }
 
 impl Moment {

@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::curve::{is_drawable, stretch};
 use super::drawing::{Color, Path, Step, color_of_vein};
+use super::marks::{LoadMark, Part, hold_marks, load_marks};
 use super::moments::{Moment, moments};
 use super::setting::Setting;
 use leafdyn::relax::{Equilibrium, RodShape};
@@ -70,7 +71,7 @@ impl Veins {
         let nodes = (&shape.curve_stations[..], &shape.curves[..]);
         veins
             .held_as(scenario)
-            .loaded(scenario, scenario.tip_moment, nodes)
+            .loaded(scenario, &load_marks(scenario, None), nodes)
     }
 
     /// Where the veins that are drawn begin.
@@ -84,10 +85,10 @@ impl Veins {
         let tips = tips(&still.curves, record.joined);
         let veins = Veins::through(&still.curves, &tips, record.length);
         let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
-        let on_tip = scenario.dynamics.tip_moment.at(time);
+        let loads = load_marks(scenario, Some(time));
         veins
             .held_as(scenario)
-            .loaded(scenario, on_tip, (&record.stations, &still.curves))
+            .loaded(scenario, &loads, (&record.stations, &still.curves))
     }
 
     /// With what the grips of a scenario hold and where moments act, on curves through nodes at these
@@ -95,15 +96,16 @@ impl Veins {
     fn loaded(
         mut self,
         scenario: &Scenario,
-        on_tip: [f64; 3],
+        loads: &[LoadMark],
         (stations, curves): (&[f64], &[Vec<DVec3>]),
     ) -> Self {
-        self.moments = moments(scenario, on_tip, |sigma| {
+        self.moments = moments(loads, |sigma| {
             let point = stretch(stations, curves.first()?, [sigma; 2]).pop()? / self.unit;
             is_drawable(point).then_some(point)
         });
-        for grip in &scenario.grips {
-            let curve = curves.get(grip.vein).map_or(&[][..], Vec::as_slice);
+        let grips = hold_marks(scenario).into_iter();
+        for grip in grips.filter(|mark| mark.part == Part::Grip) {
+            let curve = curves.get(grip.vein - 1).map_or(&[][..], Vec::as_slice);
             let points = stretch(stations, curve, grip.at).into_iter();
             let points = points.map(|point| point / self.unit);
             self.grips.push(Gripped {
@@ -116,14 +118,14 @@ impl Veins {
 
     /// With bases and tips that are held as in a scenario.
     pub fn held_as(self, scenario: &Scenario) -> Self {
-        let tip = scenario.held_tip.as_ref();
-        let tip_held = tip.map(|tip| match tip.clamps {
-            Some(_) => Hold::Clamped,
-            None => Hold::Pinned,
-        });
+        let marks = hold_marks(scenario);
+        let held = |part| {
+            let mut of_part = marks.iter().filter(move |mark| mark.part == part);
+            of_part.next().map(|mark| mark.held)
+        };
         Veins {
-            base_held: scenario.base_held,
-            tip_held,
+            base_held: held(Part::Base).unwrap_or(self.base_held),
+            tip_held: held(Part::Tip),
             ..self
         }
     }

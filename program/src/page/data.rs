@@ -5,6 +5,7 @@ use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::figure::marks::{HoldMark, LoadMark};
 use crate::figure::setting::Arrow;
 use crate::figure::veins::{node_stride, tamed};
 use leafdyn::relax::{Equilibrium, Shape};
@@ -29,9 +30,11 @@ pub struct View {
     pub units: [Option<String>; 3],
     /// Directions of the weight of all veins and of the wind at time 0, as figures draw them.
     pub directions: Vec<Arrow>,
-    /// What grips hold.
+    /// The dead loads on its leaves that do not have some of their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub grips: Vec<Gripped>,
+    pub loads: Vec<LoadMark>,
+    /// What is held: bases, a tip, and what grips hold.
+    pub holds: Vec<HoldMark>,
     /// The length of the longest vein.
     pub longest: f64,
     /// Whether the tips share one point.
@@ -52,17 +55,6 @@ pub struct View {
     pub chart: Option<Chart>,
 }
 
-/// A stretch of a vein, or a point, that a grip holds.
-#[derive(Serialize)]
-pub struct Gripped {
-    /// The number of the vein from 1.
-    pub vein: usize,
-    /// Fractions of its length.
-    pub at: [f64; 2],
-    /// Whether its directions are held as well.
-    pub clamped: bool,
-}
-
 /// A shape of the leaf.
 #[derive(Default, Serialize)]
 pub struct Leaf {
@@ -74,6 +66,9 @@ pub struct Leaf {
     /// Its time, in a motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
+    /// The dead loads at this time of a motion, where they are others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loads: Option<Vec<LoadMark>>,
     /// Fractions of the length, where they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stations: Option<Vec<f64>>,

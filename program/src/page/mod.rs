@@ -25,13 +25,14 @@ pub mod vtk;
 
 use crate::figure::Figure;
 use crate::figure::drawing::{Drawing, color_of_vein};
+use crate::figure::marks::{hold_marks, load_marks};
 use crate::figure::setting::Setting;
 use crate::figure::svg::{self, hex};
 use crate::figure::veins::is_drawn;
 use crate::report::{Reported, json};
-pub use data::{Gripped, Leaf, View};
+pub use data::{Leaf, View};
 use glam::DVec3;
-use leafdyn::scenario::{self, Hold, Scenario, Units};
+use leafdyn::scenario::{self, Scenario, Units};
 use leafdyn::simulate::Record;
 use leafdyn::study::Trace;
 use std::io::{self, Write};
@@ -112,6 +113,10 @@ pub fn view<R: Viewed>(result: &R, scenario: &Scenario) -> View {
     let mut view = bare(scenario);
     view.summary = result.summary(&scenario.units);
     result.fill(&mut view, &scenario.units);
+    for leaf in &mut view.leaves {
+        let loads = leaf.time.map(|time| load_marks(scenario, Some(time)));
+        leaf.loads = loads.filter(|loads| *loads != view.loads);
+    }
     view
 }
 
@@ -135,13 +140,8 @@ pub fn bare(scenario: &Scenario) -> View {
         ]
         .map(Clone::clone),
         directions: Setting::of(scenario).arrows(true, 0.0),
-        grips: (scenario.grips.iter())
-            .map(|grip| Gripped {
-                vein: grip.vein + 1,
-                at: grip.at,
-                clamped: grip.held == Hold::Clamped,
-            })
-            .collect(),
+        loads: load_marks(scenario, None),
+        holds: hold_marks(scenario),
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
         joined: scenario.joined,

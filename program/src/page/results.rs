@@ -1,6 +1,8 @@
 //! The data of the pages: what each kind of result shows of its leaves, and the chart beside
 //! them.
 
+use std::slice;
+
 use glam::DVec3;
 
 use super::Viewed;
@@ -14,7 +16,8 @@ use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Units;
 use leafdyn::simulate::{Moment, Record};
 use leafdyn::study::{
-    Boundary, BoundaryPoint, Equilibria, PointKind, Trace, TraceBranch, TracePoint, TraceShow,
+    Boundary, BoundaryPoint, Equilibria, Keys, PointKind, Target, Trace, TraceBranch, TracePoint,
+    TraceShow,
 };
 
 /// Most segments of a vein that are drawn of each of many leaves, and of those of a motion.
@@ -153,6 +156,7 @@ impl Viewed for Trace {
 
     fn fill(&self, view: &mut View, units: &Units) {
         view.kind = "trace";
+        drop_varied_loads(view, slice::from_ref(&self.keys));
         let count = self.branches.len();
         view.verdict = match (count, self.complete) {
             (1, true) => "1 branch, followed to its end".into(),
@@ -241,6 +245,7 @@ impl Viewed for Boundary {
 
     fn fill(&self, view: &mut View, _: &Units) {
         view.kind = "trace";
+        drop_varied_loads(view, &self.keys);
         let count = counted(self.curves.len(), "curve", "curves");
         view.verdict = match self.complete {
             true => format!("{count}, followed to the ends"),
@@ -255,6 +260,17 @@ impl Viewed for Boundary {
         };
         view.leaves = points.map(leaf).collect();
         view.chart = Some(plane(self));
+    }
+}
+
+/// Loads that vary from leaf to leaf have no arrow of one size.
+fn drop_varied_loads(view: &mut View, keys: &[Keys]) {
+    let is_load = |target: &Target| match target {
+        Target::Entry(part) => part.key.path().starts_with("load."),
+        Target::Knob(_) => false,
+    };
+    if keys.iter().flat_map(Keys::targets).any(is_load) {
+        view.loads.clear();
     }
 }
 

@@ -1,4 +1,4 @@
-// The leaf in space: veins as tubes, the surface between them, the clamp, the tip, and what grips hold.
+// The leaf in space: veins as tubes, the surface between them, the tip, what is held, and the loads.
 /// Of a tube only the half that faces the reader is drawn, in so many strips: fewer where no graphics processor helps, and
 /// a flat one of thin veins.
 const SOFTWARE = drawnBySoftware();
@@ -96,31 +96,11 @@ class LeafMesh {
     const ball = plain(new THREE.SphereGeometry(1.9 * radius, 16, 12));
     const accent = new THREE.MeshLambertMaterial({ vertexColors: true });
     this.tips = Array.from({ length: view.joined ? 1 : veins }, () => ball(accent));
-    const block = new THREE.CylinderGeometry(3 * radius, 3 * radius, 3 * radius, 24);
-    block.rotateX(Math.PI / 2);
-    this.clamp = plain(block)();
-    this.grips = this.marks(leaf);
+    this.holds = holdMarks(leaf, this);
+    this.loads = [];
     this.group = new THREE.Group();
-    this.group.add(this.tubes, this.surface, this.clamp, ...this.tips, ...this.grips.map(({ mark }) => mark));
+    this.group.add(this.tubes, this.surface, ...this.tips, ...this.holds.map(({ mark }) => mark));
     for (const part of [this.tubes, this.surface]) part.frustumCulled = false;
-  }
-
-  /// Marks on what grips hold, at its ends and at the nodes between: blocks where veins are clamped, and cones that point at them
-  /// where they are pinned.
-  marks({ stations }) {
-    const grips = (view.grips || []).map((grip) => ({ ...grip, j: view.drawn.indexOf(grip.vein) })).filter(({ j }) => j >= 0);
-    if (grips.length === 0) return [];
-    const [block, cone] = [new THREE.CylinderGeometry(2 * radius, 2 * radius, 2.8 * radius, 4), new THREE.CylinderGeometry(1.9 * radius, 0, 3.2 * radius, 12)];
-    block.rotateX(Math.PI / 2);
-    cone.rotateX(Math.PI / 2);
-    cone.translate(0, 0, 1.6 * radius);
-    const [blocks, cones] = [block, cone].map(plain);
-    const material = new THREE.MeshLambertMaterial({ vertexColors: true });
-    return grips.flatMap(({ j, at, clamped }) => {
-      const inside = stations.filter((sigma) => sigma > at[0] && sigma < at[1]);
-      const places = [...new Set([at[0], ...inside, at[1]].map((sigma) => this.fineAt(stations, sigma)))];
-      return places.map((i) => ({ place: 3 * (j * this.fine + i), mark: (clamped ? blocks : cones)(material) }));
-    });
   }
 
   /// The point nearest to a fraction of the length.
@@ -131,13 +111,28 @@ class LeafMesh {
     return Math.round((after - 1 + part) * this.sub);
   }
 
+  /// Brings the arrows of the loads to the shape.
+  load(leaf) {
+    const loads = leaf.loads || view.loads || [];
+    if (loads !== this.known) {
+      this.loads.forEach(({ mark }) => this.group.remove(mark));
+      this.loads = loads.filter(({ vein }) => view.drawn.includes(vein)).map((load) => ({ ...load, mark: loadMark(load) }));
+      this.loads.forEach(({ mark }) => (paintMark(mark), this.group.add(mark)));
+      this.known = loads;
+    }
+    for (const { mark, ...load } of this.loads) mark.position.fromArray(tailOf(load, leaf, this));
+  }
+
   /// Takes over the shape of a leaf with as many nodes.
   shape(leaf) {
     smooth(leaf, this.sub, this.points);
     this.moved = true;
     const last = (j) => 3 * (j * this.fine + this.fine - 1);
     this.tips.forEach((tip, j) => tip.position.fromArray(this.points, last(j)));
-    this.grips.forEach(({ mark, place }) => mark.position.fromArray(this.points, place));
+    // A tip that is held has the mark of its holder.
+    this.tips.forEach((tip) => (tip.visible = !view.holds.some(({ part }) => part === "tip")));
+    this.holds.forEach(({ mark, place }) => mark.position.fromArray(this.points, place));
+    this.load(leaf);
     const membrane = this.surface.geometry;
     membrane.attributes.position.needsUpdate = true;
     if (this.surface.visible) membrane.computeVertexNormals();
@@ -198,12 +193,92 @@ class LeafMesh {
 
   /// The parts that have one colour each.
   theme() {
-    this.clamp.material.color.set(css("--clamp"));
-    this.grips.forEach(({ mark }) => mark.material.color.set(css("--clamp")));
+    for (const { mark } of this.holds) mark.material.color.set(css("--clamp"));
+    for (const { mark } of this.loads) paintMark(mark);
     this.tips.forEach((tip) => tip.material.color.set(css("--accent")));
     this.surface.material.color.set(css("--membrane"));
   }
 }
+
+/// Where a mark at a fraction of a vein lies among the points of a mesh; less than zero: the vein is not drawn.
+const placeOf = (vein, at, { stations }, mesh) => 3 * (view.drawn.indexOf(vein) * mesh.fine + mesh.fineAt(stations, at));
+
+/// Marks on what is held, at its ends and at the nodes between: blocks where veins are clamped, and cones that point at them
+/// where they are pinned.
+function holdMarks(leaf, mesh) {
+  const cone = new THREE.CylinderGeometry(1.9 * radius, 0, 3.2 * radius, 12);
+  cone.rotateX(Math.PI / 2);
+  cone.translate(0, 0, 1.6 * radius);
+  const block = (part) => {
+    const size = part === "grip" ? [2 * radius, 2 * radius, 2.8 * radius, 4] : [3 * radius, 3 * radius, 3 * radius, 24];
+    return new THREE.CylinderGeometry(...size).rotateX(Math.PI / 2);
+  };
+  const shapes = { pinned: () => plain(cone), clamped: (part) => plain(block(part)) };
+  const drawn = view.holds.filter(({ vein }) => view.drawn.includes(vein));
+  return drawn.flatMap(({ part, vein, at, held }) => {
+    const inside = leaf.stations.filter((sigma) => sigma > at[0] && sigma < at[1]);
+    const places = [...new Set([at[0], ...inside, at[1]].map((sigma) => placeOf(vein, sigma, leaf, mesh)))];
+    const shape = shapes[held](part);
+    const material = new THREE.MeshLambertMaterial({ vertexColors: true });
+    return places.map((place) => ({ place, mark: shape(material) }));
+  });
+}
+
+/// Radius of the curved arrow of a moment, and pieces of it along and around.
+const TURN = { radius: 0.06, angle: 1.5 * Math.PI, along: 24, around: 6 };
+
+/// The arrow of a load: along z from the origin, turned to its direction. That of a moment is curved about it.
+function loadMark({ action, direction, length }) {
+  const mark = new THREE.Group();
+  const thick = (action === "distributed" ? 0.35 : 0.6) * radius;
+  const head = new THREE.ConeGeometry(3 * thick, 8 * thick, 12).rotateX(Math.PI / 2);
+  const material = new THREE.MeshLambertMaterial({ vertexColors: true });
+  const [reach, size] = [length * view.longest, 8 * thick];
+  if (action === "moment") {
+    const [tube, tip] = [plain(curved(thick))(material), plain(head)(material)];
+    const ring = TURN.radius * view.longest;
+    tip.position.set(ring * Math.cos(TURN.angle), ring * Math.sin(TURN.angle), 0);
+    tip.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(-Math.sin(TURN.angle), Math.cos(TURN.angle), 0));
+    mark.add(tube, tip);
+  } else {
+    const shaft = Math.max(reach - size, 0.1 * reach);
+    const rod = new THREE.CylinderGeometry(thick, thick, shaft, 8).rotateX(Math.PI / 2).translate(0, 0, 0.5 * shaft);
+    mark.add(plain(rod)(material), plain(head.translate(0, 0, reach - 0.5 * size))(material));
+  }
+  mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(...direction));
+  return mark;
+}
+
+/// A part of a ring about z.
+function curved(thick) {
+  const [points, count] = [[], TURN.around + 1];
+  for (let i = 0; i <= TURN.along; i++)
+    for (let k = 0; k < count; k++) {
+      const [turn, around] = [(TURN.angle * i) / TURN.along, (2 * Math.PI * k) / TURN.around];
+      const out = TURN.radius * view.longest + thick * Math.cos(around);
+      points.push(out * Math.cos(turn), out * Math.sin(turn), thick * Math.sin(around));
+    }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(points), 3));
+  geometry.setIndex(quads(1, 0, TURN.along, TURN.around, count, 1));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+/// Where the arrow of a load begins: one along a vein, or that pushes against it, ends at its point.
+function tailOf({ action, vein, at, direction, length }, leaf, mesh) {
+  const place = placeOf(vein, at, leaf, mesh);
+  const point = [...mesh.points.subarray(place, place + 3)];
+  if (action === "moment") return point;
+  const first = placeOf(vein, 0, leaf, mesh);
+  const before = Math.max(first, place - 3);
+  const tangent = [0, 1, 2].map((k) => mesh.points[before + 3 + k] - mesh.points[before + k]);
+  const along = direction.reduce((sum, x, k) => sum + x * tangent[k], 0);
+  const ends = action === "distributed" || along < -0.5 * hypot(...tangent);
+  return ends ? point.map((x, k) => x - length * view.longest * direction[k]) : point;
+}
+
+const paintMark = (mark) => mark.children.forEach((part) => part.material.color.set(css("--bad")));
 
 /// From the colours of screens to those that light is reckoned with.
 const linear = (c) => c.map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));

@@ -47,7 +47,9 @@ fn judgement(check: &Check, units: &Units) -> String {
             None => format!("{headline}: {allowed}; their indices are not compared"),
         },
         Verdict::Differ => format!("{headline}: to agree, {allowed}, the same index"),
-        Verdict::NotCompared(reason) => format!("{headline}: {reason}"),
+        Verdict::NotCompared(reason) | Verdict::NotIndependent(reason) => {
+            format!("{headline}: {reason}")
+        }
     }
 }
 

@@ -67,6 +67,7 @@ pub fn headline(verdict: &Verdict) -> &'static str {
         Verdict::Agree => "both methods agree",
         Verdict::Differ => "the methods differ",
         Verdict::NotCompared(_) => "could not be compared",
+        Verdict::NotIndependent(_) => "not confirmed by an independent solution",
     }
 }
 

@@ -43,7 +43,7 @@ impl Check {
             line.update_solver(progress, tolerance)
         })?;
         drop(line);
-        if let Verdict::NotCompared(reason) = &check.verdict {
+        if let Verdict::NotCompared(reason) | Verdict::NotIndependent(reason) = &check.verdict {
             job.remark(Some(reason));
         }
         let success = matches!(check.verdict, Verdict::Agree);

@@ -4,14 +4,15 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use super::job::{Delivered, Job};
-use super::progress::fraction_of;
+use super::progress::{duration, fraction_of};
 use super::request::{Request, VerbTraits};
-use super::{Refusal, Status};
+use super::{Refusal, Status, note};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
 use leafdyn::study::{
-    self, Data, Fit as Fitted, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
+    self, Data, Fit as Fitted, FitBudget, FitRequest, FitStep, Free, MeasuredColumn, Reading,
+    RowChoice,
 };
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
@@ -52,9 +53,30 @@ pub struct Fit {
     #[arg(long)]
     robust: bool,
 
+    /// Relax or follow the leaves of all experiments at most K times; 1000 if left out
+    #[arg(long, value_name = "K")]
+    most_evaluations: Option<usize>,
+
     /// Experiments that could be made, as CSV like the data: which would say most?
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
     candidates: Option<PathBuf>,
+}
+
+/// Fits that may take less than so many seconds are not announced.
+const SHORT: f64 = 30.0;
+
+/// Says what a fit takes at most, if that may be long.
+fn announce(name: &str, budget: FitBudget) {
+    if budget.seconds > SHORT {
+        let (most, time) = (budget.evaluations, duration(budget.seconds));
+        let leaves = match budget.leaves {
+            1 => "one leaf".into(),
+            leaves => format!("{leaves} leaves"),
+        };
+        note(&format!(
+            "{name}: at most {most} evaluations of {leaves}, {time} if all take as long as the first; most fits need a tenth"
+        ));
+    }
 }
 
 /// Parses the distance of rows.
@@ -103,11 +125,21 @@ impl Fit {
             candidates,
             tolerance: self.request.tolerance,
             limit: Limit::default(),
+            most_evaluations: self.most_evaluations,
         };
         let mut line = job.progress();
         let mut profiling = false;
         let fit = study::fit(&request, &mut |now| {
-            let FitStep { step, sum, known } = *now;
+            let FitStep {
+                step,
+                sum,
+                known,
+                budget,
+            } = *now;
+            if let Some(budget) = budget {
+                announce(&job.scenario.name, budget);
+                return;
+            }
             if known.is_some() && !std::mem::replace(&mut profiling, true) {
                 line.next_phase();
             }

@@ -15,7 +15,7 @@ use leafdyn::scenario::Scenario;
 use leafdyn::study::Base;
 
 use super::progress::ProgressLine;
-use super::{INTERRUPTED, Refusal, Status, note};
+use super::{Refusal, Status, note, what_stopped};
 
 /// One scenario of a request, and where its files go.
 pub struct Job {
@@ -34,7 +34,7 @@ pub struct Job {
     pub(super) source: String,
     /// Whether several run in parallel.
     pub(super) parallel: bool,
-    /// When the run ends with what it has found: at Ctrl-C, if that is of use.
+    /// When the run ends with what it has found: at a signal, if that is of use.
     pub limit: Limit,
 }
 
@@ -83,18 +83,18 @@ impl Job {
         }
     }
 
-    /// Whether Ctrl-C has ended the run.
+    /// Whether a signal has ended the run.
     pub fn is_interrupted(&self) -> bool {
         let cancel = self.limit.cancel.as_ref();
         cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
-    /// A result with its input; of a run that Ctrl-C has ended it says so.
+    /// A result with its input; of a run that a signal has ended it says so.
     pub fn document<'a, R>(&'a self, result: &'a R) -> Document<'a, R> {
         let mut document = Document::new(result, &self.scenario, Some(&self.source));
-        let status = Status::Interrupted as i32;
+        let status = Status::Interrupted.code();
         let interrupted = self.is_interrupted();
-        document.refused = interrupted.then(|| Refused::new(INTERRUPTED, status));
+        document.refused = interrupted.then(|| Refused::new(what_stopped(), status));
         document
     }
 

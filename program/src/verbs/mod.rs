@@ -18,7 +18,7 @@ use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::iter::successors;
 use std::process::{self, ExitCode};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -135,16 +135,17 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
     };
     let interrupted = stop_at_once_on_interrupt();
     let status = interrupted.and_then(|()| command_line.run());
-    status.unwrap_or_else(|refusal| match Status::of_refusal(&refusal) {
+    let status = status.unwrap_or_else(|refusal| match Status::of_refusal(&refusal) {
         Status::Interrupted => {
             note(&refusal.to_string());
             if json {
-                show_refused(&refusal.to_string(), Status::Interrupted as i32);
+                show_refused(&refusal.to_string(), Status::Interrupted.code());
             }
             Status::Interrupted
         }
         _ => refuse(&refusal.to_string(), json),
-    }) as u8
+    });
+    status.code() as u8
 }
 
 /// Whether standard output is JSON.
@@ -188,6 +189,7 @@ type Refusal = Box<dyn Error + Send + Sync>;
 
 /// Exit status of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(i32)]
 enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
     /// simulation: followed to its end; of a chart: its reference is confirmed.
@@ -199,9 +201,9 @@ enum Status {
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,
-    /// Ctrl-C ended the run: 128 and the number of the signal. What was found until then is
-    /// written, if it is of use.
-    Interrupted = 130,
+    /// Ctrl-C ended the run, or another signal. What was found until then is written, if it is of
+    /// use.
+    Interrupted = 128 + SIGINT,
 }
 
 impl Status {
@@ -209,6 +211,14 @@ impl Status {
         match success {
             true => Status::Success,
             false => Status::Failure,
+        }
+    }
+
+    /// The number that the process ends with: of a signal 128 and its number.
+    fn code(self) -> i32 {
+        match self {
+            Status::Interrupted => 128 + SIGNAL.load(Ordering::Relaxed),
+            _ => self as i32,
         }
     }
 
@@ -221,15 +231,33 @@ impl Status {
     }
 }
 
-/// Ctrl-C ended a run that has found nothing of use.
+/// A signal ended a run that has found nothing of use.
 #[derive(Debug, thiserror::Error)]
-#[error("{INTERRUPTED}: {0}")]
+#[error("{}: {}", what_stopped(), .0)]
 struct Interrupted(&'static str);
 
-/// What is told of a run that Ctrl-C ended.
-const INTERRUPTED: &str = "stopped by Ctrl-C";
+/// The signals that end a run: a closed terminal, Ctrl-C, and a request to end.
+#[cfg(unix)]
+const SIGHUP: i32 = 1;
+const SIGINT: i32 = 2;
+#[cfg(unix)]
+const SIGTERM: i32 = 15;
 
-/// Time after Ctrl-C in which a run ends by itself, with what it has found.
+/// The first signal that came.
+static SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
+
+/// What is told of a run that a signal ended.
+fn what_stopped() -> &'static str {
+    match SIGNAL.load(Ordering::Relaxed) {
+        #[cfg(unix)]
+        SIGHUP => "stopped by SIGHUP",
+        #[cfg(unix)]
+        SIGTERM => "stopped by SIGTERM",
+        _ => "stopped by Ctrl-C",
+    }
+}
+
+/// Time after a signal in which a run ends by itself, with what it has found.
 const GRACE: Duration = Duration::from_secs(10);
 
 /// What a run does when the process is stopped, if more than to end at once.
@@ -244,32 +272,68 @@ enum OnInterrupt {
 
 static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
 
-/// Makes Ctrl-C end the process at once, without half-written files and with a checkpoint of a
-/// simulation; or, where a part of a result is of use, with that.
+/// Makes Ctrl-C and other signals that ask the process to end do so at once, without half-written
+/// files and with a checkpoint of a simulation; or, where a part of a result is of use, with that.
+#[cfg(unix)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
-    ctrlc::set_handler(|| {
-        if let Some(OnInterrupt::Finish(cancel)) = on_interrupt().as_ref()
-            && !cancel.swap(true, Ordering::Relaxed)
-        {
-            clear_progress_line();
-            note("stopping with what was found so far; Ctrl-C again: at once, without it");
-            thread::spawn(|| {
-                thread::sleep(GRACE);
-                end_now();
-            });
-            return;
-        }
-        end_now();
-    })?;
+    let hangup = (!ignores_hangup()).then_some(SIGHUP);
+    let signals = [SIGINT, SIGTERM].into_iter().chain(hangup);
+    let mut signals = signal_hook::iterator::Signals::new(signals)?;
+    thread::spawn(move || signals.forever().for_each(stop));
     Ok(())
 }
 
-/// Ends the process after Ctrl-C, and says what is kept.
+/// Makes Ctrl-C end the process at once, without half-written files and with a checkpoint of a
+/// simulation; or, where a part of a result is of use, with that.
+#[cfg(windows)]
+fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
+    ctrlc::set_handler(|| stop(SIGINT))?;
+    Ok(())
+}
+
+/// Where no process is stopped by signals.
+#[cfg(not(any(unix, windows)))]
+fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
+    Ok(())
+}
+
+/// Whether whoever started the process made it survive the end of its terminal, as `nohup` does; where
+/// that cannot be told, a hangup ends the process as if it were not handled.
+#[cfg(unix)]
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_none_or(|mask| mask & (1 << (SIGHUP - 1)) != 0)
+}
+
+/// Ends the process after a signal: at once, or with what it has found.
+fn stop(signal: i32) {
+    if let Some(OnInterrupt::Finish(cancel)) = on_interrupt().as_ref()
+        && !cancel.load(Ordering::Relaxed)
+    {
+        SIGNAL.store(signal, Ordering::Relaxed);
+        cancel.store(true, Ordering::Relaxed);
+        clear_progress_line();
+        note("stopping with what was found so far; Ctrl-C again: at once, without it");
+        thread::spawn(|| {
+            thread::sleep(GRACE);
+            end_now();
+        });
+        return;
+    }
+    SIGNAL.store(signal, Ordering::Relaxed);
+    end_now();
+}
+
+/// Ends the process after a signal, and says what is kept.
 fn end_now() -> ! {
     let (kept, told) = match on_interrupt().as_ref() {
         Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
         Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
-        Some(OnInterrupt::Finish(_)) | None => (None, Some(format!("{INTERRUPTED}: {UNKEPT}"))),
+        Some(OnInterrupt::Finish(_)) | None => {
+            (None, Some(format!("{}: {UNKEPT}", what_stopped())))
+        }
     };
     files::abandon_unfinished();
     clear_progress_line();
@@ -279,9 +343,9 @@ fn end_now() -> ! {
         _ => Status::Interrupted,
     };
     if JSON.load(Ordering::Relaxed) {
-        show_refused(INTERRUPTED, status as i32);
+        show_refused(what_stopped(), status.code());
     }
-    process::exit(status as i32);
+    process::exit(status.code());
 }
 
 /// What is told where nothing of an unfinished result is kept.

@@ -24,8 +24,8 @@ use super::help::FOR_EXPERTS;
 use super::job::{Delivered, Job, attempt};
 use super::progress::{ProgressLine, fraction_of};
 use super::{
-    INTERRUPTED, Interrupted, Refusal, Status, cause, limit_until_interrupt, name_options, note,
-    refuse, show, show_report,
+    Interrupted, Refusal, Status, cause, limit_until_interrupt, name_options, note, refuse, show,
+    show_report, what_stopped,
 };
 
 /// What every verb is asked.
@@ -109,7 +109,7 @@ pub struct VerbTraits<'f> {
     /// Whether scenarios run in parallel; otherwise one after the other, each on all
     /// cores.
     pub parallel: bool,
-    /// Whether a part of a result, as it is known at Ctrl-C, is of use; of several scenarios those
+    /// Whether a part of a result, as it is known at a signal, is of use; of several scenarios those
     /// that are finished are.
     pub partial: bool,
     /// Files that it reads besides its scenarios.
@@ -251,7 +251,7 @@ impl Request {
                 }
                 Err((error, this)) => {
                     let mut json = Vec::new();
-                    json::write(&Refused::new(&error, this as i32), &mut json)?;
+                    json::write(&Refused::new(&error, this.code()), &mut json)?;
                     unsolved += usize::from(this == Status::Interrupted);
                     let told = (this != Status::Interrupted).then_some(error);
                     (this, told, json)
@@ -262,7 +262,7 @@ impl Request {
                 status = status.max(Status::Refused);
             }
             errors.extend(error);
-            documents.push((file.display().to_string(), this as i32, json));
+            documents.push((file.display().to_string(), this.code(), json));
         }
         for error in errors {
             note(&format!("error: {error}"));
@@ -270,7 +270,8 @@ impl Request {
         if unsolved > 0 {
             let count = self.scenarios.len();
             note(&format!(
-                "{INTERRUPTED}: {unsolved} of {count} scenarios are not solved"
+                "{}: {unsolved} of {count} scenarios are not solved",
+                what_stopped()
             ));
         }
         if selection.kinds.contains(&Kind::Csv) {

@@ -61,6 +61,97 @@ wind = { velocity = [0.0, 0.0, 2.0], density = 1e-3, drag = 1.0, width = 0.01 }
     contains(&page, &directions);
 }
 
+/// A leaf whose bases are apart, with loads on its veins and tips and a grip.
+const LOADED: &str = r#"
+leaf = { rods = 2, length = 1.0, fan = "symmetric", joined = false, base = [[0.0, -0.1, 0.0], [0.0, 0.1, 0.0]] }
+stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+grip = [{ vein = 2, at = [0.25, 0.5], held = "clamped" }]
+[load]
+tip_force = [0.0, 0.0, -0.5]
+g = [0.0, 0.0, -1.0]
+distributed = [0.0, 0.1, 0.0]
+point = [{ vein = 1, at = 0.5, force = [0.0, 0.2, 0.0], mass = 0.2 }]
+[dynamics]
+density = 0.1
+duration = 0.02
+tip_force = { at = [0.0, 0.02], value = [[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]] }
+"#;
+
+/// The data of a page.
+fn data(page: &str) -> serde_json::Value {
+    let mark = "<script id=\"data\" type=\"application/json\">";
+    let (_, data) = page.split_once(mark).unwrap();
+    serde_json::from_str(data.split("</script>").next().unwrap()).unwrap()
+}
+
+/// What is told of each mark.
+fn words(marks: &serde_json::Value, names: &[&str]) -> Vec<String> {
+    let told = |mark: &serde_json::Value| {
+        let told: Vec<String> = names.iter().map(|name| mark[name].to_string()).collect();
+        told.join(" ").replace('"', "")
+    };
+    marks.list().iter().map(told).collect()
+}
+
+/// Forces, moments and all that is held are marks of a page: those of a motion as they are at its times.
+#[test]
+fn a_page_knows_what_loads_and_holds_the_leaf() {
+    let place = Workplace::empty();
+    place.write("leaf.toml", LOADED);
+    place.ok("relax leaf.toml --write html");
+    let page = data(&place.read("out/leaf/view.html"));
+    let held = words(&page["holds"], &["part", "vein", "at", "held"]);
+    let clamped = "base 1 [0.0,0.0] clamped, base 2 [0.0,0.0] clamped, grip 2 [0.25,0.5] clamped";
+    assert_eq!(held.join(", "), clamped);
+    let loads = words(&page["loads"], &["action", "vein", "at"]);
+    let along = loads.iter().filter(|it| it.starts_with("distributed"));
+    assert_eq!(along.count(), 18);
+    let single = "force 1 0.5, force 1 1.0, force 2 1.0";
+    assert_eq!(loads[18..].join(", "), single);
+    // The weight of the point is part of its force.
+    let force = page["loads"].list()[18].clone();
+    assert!(
+        (force["size"].number() - 0.2 * 2.0_f64.sqrt()).abs() < 1e-12,
+        "{force}"
+    );
+    let largest = page["loads"].list()[19].clone();
+    assert_eq!(largest["direction"], serde_json::json!([0.0, 0.0, -1.0]));
+    assert!(largest["length"].number() > force["length"].number());
+
+    place.ok("simulate leaf.toml --segments 8 --write html");
+    let page = data(&place.read("out/leaf/motion.html"));
+    let last = page["leaves"].list().last().unwrap();
+    let tip = last["loads"].list().last().unwrap();
+    assert_eq!(tip["direction"], serde_json::json!([0.0, 1.0, 0.0]));
+    assert!((tip["size"].number() - 0.3).abs() < 1e-9, "{tip}");
+
+    place.ok("trace leaf.toml --vary load.tip_force[2]=-0.5..-0.55 --write html");
+    let page = data(&place.read("out/leaf/trace.html"));
+    assert!(page["loads"].is_null());
+
+    // A moment, and a tip that is held.
+    let one = LOADED
+        .replace("rods = 2", "rods = 1")
+        .replace(
+            "joined = false, base = [[0.0, -0.1, 0.0], [0.0, 0.1, 0.0]]",
+            "base_held = \"pinned\"",
+        )
+        .replace("vein = 2", "vein = 1")
+        .replace("mass = 0.2", "moment = [0.3, 0.0, 0.0]")
+        + "[tip]\nheld = \"pinned\"\nposition = [0.9, 0.0, 0.0]\n";
+    place.write("one.toml", one);
+    place.run("relax one.toml --write html");
+    let page = data(&place.read("out/one/view.html"));
+    let held = words(&page["holds"], &["part", "at", "held"]);
+    let pinned = "base [0.0,0.0] pinned, tip [1.0,1.0] pinned, grip [0.25,0.5] clamped";
+    assert_eq!(held.join(", "), pinned);
+    let moment = words(&page["loads"], &["action", "at", "direction", "size"]);
+    assert!(
+        moment.contains(&"moment 0.5 [1.0,0.0,0.0] 0.3".into()),
+        "{moment:?}"
+    );
+}
+
 #[test]
 fn a_motion_and_what_it_lists() {
     let short =

@@ -1,12 +1,13 @@
 //! Ctrl-C: what was found until then is written as whole files, and the exit status is 130; where
-//! nothing is kept of what is unfinished, that is said.
+//! nothing is kept of what is unfinished, that is said. Other requests to end do the same, with the
+//! exit status of their signal.
 #![cfg(unix)]
 
 use std::process::Child;
 use std::thread;
 use std::time::Duration;
 
-use leafdyn_testing::workplace::{Json, Run, Workplace, contains, interrupt, leaf};
+use leafdyn_testing::workplace::{Json, Run, Workplace, contains, interrupt, leaf, send};
 
 /// Long enough to be in the midst of what takes longer.
 const MEANWHILE: Duration = Duration::from_millis(900);
@@ -66,4 +67,42 @@ fn that_nothing_is_kept_is_said() {
         assert_eq!(run.out, "");
         assert!(!place.path("out").exists(), "{verb}");
     }
+}
+
+/// A file that was begun is removed at every request to end, and no draft of it stays.
+#[test]
+fn no_signal_leaves_a_draft() {
+    for (signal, status, name) in [("TERM", 143, "SIGTERM"), ("HUP", 129, "SIGHUP")] {
+        let place = Workplace::new();
+        let many = "--vary load.gravity[2]=0..-3:10000 --points 10000";
+        let child = place.start(&format!("trace leaf.toml {many} --json"));
+        thread::sleep(MEANWHILE);
+        send(&child, signal);
+        let run = Run::from(child.wait_with_output().unwrap()).ends(status);
+        assert_eq!(run.json()["error"], format!("stopped by {name}"));
+        place.holds("out/small", "trace.csv trace.json trace.png trace.svg");
+        let json = place.json("out/small/trace.json");
+        assert_eq!(json["exit_status"], status);
+    }
+}
+
+/// What is started to outlive its terminal does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hangup_that_is_ignored_ends_nothing() {
+    let place = Workplace::new();
+    let quiet = "exec \"$0\" simulate leaf.toml --duration 1 --write json";
+    let mut shell = std::process::Command::new("sh");
+    let program = leafdyn_testing::workplace::program();
+    let child = (shell
+        .arg("-c")
+        .arg(format!("trap '' HUP; {quiet}"))
+        .arg(program))
+    .current_dir(place.path("."))
+    .stdout(std::process::Stdio::piped())
+    .stderr(std::process::Stdio::piped())
+    .spawn()
+    .unwrap();
+    send(&child, "HUP");
+    Run::from(child.wait_with_output().unwrap()).ends(0);
 }

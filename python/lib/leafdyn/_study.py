@@ -19,7 +19,7 @@ from ._view import Viewed
 class Check(Result):
     """Two independent methods on the same leaf, and how far apart they end."""
 
-    verdict = Attribute[str]("""``"agree"``, ``"differ"`` or ``"not-compared"``.""")
+    verdict = Attribute[str]("""``"agree"``, ``"differ"``, ``"not-compared"`` or ``"not-independent"``.""")
     reason = Attribute[str | None]("Why there was nothing to compare.")
     difference = Attribute[dict[str, float] | None](
         """The largest differences: ``position`` (length), ``rotation`` (radians), ``force``, ``moment``."""

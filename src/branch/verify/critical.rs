@@ -86,7 +86,9 @@ pub fn refine_critical(
         let noisy = FINER * table.noise > ENOUGH * accuracy;
         let enough = exact || noisy || level + 1 >= grids;
         if enough && table.error() <= accuracy {
-            return Ok(table.refined(critical.state, equations.grid().clone()));
+            let leaf = equations.leaves.at([critical.fraction])?;
+            let state = leaf.leaning(&critical.state).into_owned();
+            return Ok(table.refined(state, equations.grid().clone()));
         }
         if 2 * equations.grid().segments() > FINEST {
             break;

@@ -115,8 +115,11 @@ pub(in crate::branch) fn observed_nodes(
 }
 
 impl Values {
+    /// Of a leaf that can turn those of the equilibrium that stands for its circle, as it does in a
+    /// relaxation: where on the circle a branch has led depends on where it began.
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
         let leaf = equations.leaves.at([fraction])?;
+        let state = &*leaf.leaning(state);
         let nodes = observed_nodes(leaf, state.segments());
         let points = nodes.flat_map(|i| (0..state.rods()).map(move |j| state.base(j) + i));
         Ok(Values {

@@ -2,7 +2,7 @@
 
 use crate::branch::problem::correct::Plane;
 use crate::branch::problem::equations::{Equations, Stuck};
-use crate::branch::problem::family::{Family, OutOfRange};
+use crate::branch::problem::family::Family;
 use crate::branch::problem::field::every_second;
 use crate::branch::problem::states::both_sides;
 use crate::branch::verify::refined::{Doubt, Refined, Table, Values, observed_nodes};
@@ -245,46 +245,55 @@ fn refine_in(
         table.push(equations.grid().segments(), values);
         table.slope = Some(slope(&mut equations, &now)?);
         if finer_grids >= FINER_GRIDS && table.error() <= accuracy {
-            return Ok(table.refined(now.state, equations.grid().clone()));
+            let leaf = equations.leaves.at([now.fraction])?;
+            let state = leaf.leaning(&now.state).into_owned();
+            return Ok(table.refined(state, equations.grid().clone()));
         }
     }
     Err(Doubt::Inaccurate)
 }
 
 /// Derivatives of a point's values with respect to the parameter: of points from the tangent;
-/// of the energy, stationary in the state, from that of the loads; of the forces on holders, and of
-/// the energy if these may move, from neighbouring states.
+/// of the energy, stationary in the state, from that of the loads; of the forces on holders, of
+/// the energy if these may move, and of the points of a leaf that can turn, from neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let leaf = &equations.leaves.at([point.fraction])?.leaf;
-    let held = leaf.is_held() || leaf.hinged();
-    let [
-        (after, energy, forces),
-        (before, energy_before, forces_before),
-    ] = both_sides(|step| {
+    let leaf = equations.leaves.at([point.fraction])?;
+    let turns = !leaf.turns(&point.state).is_empty();
+    let moves = leaf.leaf.is_held() || leaf.leaf.hinged() || turns;
+    let [after, before] = both_sides(|step| {
         let at = point.fraction + step;
-        if !held {
-            let energy = equations.leaves.at([at])?.energy(&point.state);
-            return Ok((at, energy, Vec::new()));
+        if !moves {
+            return Ok(Values {
+                points: Vec::new(),
+                fraction: at,
+                energy: equations.leaves.at([at])?.energy(&point.state),
+                reactions: Vec::new(),
+            });
         }
         let length = step / tangent.params[0];
         let state = equations.advanced(&point.state, [at], &tangent.increments, length)?;
-        let leaf = equations.leaves.at([at])?;
-        Ok::<_, OutOfRange>((at, leaf.energy(&state), leaf.forces_on_holders(&state)))
+        Values::of(equations, &state, at)
     })?;
+    let way = after.fraction - before.fraction;
     let leaf = equations.leaves.at([point.fraction])?;
     let nodes = observed_nodes(leaf, leaf.segments());
     let first = leaf.first_node();
     let displacements =
         nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - first]));
     Ok(Values {
-        points: displacements
-            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.params[0]))
-            .collect(),
+        points: match turns {
+            true => (after.points.iter().zip(&before.points))
+                .map(|(after, before)| (after - before) / way)
+                .collect(),
+            false => displacements
+                .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.params[0]))
+                .collect(),
+        },
         fraction: 1.0,
-        energy: (energy - energy_before) / (after - before),
-        reactions: (forces.iter().zip(forces_before))
-            .map(|(force, before)| (*force - before) / (after - before))
+        energy: (after.energy - before.energy) / way,
+        reactions: (after.reactions.iter().zip(before.reactions))
+            .map(|(force, before)| (*force - before) / way)
             .collect(),
     })
 }

@@ -81,6 +81,11 @@ impl Method for Explicit {
             self.balance.add(exchange);
             self.steps += 1;
             (self.stepped, self.time) = (next, next);
+            let applied = self.applied.as_ref();
+            if let Some(half_turn) = applied.and_then(|it| it.half_turn(&self.leaf)) {
+                let time = self.time;
+                return Err(Stopped::HalfTurn { time, half_turn });
+            }
             let suspect = self.steps.is_multiple_of(BENDING_CHECKED) && !self.trusted();
             if suspect || self.steps.is_multiple_of(ENERGY_CHECKED) {
                 self.judged()?;

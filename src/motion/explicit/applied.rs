@@ -7,7 +7,7 @@
 
 use super::kernel::{Array, Layout};
 use super::packs::{Pack, vector};
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, HalfTurn, State};
 use crate::motion::physics::Physics;
 use crate::motion::wind::Wind;
 use glam::DVec3;
@@ -15,6 +15,8 @@ use glam::DVec3;
 /// The moments and forces at an instant.
 pub struct Applied {
     state: State,
+    /// Those of the tissue's strips at the start.
+    alignments: Vec<bool>,
     nodes: Vec<[DVec3; 2]>,
     /// Moments and forces, laid out as positions.
     loads: [[Array; 3]; 2],
@@ -31,8 +33,13 @@ struct Blown {
 }
 
 impl Applied {
-    /// `None` if nothing acts on the nodes besides.
-    pub fn new(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout) -> Option<Self> {
+    /// Of a leaf that moves from the state `start`; `None` if nothing acts on the nodes besides.
+    pub fn new(
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        start: &State,
+        layout: Layout,
+    ) -> Option<Self> {
         let wind = Wind::new(leaf, physics);
         if !leaf.tied() && leaf.loads.own == 0.0 && wind.is_none() {
             return None;
@@ -43,6 +50,7 @@ impl Applied {
         let at_rest = || vec![DVec3::ZERO; state.x.len()];
         Some(Applied {
             nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
+            alignments: leaf.alignments(start),
             loads: [vectors(), vectors()],
             blown: wind.map(|wind| Blown {
                 wind,
@@ -102,6 +110,11 @@ impl Applied {
                 }
             }
         }
+    }
+
+    /// Where sections had passed half a turn against each other when loads were last set.
+    pub fn half_turn(&self, leaf: &DiscreteLeaf) -> Option<HalfTurn> {
+        leaf.half_turn_since(&self.alignments, &self.state)
     }
 
     /// Power of the wind at the mean of the velocities before the last kick and of these.

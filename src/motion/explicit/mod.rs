@@ -125,7 +125,7 @@ impl Explicit {
             next: positions.clone(),
             positions,
             layout,
-            applied: Applied::new(&leaf, &physics, layout),
+            applied: Applied::new(&leaf, &physics, state, layout),
             moments: Moments::default(),
             block: Block::new(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),

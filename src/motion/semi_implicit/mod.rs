@@ -147,6 +147,8 @@ pub struct SemiImplicit {
     balance: EnergyBalance,
     /// Loads by which the accelerations were corrected for the step being attempted.
     corrected: Loads,
+    /// Those of the tissue's strips at the start.
+    alignments: Vec<bool>,
 }
 
 impl SemiImplicit {
@@ -180,6 +182,7 @@ impl SemiImplicit {
             factorizations: 0,
             balance: EnergyBalance::default(),
             corrected: Loads::default(),
+            alignments: leaf.alignments(state),
             leaf,
             physics,
         };
@@ -193,7 +196,7 @@ impl SemiImplicit {
     /// Attempts a step that does not go beyond `until`.
     ///
     /// # Errors
-    /// If it would be too short.
+    /// If it would be too short, or sections passed half a turn against each other.
     pub fn step_towards(&mut self, until: f64) -> Result<(), Stopped> {
         let left = until - self.time;
         if left < NO_TIME * self.step {
@@ -227,8 +230,16 @@ impl SemiImplicit {
         if let (Steps::Fixed(longest), Some(_)) = (self.steps, error) {
             self.step = longest.min(GROWTH.1 * self.step);
         }
+        let time = self.time;
+        // Beyond the jump of the law no step may converge.
+        let half_turn = match self.step < SHORTEST_STEP {
+            true => self.leaf.half_turn_near(&self.state),
+            false => (self.leaf).half_turn_since(&self.alignments, &self.state),
+        };
+        if let Some(half_turn) = half_turn {
+            return Err(Stopped::HalfTurn { time, half_turn });
+        }
         if self.step < SHORTEST_STEP {
-            let time = self.time;
             let started = time > 0.0;
             let advice = if started {
                 TOO_SHORT

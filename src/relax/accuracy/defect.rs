@@ -16,7 +16,9 @@
 use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Factorised, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::accuracy::jump_response::{Tangents, apply, largest_rotation_and_stress};
+use crate::relax::accuracy::jump_response::{
+    Change, Tangents, apply, largest_rotation_and_stress,
+};
 use crate::relax::accuracy::nodal_fields::nodes;
 use crate::relax::accuracy::steps::Steps;
 use crate::relax::transfer::level::Level;
@@ -66,6 +68,11 @@ pub struct Estimate {
     pub rods: Vec<Vec<RodFields>>,
     /// Its potential energy, dimensionless.
     pub energy: f64,
+    /// The error of the energy: see [`energy_error`].
+    pub energy_error: f64,
+    /// The errors of the fields along the lab axes, at the nodes from which the leaf was
+    /// integrated and at the midpoints between them, rod after rod.
+    pub errors: Vec<Vec<Change>>,
     /// The finest grid or, for a corrected leaf, one with as many segments as its accuracy needs.
     pub grid: Grid,
     /// Number of corrections.
@@ -144,22 +151,28 @@ pub fn estimate(
         }
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
         let out_of_reach = largest * contraction.powi(rounds_left) > enough;
-        if corrections == 0 && (largest <= enough || out_of_reach) {
-            return Some(integrated.estimate(&known, response.largest, finest));
-        }
-        if out_of_reach {
+        if corrections > 0 && out_of_reach {
             break;
         }
         let changes = tangents.changes(&response, &integrated.jumps);
         if corrections == 0 {
-            uncorrected = Some(integrated.estimate(&known, response.largest, finest));
+            let estimate =
+                integrated.estimate((first, finest), &known, &changes, response.largest);
+            if largest <= enough || out_of_reach {
+                return Some(estimate);
+            }
+            uncorrected = Some(estimate);
         } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
                 let errors = response.largest.map(|error| error + steps.error);
+                let mut forces = known.iter().flatten().map(|it| it.n.length() + it.m.length());
+                let largest = forces.by_ref().fold(0.0, larger);
                 return Some(Estimate {
                     corrections,
-                    ..integrated.estimate(&known, errors, finest)
+                    energy_error: energy_error(first, &changes, &integrated.jumps)
+                        + steps.error * largest,
+                    ..integrated.estimate((first, finest), &known, &changes, errors)
                 });
             }
         }
@@ -247,9 +260,10 @@ impl Integrated {
     /// between them, on the `finest` grid or on the refined one that has the ends of all steps.
     fn estimate(
         &self,
+        (leaf, finest): (&DiscreteLeaf, &Grid),
         known: &[Vec<RodFields>],
+        changes: &[Vec<Change>],
         [at_nodes, between]: [f64; 2],
-        finest: &Grid,
     ) -> Estimate {
         let rods = self.rods(known);
         let mut grid = finest.clone();
@@ -261,6 +275,8 @@ impl Integrated {
             between,
             rods,
             energy: self.energy,
+            energy_error: energy_error(leaf, changes, &self.jumps),
+            errors: with_midpoints(changes, &self.jumps),
             grid,
             corrections: 0,
         }
@@ -284,6 +300,45 @@ impl Integrated {
         };
         known.iter().enumerate().map(rod).collect()
     }
+}
+
+/// Changes at the nodes, and at the midpoints between them on the side where they are larger: half
+/// of the jump is added to their mean.
+fn with_midpoints(changes: &[Vec<Change>], jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
+    let rod = |(nodes, jumps): (&Vec<Change>, &Vec<Jump>)| {
+        let mut all = Vec::with_capacity(nodes.len() + jumps.len());
+        for (pair, jump) in nodes.windows(2).zip(jumps) {
+            all.push(pair[0]);
+            all.push(std::array::from_fn(|k| {
+                let mean = 0.5 * (pair[0][k] + pair[1][k]);
+                let half = 0.5 * jump[k];
+                mean + if mean.dot(half) < 0.0 { -half } else { half }
+            }));
+        }
+        all.extend(nodes.last());
+        all
+    };
+    changes.iter().zip(jumps).map(rod).collect()
+}
+
+/// The error of the energy of a leaf with these jumps, which are closed by the work of its forces,
+/// and with the response `changes` to them. Between the jumps the error e of the fields satisfies the linear
+/// equations, so that its energy is the work of its forces at the jumps, and the error of the leaf's
+/// energy half of [n] e_x - e_n [x], with the same of moments and rotations: it is of second order, and
+/// bounded by the size of every term. A dead moment has no potential: the energy is not
+/// stationary, and changes by its work in the rotation e of the node on which it acts.
+fn energy_error(leaf: &DiscreteLeaf, changes: &[Vec<Change>], jumps: &[Vec<Jump>]) -> f64 {
+    let mut error = 0.0;
+    for (nodes, jumps) in changes.iter().zip(jumps) {
+        for (pair, [x, turn, n, m]) in nodes.windows(2).zip(jumps) {
+            let mean = |k: usize| 0.5 * (pair[0][k].length() + pair[1][k].length());
+            error += 0.5 * (n.length() * mean(0) + mean(2) * x.length());
+            error += 0.5 * (m.length() * mean(1) + mean(3) * turn.length());
+        }
+    }
+    let [turned, _] = largest_rotation_and_stress(changes);
+    let moments = leaf.moments().map(|(_, moment)| moment.length());
+    error + turned * moments.sum::<f64>()
 }
 
 /// Makes forces and moments at the tips, and moments at hinges, satisfy the end conditions, which unfinished

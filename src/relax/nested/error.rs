@@ -16,6 +16,10 @@ const EXTRAPOLATED: f64 = 2.0;
 /// Safety factor on the error estimated from the defect of the extrapolated leaf.
 const SAFETY: f64 = 2.0;
 
+/// The same on that of the energy: the linear equations of a coarse grid tell less of what is of
+/// second order.
+const ENERGY_SAFETY: f64 = 3.0;
+
 /// The least part of the largest error between the nodes of the coarsest grid that is taken
 /// for the error at these nodes: where layers are thinner than its segments the linear
 /// equations of a coarse grid are wrong by so much.
@@ -87,6 +91,21 @@ impl NestedEquilibrium {
     /// Error by unfinished iterations and rounding on a grid of `segments` segments.
     fn unfinished(&self, segments: usize) -> f64 {
         EXTRAPOLATED * self.history.remaining + ROUNDING * segments as f64
+    }
+
+    /// Error of the energy of an integrated leaf: that of grids, and rounding of what is summed along
+    /// the rods.
+    pub(super) fn energy_error(&self, estimate: &Estimate) -> f64 {
+        let segments = estimate.grid.segments() * estimate.rods.len();
+        let rounding = ROUNDING * segments as f64 * larger(1.0, estimate.energy.abs());
+        self.softening * ENERGY_SAFETY * estimate.energy_error + rounding
+    }
+
+    /// The leaf integrated along its rods, with bounds on the errors of its fields, along the lab axes,
+    /// at equally many places of each rod.
+    pub fn field_errors(&self) -> Option<(&Estimate, f64)> {
+        let estimate = self.estimate.as_ref()?;
+        Some((estimate, self.softening * SAFETY))
     }
 
     /// Whether the error is within the tolerance; always true on a fixed grid.

@@ -7,7 +7,7 @@
 pub mod error;
 
 use crate::largest::larger;
-use crate::leaf::{Grid, Leaf, RodFields, whole_fields};
+use crate::leaf::{Grid, Leaf, RodFields, whole_changes, whole_fields};
 use crate::memory;
 use crate::newton::{Contraction, Stop, Work};
 use crate::relax::accuracy::defect::{Estimate, Linear};
@@ -328,27 +328,30 @@ impl NestedEquilibrium {
     }
 
     /// The potential energy: integrated along the leaf, with an error of second order in the
-    /// defect, or extrapolated as far as it converges as that assumes; its error, if that is
-    /// larger than that of positions lets expect.
+    /// defect, or extrapolated as far as it converges as that assumes; and its error, which is
+    /// unknown on a single grid.
     pub fn energy(&self) -> (f64, Option<f64>) {
         if let Some(estimate) = &self.estimate {
-            return (estimate.energy, None);
+            return (estimate.energy, Some(self.energy_error(estimate)));
         }
         let (table, columns) = (energies(&self.levels), self.table.columns());
-        let Some(best) = table.best() else {
+        let Some(best) = table.error_of_few() else {
             return (table.column(columns)[0], None);
         };
         let energy = table.column(columns.min(best.columns))[0];
-        let expected = self.error().unwrap_or(f64::INFINITY) * energy.abs();
-        (energy, (best.error > expected).then_some(best.error))
+        let further = (energy - table.column(best.columns)[0]).abs();
+        (energy, Some(best.error + further))
     }
 }
 
 /// The estimate of a whole leaf from that of its half.
 fn completed(half: Estimate, reduced: &Leaf) -> Estimate {
+    let both = if reduced.in_half() { 2.0 } else { 1.0 };
     Estimate {
         rods: whole_fields(reduced, half.rods),
-        energy: half.energy * if reduced.in_half() { 2.0 } else { 1.0 },
+        energy: half.energy * both,
+        energy_error: half.energy_error * both,
+        errors: whole_changes(reduced, half.errors),
         ..half
     }
 }

@@ -7,7 +7,7 @@ use crate::memory::TooMuch;
 use crate::refusal::{RefusedOption, Unmodelled};
 use crate::relax::path::Route;
 use crate::relax::request::method::Method;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, UnbalancedMoment};
 use crate::shooting;
 use glam::DVec3;
 
@@ -150,6 +150,17 @@ pub enum RelaxError {
         "leaf.base_held: without a load nothing holds the leaf against turning about its hinge: give it a load or another hinge, hold its tip, or clamp its base"
     )]
     TurnsFreely,
+    /// Dead moments about the line about which a leaf on hinges turns freely.
+    #[error(
+        "leaf.base_held: no equilibrium exists: the leaf turns freely about {line}, and nothing balances the moments on it, \
+         which sum up to {moment:e} there: let them sum up to zero, add a force across this line, or clamp the base"
+    )]
+    UnbalancedMoment {
+        /// The line.
+        line: &'static str,
+        /// The sum of the moments about it, in the units of the scenario.
+        moment: f64,
+    },
 }
 
 /// Refuses scenarios with wind for what does not take it into account.
@@ -160,11 +171,14 @@ pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), Relax
     }
 }
 
-/// Refuses a leaf on hinges that may point anywhere.
+/// Refuses a leaf on hinges that may point anywhere, or that nothing keeps from turning for ever.
 pub fn points_somewhere(scenario: &Scenario) -> Result<(), RelaxError> {
-    match scenario.turns_freely() {
-        true => Err(RelaxError::TurnsFreely),
-        false => Ok(()),
+    match (scenario.turns_freely(), scenario.unbalanced_moment()) {
+        (true, _) => Err(RelaxError::TurnsFreely),
+        (false, Some(UnbalancedMoment { line, moment })) => {
+            Err(RelaxError::UnbalancedMoment { line, moment })
+        }
+        (false, None) => Ok(()),
     }
 }
 

@@ -164,8 +164,8 @@ pub struct Accuracy {
     pub residual: Option<f64>,
     /// Bound on the error of the positions, in units of length; `None` on a single grid.
     pub error_estimate: Option<f64>,
-    /// Bound on the error of the energy, where it is larger than that of the positions, relative
-    /// to the length, lets expect.
+    /// Bound on the error of the energy; `None` on a single grid that was not integrated along its
+    /// rods, in wind, and after shooting.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy_error: Option<f64>,
 }

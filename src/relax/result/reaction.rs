@@ -51,6 +51,10 @@ pub struct GripReaction {
     pub moment_error: Option<f64>,
 }
 
+/// Largest number of grids that are extrapolated: on those before errors of forces, which the
+/// finest have no more, need not be small.
+const GRIDS: usize = 4;
+
 /// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows, with
 /// the error; `relative` is that of each of them by unfinished iterations, `rounding` that by
 /// rounding. The error is unknown on a single grid.
@@ -59,6 +63,7 @@ pub(in crate::relax) fn extrapolated(
     on: impl Fn(&Level) -> Vec<DVec3>,
     [relative, rounding]: [f64; 2],
 ) -> (Vec<DVec3>, Option<f64>) {
+    let levels = &levels[levels.len().saturating_sub(GRIDS)..];
     let values: Vec<Vec<DVec3>> = levels.iter().map(on).collect();
     let all = values.iter().flatten().map(|vector| vector.length());
     let size = largest(all);
@@ -71,7 +76,7 @@ pub(in crate::relax) fn extrapolated(
         })
         .collect();
     let table = table.with_noise(rounding / scale);
-    let best = table.best();
+    let best = table.error_of_few();
     let found = table.column(best.map_or(0, |best| best.columns));
     let error = best.map(|best| (best.error + relative) * scale + rounding);
     let vectors = found.chunks(3).map(|it| DVec3::from_slice(it) * scale);
@@ -95,27 +100,40 @@ impl NestedEquilibrium {
         let leaf = &self.levels[0].leaf.leaf;
         let held = leaf.held.as_ref()?;
         let unfinished = self.unfinished_forces();
-        let force = |level: &Level| vec![level.leaf.reaction(&level.state).0];
-        let (mut forces, mut error) = extrapolated(&self.levels, force, unfinished);
-        // A single grid is compared with the leaf that was integrated from it.
-        if let ([level], Some(estimate)) = (self.levels.as_slice(), &self.estimate) {
-            let rods = estimate.rods.iter().enumerate();
-            let integrated: DVec3 = rods
-                .filter_map(|(j, rod)| Some(level.leaf.tip_force(j) - rod.last()?.n))
-                .sum();
-            error = Some(forces[0].distance(integrated) + unfinished[1]);
-            forces[0] = integrated;
-        }
-        let moments = |level: &Level| level.leaf.reaction(&level.state).1;
         let clamped = held.clamps.is_some();
-        let moments = clamped.then(|| extrapolated(&self.levels, moments, unfinished));
-        let (moments, moments_error) = moments.unzip();
+        let (force, error, moments, moments_error) = match self.field_errors() {
+            Some((estimate, safety)) => {
+                let tips = || estimate.rods.iter().filter_map(|rod| rod.last());
+                let level = &self.levels[0].leaf;
+                let forces = tips().enumerate();
+                let force: DVec3 = forces.map(|(j, tip)| level.tip_force(j) - tip.n).sum();
+                let moments = tips().map(|tip| level.moment_at(1.0) - tip.m).collect();
+                let off = |k: usize| -> Vec<f64> {
+                    let tips = estimate.errors.iter().filter_map(|rod| rod.last());
+                    tips.map(|tip| safety * tip[k].length()).collect()
+                };
+                let bar = |error: f64, size: f64| error + unfinished[0] * size + unfinished[1];
+                let largest_moment = largest(tips().map(|tip| tip.m.length()));
+                let error = bar(off(2).iter().sum(), force.length());
+                let moments_error = bar(largest(off(3)), largest_moment);
+                (force, Some(error), moments, Some(moments_error))
+            }
+            None => {
+                let force = |level: &Level| vec![level.leaf.reaction(&level.state).0];
+                let moments = |level: &Level| level.leaf.reaction(&level.state).1;
+                let (forces, error) = extrapolated(&self.levels, force, unfinished);
+                let (moments, moments_error) = extrapolated(&self.levels, moments, unfinished);
+                (forces[0], error, moments, moments_error)
+            }
+        };
         let of = |all: Vec<DVec3>| all.iter().map(|it| *it * leaf.scale.moment()).collect();
         Some(Reaction {
-            force: forces[0] * leaf.scale.force(),
+            force: force * leaf.scale.force(),
             error: error.map(|error| error * leaf.scale.force()),
-            moments: moments.map(of),
-            moments_error: (moments_error.flatten()).map(|error| error * leaf.scale.moment()),
+            moments: clamped.then(|| of(moments)),
+            moments_error: moments_error
+                .filter(|_| clamped)
+                .map(|error| error * leaf.scale.moment()),
         })
     }
 

@@ -1,7 +1,8 @@
 //! From the settled grids to the result in the units of the scenario.
 
-use crate::leaf::{Grid, Leaf, RodFields};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, RodFields};
 use crate::newton::Stop;
+use crate::numbers::two_digits;
 use crate::relax::accuracy::nodal_fields::with_sign_of;
 use crate::relax::nested::NestedEquilibrium;
 use crate::relax::path::{Event, Happening, Path, Stage};
@@ -68,7 +69,8 @@ pub fn equilibrium(
         sensitivities: None,
         margin: None,
         blade: BladeReport::of(scenario),
-        stress: Stresses::of(scenario, &stations, &rods).map(|it| it.on_grids(scenario, found)),
+        stress: Stresses::of(scenario, &stations, &rods)
+            .map(|it| it.on_grids(scenario, &stations, found)),
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
@@ -277,6 +279,52 @@ pub fn outcome(
     }
 }
 
+/// Part of its length by which the distance between two holders of an inextensible span is smaller
+/// where the span is straight, for all that rounding tells.
+const STRAIGHT: f64 = 1e-9;
+
+/// An inextensible vein that two holders, neighbours along it, keep straight. What pulls it aside
+/// would need infinite forces along it, and any force along it is in balance.
+fn taut_span(leaf: &DiscreteLeaf) -> Option<String> {
+    let n = leaf.segments();
+    let holders = |j: usize| {
+        let base = [("its base".to_owned(), 0, leaf.leaf.base(j).0)];
+        let grips = leaf.grips_of(j).map(|held| {
+            let sigma = two_digits(leaf.grid.sigma()[held.node]);
+            (
+                format!("the grip at {sigma} of its length"),
+                held.node,
+                held.position,
+            )
+        });
+        let tip = leaf.leaf.held.as_ref();
+        let tip = tip.map(|held| ("its tip".to_owned(), n, held.position));
+        base.into_iter().chain(grips).chain(tip).collect::<Vec<_>>()
+    };
+    let taut = |j: usize, from: usize, to: usize, distance: f64| {
+        let sections = || (from..to).map(|i| leaf.section(j, i));
+        let length: f64 = sections().map(|it| it.ds * it.rest_strain.x).sum();
+        // Within a stretch that a grip holds every node is held.
+        to > from + 1
+            && sections().all(|it| it.compliance.x == 0.0)
+            && distance >= length * (1.0 - STRAIGHT)
+    };
+    (0..leaf.rods()).find_map(|j| {
+        let holders = holders(j);
+        let mut spans = holders.windows(2);
+        let span = spans.find(|span| taut(j, span[0].1, span[1].1, span[0].2.distance(span[1].2)));
+        span.map(|span| {
+            format!(
+                "vein {} is inextensible and held straight between {} and {}: no finite force in it bears what pulls it aside, \
+                 and what it carries along itself is not determined; give stiffness.axial a number, or move one holder towards the other",
+                j + 1,
+                span[0].0,
+                span[1].0
+            )
+        })
+    })
+}
+
 /// Loads that advice names, as a part of the largest.
 const COUNTS: f64 = 0.1;
 
@@ -289,6 +337,12 @@ fn advice(problem: &Problem, found: &NestedEquilibrium, reached: Option<(Stage, 
     let Some(level) = found.levels.last() else {
         return String::new();
     };
+    if let Some(half_turn) = level.leaf.half_turn_near(&level.state) {
+        return format!(": {}", half_turn.sentence());
+    }
+    if let Some(taut) = taut_span(&level.leaf) {
+        return format!(": {taut}");
+    }
     let bends = |j: usize| {
         let base = level.state.base(j);
         let rate = |i: usize| {

@@ -1,8 +1,11 @@
 //! The largest stresses along the veins.
 
-use crate::largest::largest;
+use crate::largest::{larger, largest};
+use crate::leaf::Scale;
+use crate::relax::accuracy::defect::Estimate;
 use crate::relax::nested::NestedEquilibrium;
 use crate::relax::result::reaction::extrapolated;
+use crate::relax::result::stations::SAME;
 use crate::relax::transfer::level::Level;
 use crate::relax::transfer::strains;
 use crate::scenario::{Moduli, Scenario, Stress};
@@ -73,11 +76,59 @@ impl Stresses {
         Stresses { error, ..self }
     }
 
-    /// With the error of a leaf on nested grids: that of the stresses at the nodes of the coarsest,
-    /// and the distance of these from their extrapolation.
-    pub(in crate::relax) fn on_grids(self, scenario: &Scenario, found: &NestedEquilibrium) -> Self {
+    /// With the error of a leaf that was integrated along its rods to these stations, from those of its
+    /// forces and moments: a stress is a norm of both, and may be the largest at another station.
+    fn integrated(
+        self,
+        (scenario, stations): (&Scenario, &[f64]),
+        (estimate, safety): (&Estimate, f64),
+        scale: Scale,
+    ) -> Self {
+        let places = estimate.errors[0].len() - 1;
+        let (nodes, sigma) = (estimate.grid.segments(), estimate.grid.sigma());
+        let error = |j: usize, station: f64| -> Option<f64> {
+            let i = sigma.partition_point(|at| *at < station - SAME).min(nodes);
+            let fields = &estimate.rods[j][i];
+            let along = |it: DVec3| fields.q.conjugate() * it;
+            let moduli = scenario.moduli(j, station)?;
+            let at = |place: usize| {
+                let [_, turn, n, m] = estimate.errors[j][place];
+                let force = along(n - turn.cross(fields.n)) * scale.force();
+                let moment = along(m - turn.cross(fields.m)) * scale.moment();
+                safety * moduli.stress(force, moment).equivalent
+            };
+            let place = i * places / nodes;
+            let next = (i * places).div_ceil(nodes);
+            Some(larger(at(place), at(next)))
+        };
+        let mut most = error(self.vein - 1, self.sigma);
+        for (j, rod) in self.rods.iter().enumerate() {
+            for (&station, stress) in stations.iter().zip(rod) {
+                let reached = error(j, station).map(|error| stress.equivalent + error);
+                let above = reached.map(|reached| reached - self.largest.equivalent);
+                most = most.zip(above).map(|(most, above)| larger(most, above));
+            }
+        }
+        Stresses {
+            error: most,
+            ..self
+        }
+    }
+
+    /// With the error of a leaf on nested grids at these stations: where it was not integrated that of
+    /// the stresses at the nodes of the coarsest, and the distance of these from their extrapolation.
+    pub(in crate::relax) fn on_grids(
+        self,
+        scenario: &Scenario,
+        stations: &[f64],
+        found: &NestedEquilibrium,
+    ) -> Self {
+        let scale = found.levels[0].leaf.leaf.scale;
+        if let Some(errors) = found.field_errors().filter(|_| found.integrated().is_some()) {
+            return self.integrated((scenario, stations), errors, scale);
+        }
         let sigma = found.levels[0].leaf.grid.sigma();
-        let (rods, scale) = (self.rods.len(), found.levels[0].leaf.leaf.scale);
+        let rods = self.rods.len();
         let moduli: Option<Vec<Moduli>> = (0..rods)
             .flat_map(|j| sigma.iter().map(move |at| scenario.moduli(j, *at)))
             .collect();
@@ -98,19 +149,6 @@ impl Stresses {
                 .collect()
         };
         let (extrapolated, error) = extrapolated(&found.levels, on, [found.history.remaining, 0.0]);
-        let error = match (&error, found.integrated()) {
-            (None, Some((estimate, _))) => {
-                // A single grid is compared with the leaf that was integrated from it.
-                let stride = estimate.grid.segments() / (sigma.len() - 1);
-                let off = nodes().enumerate().map(|(k, (j, i))| {
-                    let at = &estimate.rods[j][i * stride];
-                    let along = [at.n, at.m].map(|it| at.q.conjugate() * it);
-                    stress(k, along).distance(extrapolated[k])
-                });
-                Some(largest(off))
-            }
-            _ => error,
-        };
         let told = self.largest.equivalent;
         let peak = largest(extrapolated.iter().map(|it| it.z));
         // Between the nodes of the coarsest grid stresses may be larger, but not those at a node.

@@ -1,6 +1,6 @@
 //! Directions in which the equations are nearly singular, and why there is no convergence.
 
-use super::{LARGEST_GROWTH, NEARLY_SINGULAR, NUDGE, Newton, STATIONS, size_of};
+use super::{LARGEST_GROWTH, NEARLY_SINGULAR, NUDGE, Newton, ROUNDED, STATIONS, size_of};
 use crate::largest::largest;
 use crate::shooting::solution::{Neutral, Reason};
 use crate::shooting::trajectory::{Nodes, Trajectory};
@@ -17,13 +17,22 @@ impl Newton<'_, '_, '_> {
     /// Why there is no convergence, as far as the last linearisation shows it.
     pub(super) fn explained(&self, reason: Reason) -> Reason {
         let Reason::NoConvergence {
-            correction, fixed, ..
+            correction,
+            fixed,
+            from_leaf,
+            ..
         } = reason
         else {
             return reason;
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),
+            None if self.costs_too_much() || self.from_leaf && correction <= ROUNDED => {
+                Reason::Rounding {
+                    correction,
+                    growth: self.growth.iter().map(|growth| growth.log10()).sum(),
+                }
+            }
             None => {
                 let growths = self.growth.iter().map(|growth| growth.log10());
                 let growth = largest(growths);
@@ -31,6 +40,7 @@ impl Newton<'_, '_, '_> {
                     correction,
                     growth,
                     fixed,
+                    from_leaf,
                 }
             }
         }

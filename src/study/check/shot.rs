@@ -84,6 +84,7 @@ impl Serialize for Shot {
             Err(Failure { reason, work, .. }) => match reason {
                 Reason::Singular(neutral) => ("singular", Some(neutral), *work),
                 Reason::NoConvergence { .. } => ("no-convergence", None, *work),
+                Reason::Rounding { .. } => ("rounding", None, *work),
                 Reason::Unbounded { .. } => ("unbounded", None, *work),
                 Reason::TooMuch(_) => ("too-much-memory", None, *work),
                 Reason::OutOfTime => ("out-of-time", None, *work),

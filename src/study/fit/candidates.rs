@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::FitError;
 use super::case::{Compared, Component};
 use super::data::{Data, Experiment};
-use super::model::Model;
+use super::model::{Budget, Model};
 use super::result::FitCandidate;
 use super::statistics::Statistics;
 
@@ -28,6 +28,8 @@ pub(super) fn rank(
             ..Data::default()
         };
         let of = stats.model;
+        // One leaf for each, whatever the search took.
+        let data = (data, Budget::new(usize::MAX));
         let model = Model::new(of.base, of.coordinates, &of.options, data)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),

@@ -108,6 +108,8 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
     let mut remarks = Vec::new();
     match end {
         End::Converged => {}
+        // That is said at the end.
+        End::UsedUp => {}
         End::MostSteps => remarks.push(
             "the step limit came before the minimum: start from values nearer to it".into(),
         ),

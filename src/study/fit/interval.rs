@@ -25,7 +25,14 @@ pub(super) fn intervals(
     (0..all)
         .map(|k| {
             let known = Some((k, all));
-            let mut profiling = |step, sum| progress(&FitStep { step, sum, known });
+            let mut profiling = |step, sum| {
+                progress(&FitStep {
+                    step,
+                    sum,
+                    known,
+                    budget: None,
+                })
+            };
             parameter(stats, (shape, near.as_ref()), k, &mut profiling)
         })
         .collect()

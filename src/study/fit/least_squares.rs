@@ -136,6 +136,8 @@ fn spread(residuals: &DVector<f64>) -> f64 {
 pub(super) enum End {
     Converged,
     MostSteps,
+    /// The budget of evaluations is used up.
+    UsedUp,
     /// No further step succeeds; with the reason of the last failure.
     Stuck(Option<Lost>),
 }
@@ -235,6 +237,9 @@ impl<'m, 'a> Iteration<'m, 'a> {
                 let worth = size >= STEP && predicted >= GAIN * variance && radius >= LEAST_STEP;
                 if !number || !worth {
                     return (point, end(lost), evaluations);
+                }
+                if self.model.budget.is_used_up() {
+                    return (point, End::UsedUp, evaluations);
                 }
                 evaluations += 1;
                 match self.model.follow(&point, &theta) {

@@ -3,6 +3,8 @@
 
 use std::cell::Cell;
 
+use crate::clock::Instant;
+
 use super::FitError;
 use super::data::Experiment;
 use super::end::BETTER;
@@ -44,10 +46,17 @@ pub(super) struct Beginning {
 impl Beginning {
     /// The values of the scenario, if all leaves come to rest there and the data are not far from
     /// them; otherwise the best ones in decades around them, or near them.
-    pub fn find(model: &Model, weighting: Weighting) -> Result<Beginning, FitError> {
+    /// `told` is called with the time in seconds that the first leaves took.
+    pub fn find(
+        model: &Model,
+        weighting: Weighting,
+        told: &mut dyn FnMut(f64),
+    ) -> Result<Beginning, FitError> {
         let start: Vec<f64> = model.coordinates.iter().map(|free| free.start).collect();
         let loose = model.with_loose_tolerance(weighting.assumed);
+        let clock = Instant::now();
         let found = loose.find(&start);
+        told(clock.elapsed().as_secs_f64());
         let (initial, refused) = match found {
             Ok(point) if misfit(model, &point) <= FAR => {
                 return Ok(Beginning {
@@ -180,7 +189,8 @@ impl<'a> Minima<'_, 'a> {
         let first = self.search(&began.point, usize::MAX, progress);
         // What the initial values lead to is found even where other values seemed better.
         let doubtful = first.as_ref().map_or(true, |first| self.doubts(first));
-        let plain = began.initial.filter(|_| doubtful);
+        let budget = &self.model.budget;
+        let plain = (began.initial).filter(|_| doubtful && !budget.is_used_up());
         let plain = plain.and_then(|initial| self.search(&initial, usize::MAX, progress).ok());
         let mut best = match (first, plain) {
             (Ok(first), Some(plain)) if !plain.is_preferred_to(&first) => first,
@@ -194,8 +204,7 @@ impl<'a> Minima<'_, 'a> {
             (first, None) => first?,
         };
         for _ in 0..MOST_SEARCHES {
-            let further = best
-                .beyond_window
+            let further = (best.beyond_window && !budget.is_used_up())
                 .then(|| self.again(&best, &best.theta, progress));
             let further = further.flatten();
             match further.filter(|again| again.is_preferred_to(&best)) {
@@ -205,6 +214,9 @@ impl<'a> Minima<'_, 'a> {
         }
         let mut others = Others::default();
         for _ in 0..MOST_SEARCHES {
+            if budget.is_used_up() {
+                break;
+            }
             others = match self.doubts(&best) {
                 true => self.elsewhere(&best),
                 false => self.images(&best),
@@ -232,6 +244,16 @@ impl<'a> Minima<'_, 'a> {
         }
         fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
+        if budget.is_used_up() {
+            fit.remarks.insert(
+                0,
+                format!(
+                    "the budget of {} evaluations was used up: this is the best that was found so far; allow more, \
+                     free fewer numbers, or begin nearer",
+                    budget.most()
+                ),
+            );
+        }
         fit.work.evaluations = began.evaluations + self.evaluations.get();
         Ok(fit)
     }

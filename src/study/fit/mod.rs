@@ -40,7 +40,7 @@ pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
 pub use free::{Free, FreeNumber, OffsetColumn};
 pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{
-    Fit, FitAlternative, FitCandidate, FitExperiment, FitLeaf, FitOutcome, FitParameter,
+    Fit, FitAlternative, FitBudget, FitCandidate, FitExperiment, FitLeaf, FitOutcome, FitParameter,
     FitResidual, FitStep, FitSystematic, FitWork,
 };
 
@@ -53,7 +53,7 @@ use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
 use free::Coordinate;
 use least_squares::{ASSUMED, Weighting};
 use minima::{Beginning, Minima};
-use model::Model;
+use model::{Budget, Model};
 use quantity::Quantity;
 
 /// Why nothing can be fitted.
@@ -93,7 +93,14 @@ pub struct FitRequest {
     pub tolerance: Option<f64>,
     /// Time limit.
     pub limit: Limit,
+    /// How often the leaves of all experiments are relaxed or followed at most; `None`:
+    /// [`MOST_EVALUATIONS`].
+    pub most_evaluations: Option<usize>,
 }
+
+/// How often the leaves of all experiments are relaxed or followed in a fit, unless it is said: some
+/// hundred are usual with many free numbers, and what takes more mostly has no minimum.
+pub const MOST_EVALUATIONS: usize = 1000;
 
 impl FitRequest {
     /// Reads candidate experiments from a table like that of experiments, whose columns may
@@ -129,12 +136,27 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         limit: request.limit.clone(),
         ..Options::default()
     };
-    let model = Model::new(base, &coordinates, &options, request.data.clone())?;
+    let most = request.most_evaluations.unwrap_or(MOST_EVALUATIONS);
+    let data = (request.data.clone(), Budget::new(most));
+    let model = Model::new(base, &coordinates, &options, data)?;
     let weighting = Weighting {
         assumed: ASSUMED * model.unit(),
         robust: request.robust,
     };
-    let began = Beginning::find(&model, weighting)?;
+    let mut told = |seconds: f64| {
+        let leaves = model.cases.len();
+        progress(&FitStep {
+            step: 0,
+            sum: f64::INFINITY,
+            known: None,
+            budget: Some(FitBudget {
+                evaluations: most,
+                leaves,
+                seconds: seconds * most as f64,
+            }),
+        });
+    };
+    let began = Beginning::find(&model, weighting, &mut told)?;
     let known = model.check_deviations(&began.point)?;
     model.check_weights(&began.point)?;
     let measured = began.point.components().filter(|component| !component.free);

@@ -1,6 +1,7 @@
 //! Predictions of a scenario's leaf for the data, and their derivatives with respect to the free
 //! numbers.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::DVector;
@@ -27,6 +28,29 @@ pub(super) const INSIGNIFICANT: f64 = 0.05;
 /// The largest tolerance of leaves from which a search starts.
 const LOOSEST: f64 = 1e-4;
 
+/// How often the leaves of all experiments may be relaxed or followed in a fit, and how often they were.
+pub(super) struct Budget {
+    most: usize,
+    spent: AtomicUsize,
+}
+
+impl Budget {
+    pub fn new(most: usize) -> Self {
+        let spent = AtomicUsize::new(0);
+        Budget { most, spent }
+    }
+
+    /// Whether it is used up. Asked where nothing is computed in parallel, so that a fit ends at the
+    /// same place on any number of threads.
+    pub fn is_used_up(&self) -> bool {
+        self.spent.load(Ordering::Relaxed) >= self.most
+    }
+
+    pub fn most(&self) -> usize {
+        self.most
+    }
+}
+
 /// Data common to all points of a fit.
 #[derive(Clone)]
 pub(super) struct Model<'a> {
@@ -40,6 +64,7 @@ pub(super) struct Model<'a> {
     pub linear: bool,
     /// The derivatives of scenarios with respect to the free numbers, if common to all.
     pub changes: Arc<OnceLock<Option<Vec<Change>>>>,
+    pub budget: Arc<Budget>,
 }
 
 /// The leaves of all experiments.
@@ -85,7 +110,7 @@ impl<'a> Model<'a> {
         base: &'a Base,
         coordinates: &'a [Coordinate],
         options: &Options,
-        data: Data,
+        (data, budget): (Data, Budget),
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
         let cases = experiments::cases(data)?;
@@ -153,6 +178,7 @@ impl<'a> Model<'a> {
             grids: Grids::AsNeeded,
             linear: is_linear(coordinates) && !base.scenario().depends_on_natural_leaf(),
             changes: Arc::default(),
+            budget: Arc::new(budget),
         })
     }
 
@@ -238,6 +264,7 @@ impl<'a> Model<'a> {
         theta: &[f64],
         of: impl Fn(usize) -> Result<CaseAt, E> + Sync + Send,
     ) -> Result<Point, E> {
+        self.budget.spent.fetch_add(1, Ordering::Relaxed);
         let cases = (0..self.cases.len()).into_par_iter().map(of);
         Ok(Point {
             theta: theta.to_vec(),

@@ -76,6 +76,9 @@ impl Profile<'_, '_, '_> {
         let mut lost = f64::INFINITY;
         let mut failures = 0;
         for _ in 0..PROFILE_STEPS {
+            if self.stats.model.budget.is_used_up() {
+                return Ok(Reach::Lost(inside.distance));
+            }
             let least = self.least(sign * reach, &inside, outside.as_ref(), progress);
             let Some(mut least) = least else {
                 failures += 1;

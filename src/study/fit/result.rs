@@ -129,6 +129,19 @@ pub struct FitStep {
     pub sum: f64,
     /// Once the minimum is found: the number of known intervals, and that of all numbers.
     pub known: Option<(usize, usize)>,
+    /// Before the first step: what the fit takes at most.
+    pub budget: Option<FitBudget>,
+}
+
+/// What a fit takes at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitBudget {
+    /// Number of times that the leaves of all experiments are relaxed or followed.
+    pub evaluations: usize,
+    /// Number of these leaves.
+    pub leaves: usize,
+    /// The time that this takes if each takes as long as the first, in seconds.
+    pub seconds: f64,
 }
 
 /// Work of a fit.

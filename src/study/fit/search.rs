@@ -92,7 +92,12 @@ impl<'m, 'a> Search<'m, 'a> {
             // The search on coarse grids; the last steps use all.
             let mut searching = |step, sum| {
                 let known = None;
-                progress(&FitStep { step, sum, known });
+                progress(&FitStep {
+                    step,
+                    sum,
+                    known,
+                    budget: None,
+                });
             };
             let mut search = Iteration::new(&coarse, weighting, &mut searching);
             search.most_steps = search.most_steps.min(self.most_steps);

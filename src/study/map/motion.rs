@@ -54,6 +54,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         let until = motion.time() + LOOK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
             let (Stopped::Unresolved { time, .. }
+            | Stopped::HalfTurn { time, .. }
             | Stopped::Diverged { time, .. }
             | Stopped::StepTooShort { time, .. }) = stopped;
             let at = format!("at t = {:.3e}", time * physics.time);
@@ -62,6 +63,10 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
                     let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
                     failed(MapOutcome::NotConverged, format!("{at} {bent}"))
                 }
+                Stopped::HalfTurn { half_turn, .. } => failed(
+                    MapOutcome::NotConverged,
+                    format!("{at} {}", half_turn.sentence()),
+                ),
                 _ => failed(MapOutcome::Diverged, format!("numerical instability {at}")),
             };
         }

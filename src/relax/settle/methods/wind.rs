@@ -26,6 +26,10 @@ const SLOWER: f64 = 0.1;
 /// is elsewhere.
 const NEAR: f64 = 10.0;
 
+/// Two balances no farther apart (lengths, radians) are one: a leaf that has come closer to it in
+/// between, however slowly, comes to rest there.
+const SAME: f64 = 1e-8;
+
 /// Newton iterations, their longest increment (radians, lengths), and their accuracy: forces are
 /// balanced to rounding, as nothing else shows that the leaf rests.
 const ITERATIONS: usize = 20;
@@ -63,6 +67,8 @@ fn move_to_rest(
     let mut motion = SemiImplicit::new(leaf.clone(), physics, &rest.state, steps);
     let (mut slow, mut until) = (SLOW, LOOK);
     let mut end = Err(Stop::StepLimit);
+    // Where forces are balanced, as found before, and how far from there the leaf was.
+    let mut before: Option<(State, f64)> = None;
     while until < LONGEST_MOTION && !rest.limit.reached() {
         if motion.step_towards(until).is_err() {
             end = Err(Stop::Stuck);
@@ -79,9 +85,17 @@ fn move_to_rest(
         rest.state = now.state;
         if speed < slow {
             let moving = rest.state.clone();
-            end = balance(leaf, system, air, rest);
-            if end.is_ok() && moving.distance(&rest.state) < NEAR * slow {
-                break;
+            let balanced = balance(leaf, system, air, rest);
+            if balanced.is_ok() {
+                let away = moving.distance(&rest.state);
+                let comes_closer = |(other, then): &(State, f64)| {
+                    away < *then && other.distance(&rest.state) < SAME
+                };
+                if away < NEAR * slow || before.as_ref().is_some_and(comes_closer) {
+                    end = balanced;
+                    break;
+                }
+                before = Some((rest.state.clone(), away));
             }
             rest.state = moving;
             slow *= SLOWER;

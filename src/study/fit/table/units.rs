@@ -1,10 +1,14 @@
 //! The row of units below a header.
 
+use super::decimals::is_number;
+
 /// Units that stand without brackets, in small letters: programs write them in either case.
-const UNITS: [&str; 44] = [
+const UNITS: [&str; 61] = [
     "n", "mn", "un", "µn", "μn", "kn", "m", "dm", "cm", "mm", "um", "µm", "μm", "nm", "in", "inch",
     "ft", "px", "pixel", "s", "sec", "ms", "min", "h", "hz", "khz", "rad", "deg", "°", "%", "g",
-    "mg", "kg", "gf", "kgf", "lbf", "pa", "kpa", "mpa", "gpa", "psi", "v", "mv", "j",
+    "mg", "kg", "gf", "kgf", "lbf", "pa", "kpa", "mpa", "gpa", "psi", "v", "mv", "j", "us", "µs",
+    "μs", "second", "seconds", "minute", "minutes", "lb", "oz", "dyn", "bar", "°c", "°f", "a",
+    "ma", "w", "count",
 ];
 
 fn is_unit(cell: &str) -> bool {
@@ -28,9 +32,10 @@ fn is_product(cell: &str) -> bool {
     })
 }
 
-/// Whether a row has units, and nothing else but dashes for what has none.
+/// Whether a row has units: no number, and a unit in at least half of what else it has besides dashes.
 pub fn are_units<'c>(cells: impl Iterator<Item = &'c str>) -> bool {
     let cells = cells.filter(|cell| !matches!(*cell, "" | "-"));
     let cells: Vec<&str> = cells.collect();
-    !cells.is_empty() && cells.into_iter().all(is_unit)
+    let units = cells.iter().filter(|cell| is_unit(cell)).count();
+    units > 0 && 2 * units >= cells.len() && !cells.into_iter().any(is_number)
 }

@@ -1,0 +1,50 @@
+//! A fit has a budget that is told before its first step, and ends with the best that was found so far.
+
+use leafdyn::study::{FitOutcome, fit};
+use leafdyn_testing::fit::{LEAF, THREE, pulls, request};
+use leafdyn_testing::random::Draw;
+use leafdyn_testing::*;
+
+/// Tips pulled to where no such leaf has them, so that there is much to search.
+fn hopeless() -> String {
+    let truth = "stiffness.bending_2=1.4; stiffness.bending_3=0.7; stiffness.axial=40";
+    let forces = [0.0, 2.0, 4.0, 6.0].map(|k: f64| [1.0 + k, 0.5 * (k - 4.0), 0.7 * k.cos()]);
+    pulls(LEAF, truth, &forces, 0.3, &mut Draw(5))
+}
+
+#[test]
+fn a_budget_is_told_and_kept() {
+    let mut asked = request(base(LEAF, ""), &[&hopeless()], &THREE);
+    let mut sums = Vec::new();
+    for most in [3, 6, 12] {
+        asked.most_evaluations = Some(most);
+        let mut first = None;
+        let found = fit(&asked, &mut |step| first = first.or(Some(step.budget))).unwrap();
+        let budget = first.flatten().unwrap();
+        assert_eq!((budget.evaluations, budget.leaves), (most, 4));
+        assert!(budget.seconds > 0.0);
+        let said = format!("the budget of {most} evaluations was used up");
+        assert!(found.remarks[0].starts_with(&said), "{:?}", found.remarks);
+        if most == 3 {
+            assert_eq!(found.outcome, FitOutcome::NotConverged);
+        }
+        sums.push(found.chi_squared);
+    }
+    // What is found with more is no worse.
+    assert!(sums.is_sorted_by(|a, b| b <= a), "{sums:?}");
+}
+
+/// It ends at the same place on any number of threads.
+#[test]
+fn a_budget_ends_at_the_same_place_on_all_threads() {
+    let mut asked = request(base(LEAF, ""), &[&hopeless()], &THREE);
+    asked.most_evaluations = Some(8);
+    let found = [1, 2].map(|threads| on_threads(threads, || fit(&asked, &mut |_| {}).unwrap()));
+    let values = found.map(|fit| {
+        fit.parameters
+            .iter()
+            .map(|it| it.value.to_bits())
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(values[0], values[1]);
+}

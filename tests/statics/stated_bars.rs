@@ -1,0 +1,306 @@
+//! Every stated bar covers the true error and is not much larger, on random leaves with tissue,
+//! grips, hinges, wind, held tips, dead moments and sections, each with any of the others.
+
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+use leafdyn::relax::Route;
+use leafdyn_testing::random::{Draw, list};
+use leafdyn_testing::*;
+
+/// What leaves have, each row of the table in the documents.
+const KINDS: [&str; 8] = [
+    "tissue",
+    "grips",
+    "hinges",
+    "wind",
+    "held tip",
+    "dead moments",
+    "section",
+    "none of these",
+];
+
+/// What is stated of them, each column.
+const QUANTITIES: [&str; 5] = ["positions", "reactions", "stresses", "energies", "eigenvalues"];
+
+/// Farther from the truth, in lengths, is another equilibrium.
+const ANOTHER: f64 = 0.05;
+
+/// A random leaf in cm and N, and which of [`KINDS`] it has.
+struct Drawn {
+    scenario: Scenario,
+    kinds: [bool; KINDS.len()],
+}
+
+fn draw(seed: usize) -> Drawn {
+    let mut random = Draw(0x5eed_0000 + seed as u64);
+    let rods = 1 + random.uniform(0.0, 4.0) as usize;
+    let single = rods == 1;
+    let joined = !single && random.chance(0.6);
+    let length = random.log(1.0, 40.0);
+    let wind = random.chance(0.25);
+    let holdable = joined || single;
+    let held = !wind && holdable && random.chance(0.3);
+    let grips = random.chance(0.3);
+    let hinges = random.chance(0.25);
+    let tissue = !single && random.chance(0.4);
+    let moments = single && !wind && random.chance(0.6);
+    let section = random.chance(0.5);
+    let none = !(wind || held || grips || hinges || tissue || moments || section);
+    let kinds = [tissue, grips, hinges, wind, held, moments, section, none];
+    let mut text = String::from("units = { length = \"cm\", force = \"N\" }\n");
+    let mut line = |it: String| writeln!(text, "{it}").unwrap();
+    let angles = random.list(rods, -0.5, 0.5);
+    let lengths: Vec<f64> = (0..rods).map(|_| length * random.uniform(0.9, 1.1)).collect();
+    let base_held = if hinges { "pinned" } else { "clamped" };
+    line(format!(
+        "leaf = {{ rods = {rods}, length = {}, fan = {}, joined = {joined}, base_held = \"{base_held}\", elevation = {:?} }}",
+        list(lengths.clone()), list(angles.clone()), random.uniform(-0.2, 0.2)
+    ));
+    // A stiffness A that is typical of the leaf.
+    let a = match section {
+        true => {
+            let [width, thickness] = [random.log(0.02, 0.05), random.log(0.008, 0.03)];
+            let young = random.log(1e4, 1e6);
+            let [width, thickness] = [width, thickness].map(|it| it * length);
+            line(format!(
+                "section = {{ shape = \"rectangle\", width = {width:?}, thickness = {thickness:?}, young = {young:?} }}"
+            ));
+            young * width * thickness.powi(3) / 12.0
+        }
+        false => {
+            let a = random.log(1e-2, 1e2);
+            let mut part = |low: f64, high: f64| a * random.log(low, high);
+            let [one, two, three] = [part(0.3, 2.0), part(0.5, 2.0), part(0.5, 4.0)];
+            let mut part = |low: f64, high: f64| match random.chance(0.2) && !(grips || held) {
+                true => "inf".to_owned(),
+                false => format!("{:?}", a / (length * length) * random.log(low, high)),
+            };
+            let [axial, shear] = [part(50.0, 1e5), part(30.0, 1e4)];
+            line(format!(
+                "stiffness = {{ torsion = {one:?}, bending_2 = {two:?}, bending_3 = {three:?}, axial = {axial}, shear_2 = {shear}, shear_3 = {shear} }}"
+            ));
+            a
+        }
+    };
+    let force = a / (length * length);
+    let bend = |random: &mut Draw| random.uniform(-1.5, 1.5) / length;
+    let bent = match random.chance(0.3) {
+        true => format!("{{ at = [0.0, {:?}, 1.0], value = {} }}", random.uniform(0.2, 0.8),
+            list((0..3).map(|_| bend(&mut random)).collect())),
+        false => format!("{:?}", bend(&mut random)),
+    };
+    line(format!(
+        "rest = {{ bend_2 = {bent}, bend_3 = {:?}, twist = {:?} }}",
+        bend(&mut random), bend(&mut random)
+    ));
+    if tissue {
+        let unit = force / length;
+        let part = |random: &mut Draw| unit * random.log(1.0, 300.0);
+        line(format!(
+            "tissue = {{ along = {:?}, across = {:?}, normal = {:?}, fold = {:?} }}",
+            part(&mut random), part(&mut random), part(&mut random), force * random.log(0.01, 1.0)
+        ));
+    }
+    if !single && random.chance(0.4) {
+        let unit = force / length;
+        line(format!("coupling = {{ y = {:?}, z = {:?} }}",
+            unit * random.uniform(0.0, 5.0), unit * random.uniform(0.0, 5.0)));
+    }
+    line(format!(
+        "load.gravity = {:?}\nload.tip_force = {:?}",
+        random.vector(3.0 * force / length, 1), random.vector(2.0 * force, 1)
+    ));
+    if moments {
+        if !held {
+            line(format!("load.tip_moment = {:?}", random.vector(1.5 * force * length, 1)));
+        }
+        if held || random.chance(0.5) {
+            line(format!("[[load.point]]\nvein = 1\nat = {:?}\nmoment = {:?}",
+                random.uniform(0.2, 0.9), random.vector(force * length, 1)));
+        }
+    }
+    if wind {
+        // The drag of wind across the leaf, in units of A/L^3.
+        let drag = random.log(0.3, 8.0) * force / length;
+        line(format!("[wind]\nvelocity = {:?}\ndensity = {drag:?}\ndrag = 2.0\nwidth = 1.0",
+            random.vector(1.0, 0)));
+    }
+    if held {
+        // Where the tip can be: nearer to the base than the shortest vein is long.
+        let most = lengths.iter().fold(f64::INFINITY, |m, it| m.min(*it));
+        let how = if random.chance(0.5) { "pinned" } else { "clamped" };
+        let at = [random.uniform(0.75, 0.95), random.uniform(-0.1, 0.1), random.uniform(-0.2, 0.2)];
+        line(format!("[tip]\nheld = \"{how}\"\nposition = {:?}", at.map(|it| it * most)));
+    }
+    if grips {
+        for at in [0.45, 0.8].into_iter().take(1 + usize::from(random.chance(0.4))) {
+            let vein = 1 + (random.even() * rods as f64) as usize;
+            let how = if random.chance(0.7) { "pinned" } else { "clamped" };
+            let moved = [random.uniform(-0.05, 0.01), random.uniform(-0.08, 0.08), random.uniform(-0.08, 0.08)];
+            line(format!("[[grip]]\nvein = {vein}\nat = {:?}\nheld = \"{how}\"\nmove = {:?}",
+                at + random.uniform(-0.1, 0.1), moved.map(|it| it * length)));
+        }
+    }
+    Drawn { scenario: parse(&text), kinds }
+}
+
+/// What a leaf at rest states: its values, and the bar of each group of them.
+struct Stated {
+    values: Vec<f64>,
+    bar: f64,
+}
+
+/// Each of [`QUANTITIES`] that a leaf states, at the stations of `other`.
+fn stated(leaf: &Equilibrium, other: &Equilibrium) -> [Vec<Stated>; QUANTITIES.len()] {
+    let one = |values: Vec<f64>, bar: Option<f64>| bar.map(|bar| Stated { values, bar });
+    let vector = |it: DVec3, bar| one(it.to_array().to_vec(), bar);
+    let tip = leaf.reaction.iter().flat_map(|it| {
+        let moments = it.moments.iter().flatten().map(|m| vector(*m, it.moments_error));
+        std::iter::once(vector(it.force, it.error)).chain(moments).flatten().collect::<Vec<_>>()
+    });
+    let grips = leaf.grip_reactions.iter().flat_map(|it| {
+        let moment = it.moment.and_then(|m| vector(m, it.moment_error));
+        vector(it.force, it.error).into_iter().chain(moment).collect::<Vec<_>>()
+    });
+    let length = leaf.shape.longest();
+    let energy = leaf.energy.and_then(|energy| {
+        let expected = estimate(leaf) / length * energy.abs();
+        one(vec![energy], Some(leaf.accuracy.energy_error.unwrap_or(expected)))
+    });
+    let modes = leaf.stability.modes.iter().flatten();
+    let modes = modes.filter_map(|mode| one(vec![mode.eigenvalue], mode.error));
+    // Where the other states its largest stress.
+    let stress = (leaf.stress.as_ref()).zip(other.stress.as_ref()).and_then(|(own, there)| {
+        let at = leaf.shape.stations.iter().position(|at| (at - there.sigma).abs() < 1e-12)?;
+        one(vec![own.rods[there.vein - 1][at].equivalent], own.error)
+    });
+    [
+        Vec::new(),
+        tip.chain(grips).collect(),
+        stress.into_iter().collect(),
+        energy.into_iter().collect(),
+        modes.collect(),
+    ]
+}
+
+/// Bars over true errors of a quantity.
+#[derive(Default)]
+struct Ratios {
+    judged: usize,
+    all: Vec<f64>,
+}
+
+impl Ratios {
+    fn quantile(&self, part: f64) -> f64 {
+        match self.all.len() {
+            0 => f64::NAN,
+            count => self.all[(part * (count - 1) as f64) as usize],
+        }
+    }
+}
+
+#[derive(Default)]
+struct Table {
+    rows: [[Ratios; QUANTITIES.len()]; KINDS.len() + 1],
+    wrong: Vec<String>,
+    resting: usize,
+    others: usize,
+}
+
+impl Table {
+    fn judge(&mut self, seed: usize) {
+        let Drawn { scenario, kinds } = draw(seed);
+        let limit = Duration::from_secs(3);
+        let rest = |tolerance: f64, modes: usize| {
+            let mut options = with_modes(modes, to(tolerance));
+            options.limit = Limit::at(Instant::now() + limit);
+            if scenario.wind.is_some() {
+                options.route = Route::Release;
+            }
+            let found = relaxed(&scenario, &options);
+            found.outcome.is_success().then_some(found)
+        };
+        let Some(truth) = rest(1e-11, 3).or_else(|| rest(1e-10, 3)) else {
+            return;
+        };
+        self.resting += 1;
+        for (tolerance, modes) in [(1e-4, 0), (1e-4, 3), (1e-6, 0), (1e-6, 3)] {
+            let Some(leaf) = rest(tolerance, modes) else {
+                continue;
+            };
+            let error = distance(&leaf, &truth);
+            if error > ANOTHER * leaf.shape.longest() || leaf.stability.negative_eigenvalues != truth.stability.negative_eigenvalues {
+                self.others += 1;
+                continue;
+            }
+            let mut compare = |quantity: usize, error: f64, [bar, uncertain]: [f64; 2]| {
+                let what = || {
+                    let kinds = KINDS.iter().zip(kinds).filter(|(_, has)| *has).map(|(kind, _)| *kind);
+                    let kinds = kinds.collect::<Vec<_>>().join(", ");
+                    let grids = &leaf.accuracy.segments;
+                    format!("{seed} at {tolerance:e}, {modes} modes, {} rods ({kinds}): {} off by {error:.2e}, bar {bar:.2e} ({:.2}), truth within {uncertain:.1e}, {grids:?}",
+                        leaf.rod_count, QUANTITIES[quantity], bar / error)
+                };
+                if !(error <= bar + uncertain) {
+                    self.wrong.push(what());
+                }
+                let rows = kinds.iter().copied().chain([true]).zip(&mut self.rows);
+                for (_, row) in rows.filter(|(has, _)| *has) {
+                    row[quantity].judged += 1;
+                    if error > 10.0 * uncertain {
+                        row[quantity].all.push(bar / error);
+                    }
+                }
+            };
+            compare(0, error, [estimate(&leaf), estimate(&truth)]);
+            let both = [stated(&leaf, &leaf), stated(&truth, &leaf)];
+            let [own, exact] = both;
+            for (quantity, (own, exact)) in own.iter().zip(&exact).enumerate() {
+                for (own, exact) in own.iter().zip(exact) {
+                    let squares = own.values.iter().zip(&exact.values).map(|(a, b)| (a - b).powi(2));
+                    compare(quantity, squares.sum::<f64>().sqrt(), [own.bar, exact.bar]);
+                }
+            }
+        }
+    }
+
+    /// The table as the documents have it: of each kind and quantity how many bars, the least bar
+    /// over true error, and the median.
+    fn rows(&mut self) -> String {
+        let mut text = String::new();
+        let names = KINDS.iter().copied().chain(["all"]);
+        for (name, row) in names.zip(&mut self.rows) {
+            let cells = row.iter_mut().map(|ratios| {
+                ratios.all.sort_by(f64::total_cmp);
+                match ratios.all.is_empty() {
+                    true => "-".to_owned(),
+                    false => format!("{}: {:.1}, {:.0}", ratios.judged, ratios.quantile(0.0), ratios.quantile(0.5)),
+                }
+            });
+            let cells: Vec<String> = cells.collect();
+            writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
+        }
+        text
+    }
+}
+
+/// Leaves of which some bar was too small: in wind on hinges, which came to rest too slowly to be seen
+/// at rest; under dead moments, where the energy is not stationary; in grips, whose reactions converge
+/// as chance has it.
+const KNOWN: [usize; 4] = [231, 261, 394, 730];
+
+/// As many leaves as `LEAFDYN_BARS` says.
+#[test]
+fn bars_of_random_leaves_of_all_kinds_hold() {
+    let mut table = Table::default();
+    let count = asked("LEAFDYN_BARS", 6);
+    let first = asked("LEAFDYN_BARS_FROM", 0);
+    let others = KNOWN.into_iter().filter(|known| !(first..first + count).contains(known));
+    (first..first + count).chain(others).for_each(|seed| table.judge(seed));
+    println!("{}", table.rows());
+    println!("{} rest, {} in others", table.resting, table.others);
+    let wrong = table.wrong.join("\n");
+    assert!(wrong.is_empty(), "{wrong}");
+    assert!(4 * table.resting > 3 * count && table.others <= table.resting / 10);
+}
