@@ -128,7 +128,7 @@ fn a_rod_pushed_together_between_clamps_is_the_elastica() {
 #[test]
 fn the_travel_of_a_grip_is_followed() {
     let arch = "stiffness.bending_2=10.0; stiffness.torsion=10.0; stiffness.axial=1e4; \
-         leaf.fan=[0.3]; tip.position=[0.9, 0, 0]; tip.angles=-0.3; load.gravity=[0, -1, 0]";
+         leaf.fan=[0.3]; tip.position=[0.9, 0, 0]; tip.angles=-0.3; load.gravity=[0, 1, 0]";
     for travel in [
         "tip.position[0]=0.9..0.3",
         "tip.position[1]=0..0.3",
