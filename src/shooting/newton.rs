@@ -59,9 +59,12 @@ const NEARLY_SINGULAR: f64 = 1e-7;
 /// of perturbations that grow: no part of a step and no other linearisation reduces them.
 const ROUNDED: f64 = 1e-5;
 
-/// Cost of linearisations, in rods times steps of the integration, beyond which Newton's method from a
-/// leaf at rest has to converge as it does near a solution: about two seconds on one core.
-const MOST_LINEARIZED: usize = 60_000;
+/// Cost of linearisations, in rods times steps of the integration, beyond which Newton's method that
+/// may give up has to converge as it does near a solution: some seconds.
+const MOST_LINEARIZED: usize = 300_000;
+
+/// Parts of steps of a fresh linearisation below which it gives up: a leaf at rest is near.
+const LEAST_PART: f64 = 0.125;
 
 /// The cost of the tissue of a gap in that of a rod.
 const TISSUE: usize = 20;
@@ -96,8 +99,8 @@ pub struct Newton<'e, 'a, 'p> {
     pub nodes: Nodes,
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
-    /// Whether the start is a leaf at rest.
-    pub from_leaf: bool,
+    /// Whether it gives up where it does not converge as it does near a solution.
+    pub gives_up: bool,
     /// Steps of the last integration, over all intervals.
     steps: usize,
     /// Cost of all linearisations.
@@ -149,7 +152,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             units: Units::new(equations, near),
             nodes,
             only_near: false,
-            from_leaf: false,
+            gives_up: false,
             steps: 0,
             linearized: 0,
             moved: (equations.turnings().iter())
@@ -212,7 +215,8 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                         break (trial, next, 0.0);
                     }
                 }
-                if self.costs_too_much() || self.from_leaf && fresh && size <= ROUNDED {
+                let far = || size <= ROUNDED || 0.5 * factor < LEAST_PART;
+                if self.costs_too_much() || self.gives_up && fresh && far() {
                     break 'iterations;
                 }
                 if !fresh {
@@ -257,9 +261,9 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         Err(no_progress(size))
     }
 
-    /// Whether another linearisation from a leaf at rest would cost too much.
+    /// Whether another linearisation would cost too much for what may give up.
     fn costs_too_much(&self) -> bool {
-        self.from_leaf && self.linearized + self.cost() > MOST_LINEARIZED
+        self.gives_up && self.linearized + self.cost() > MOST_LINEARIZED
     }
 
     /// The cost of a linearisation along the last integration.

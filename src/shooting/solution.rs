@@ -100,6 +100,9 @@ pub struct Options<'s> {
     pub intervals: Option<usize>,
     /// Time limit of Newton's method.
     pub limit: Limit,
+    /// Whether it gives up where Newton's method does not converge as it does near a solution: for a
+    /// start that is one.
+    pub gives_up: bool,
 }
 
 impl<'s> Options<'s> {
@@ -111,6 +114,7 @@ impl<'s> Options<'s> {
             precision,
             intervals: None,
             limit: Limit::default(),
+            gives_up: false,
         }
     }
 }

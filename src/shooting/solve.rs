@@ -136,19 +136,17 @@ fn solve_once(
     };
     let end = match found {
         Err(end) => end,
-        Ok(near) => {
-            match solve_near(&equations, (&near, from_leaf), tolerance, options, &mut log) {
-                Ok(solution) => {
-                    let work = log.work;
-                    return Ok(Solution { work, ..solution });
-                }
-                Err(reason) => Interrupted {
-                    reason,
-                    part: 1.0,
-                    near,
-                },
+        Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut log) {
+            Ok(solution) => {
+                let work = log.work;
+                return Ok(Solution { work, ..solution });
             }
-        }
+            Err(reason) => Interrupted {
+                reason,
+                part: 1.0,
+                near,
+            },
+        },
     };
     let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
     let near = Trajectory::new(&equations, options.stations.to_vec(), states.collect());
@@ -162,7 +160,7 @@ fn solve_once(
 
 fn solve_near(
     equations: &Equations,
-    (near, from_leaf): (&Trajectory, bool),
+    near: &Trajectory,
     tolerance: f64,
     options: &Options,
     log: &mut Log,
@@ -170,7 +168,7 @@ fn solve_near(
     let stations = options.stations;
     let mut newton = Newton::from_trajectory(equations, near, options.intervals, log)?;
     // Over intervals that are given perturbations may grow too much for another reason.
-    newton.from_leaf = from_leaf && options.intervals.is_none();
+    newton.gives_up = options.gives_up && options.intervals.is_none();
     let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
         newton.solve(tolerance)?;
         let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);

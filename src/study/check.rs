@@ -298,6 +298,7 @@ fn shoot(
     let options = shooting::Options {
         intervals: asked.intervals,
         limit: asked.limit.clone(),
+        gives_up: true,
         ..shooting::Options::new(start, &stations, precision)
     };
     let (found, wall_seconds) = timed(|| {

@@ -351,6 +351,32 @@ fn their_errors_are_bounds() {
     }
 }
 
+/// How a mass on a point slows a leaf, over all grids, against relaxations with other masses: where it
+/// hangs from the vein as well as where it has inertia alone.
+#[test]
+fn frequencies_change_with_a_mass_on_a_point() {
+    let vibrating = "; dynamics.density=1.0; load.tip_force=[0.1, 0.2, -0.3]";
+    for (g, at) in [("[0.0, 0.0, 0.0]", 1.0), ("[0.0, 0.1, -0.5]", 0.7)] {
+        let text = format!("{ROD}\n[[load.point]]\nvein = 1\nat = {at:?}\nmass = 0.3\n");
+        let stiffness = set_stiffness(1e3, 1e3);
+        let entries = format!("{stiffness}; stiffness.bending_3=1.5{vibrating}; load.g={g}");
+        let base = base(&text, &entries);
+        let options = with_modes(2, leafdyn_testing::to(1e-9));
+        let mass = "load.point[0].mass";
+        let (leaf, found) = derivatives(&base, &[mass], &options);
+        let theirs = differenced(&base, &keys(&[mass])[0], &options);
+        let count = results(&leaf).1;
+        let frequencies = found[0].frequencies.iter().flatten();
+        let mut compared = 0;
+        for (ours, (theirs, _)) in frequencies.zip(&theirs[count + 1..]) {
+            let what = format!("mass at {at}: {ours} for {theirs}");
+            assert!((ours - theirs).abs() < 1e-5 * theirs.abs(), "{what}");
+            compared += 1;
+        }
+        assert_eq!(compared, 2);
+    }
+}
+
 /// A round rod vibrates alike in all directions. Other bending in one of them splits
 /// the lowest eigenvalue, which has no derivative then; weight along the rod does not.
 #[test]

@@ -25,7 +25,7 @@ pub mod vtk;
 
 use crate::figure::Figure;
 use crate::figure::drawing::{Drawing, color_of_vein};
-use crate::figure::marks::{hold_marks, load_marks};
+use crate::figure::marks::{LoadMark, hold_marks, load_marks};
 use crate::figure::setting::Setting;
 use crate::figure::svg::{self, hex};
 use crate::figure::veins::is_drawn;
@@ -114,7 +114,7 @@ pub fn view<R: Viewed>(result: &R, scenario: &Scenario) -> View {
     view.summary = result.summary(&scenario.units);
     result.fill(&mut view, &scenario.units);
     for leaf in &mut view.leaves {
-        let loads = leaf.time.map(|time| load_marks(scenario, Some(time)));
+        let loads = leaf.time.map(|time| drawn_loads(scenario, Some(time)));
         leaf.loads = loads.filter(|loads| *loads != view.loads);
     }
     view
@@ -140,8 +140,10 @@ pub fn bare(scenario: &Scenario) -> View {
         ]
         .map(Clone::clone),
         directions: Setting::of(scenario).arrows(true, 0.0),
-        loads: load_marks(scenario, None),
-        holds: hold_marks(scenario),
+        loads: drawn_loads(scenario, None),
+        holds: (hold_marks(scenario).into_iter())
+            .filter(|mark| is_drawn(mark.vein - 1, count))
+            .collect(),
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
         joined: scenario.joined,
@@ -152,6 +154,14 @@ pub fn bare(scenario: &Scenario) -> View {
         modes: Vec::new(),
         chart: None,
     }
+}
+
+/// The loads on the veins that are drawn.
+fn drawn_loads(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
+    let count = scenario.rods.len();
+    let mut loads = load_marks(scenario, time);
+    loads.retain(|mark| is_drawn(mark.vein - 1, count));
+    loads
 }
 
 /// A leaf in motion, as centerlines with nodes at these stations, for the page of its scenario.

@@ -62,8 +62,8 @@ pub struct Fit {
     candidates: Option<PathBuf>,
 }
 
-/// Fits that may take less than so many seconds are not announced.
-const SHORT: f64 = 30.0;
+/// Fits that may take less than so many seconds are announced in the line of progress alone.
+const SHORT: f64 = 300.0;
 
 /// Says what a fit takes at most, if that may be long.
 fn announce(name: &str, budget: FitBudget) {
@@ -128,7 +128,7 @@ impl Fit {
             most_evaluations: self.most_evaluations,
         };
         let mut line = job.progress();
-        let mut profiling = false;
+        let (mut profiling, mut most) = (false, String::new());
         let fit = study::fit(&request, &mut |now| {
             let FitStep {
                 step,
@@ -138,6 +138,7 @@ impl Fit {
             } = *now;
             if let Some(budget) = budget {
                 announce(&job.scenario.name, budget);
+                most = format!(" (at most {} in all)", duration(budget.seconds));
                 return;
             }
             if known.is_some() && !std::mem::replace(&mut profiling, true) {
@@ -148,7 +149,7 @@ impl Fit {
                 format!("{known} of {all} intervals, ")
             });
             line.update(fraction, || {
-                format!("{intervals}step {step}, sum of squares {sum:.6e}")
+                format!("{intervals}step {step}, sum of squares {sum:.6e}{most}")
             });
         })?;
         drop(line);

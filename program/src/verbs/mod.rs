@@ -291,12 +291,6 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Where no process is stopped by signals.
-#[cfg(not(any(unix, windows)))]
-fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
-    Ok(())
-}
-
 /// Whether whoever started the process made it survive the end of its terminal, as `nohup` does; where
 /// that cannot be told, a hangup ends the process as if it were not handled.
 #[cfg(unix)]

@@ -424,7 +424,8 @@ impl<'s> Generator<'s> {
             leaf.as_object_mut().unwrap().remove("stiffness");
         }
         match repeated.first() {
-            Some((within, of)) if self.draw.chance(0.7) => {
+            // What was replaced already is text.
+            Some((within, of)) if self.draw.chance(0.7) && !leaf[name].is_string() => {
                 let text = self.value(of, None);
                 leaf[name][*within] = format!("{RAW}{text}").into();
             }

@@ -16,9 +16,7 @@
 use crate::largest::larger;
 use crate::leaf::{DiscreteLeaf, Factorised, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::accuracy::jump_response::{
-    Change, Tangents, apply, largest_rotation_and_stress,
-};
+use crate::relax::accuracy::jump_response::{Change, Tangents, apply, largest_rotation_and_stress};
 use crate::relax::accuracy::nodal_fields::nodes;
 use crate::relax::accuracy::steps::Steps;
 use crate::relax::transfer::level::Level;
@@ -156,8 +154,7 @@ pub fn estimate(
         }
         let changes = tangents.changes(&response, &integrated.jumps);
         if corrections == 0 {
-            let estimate =
-                integrated.estimate((first, finest), &known, &changes, response.largest);
+            let estimate = integrated.estimate((first, finest), &known, &changes, response.largest);
             if largest <= enough || out_of_reach {
                 return Some(estimate);
             }
@@ -166,7 +163,10 @@ pub fn estimate(
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
                 let errors = response.largest.map(|error| error + steps.error);
-                let mut forces = known.iter().flatten().map(|it| it.n.length() + it.m.length());
+                let mut forces = known
+                    .iter()
+                    .flatten()
+                    .map(|it| it.n.length() + it.m.length());
                 let largest = forces.by_ref().fold(0.0, larger);
                 return Some(Estimate {
                     corrections,

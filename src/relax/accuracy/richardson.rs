@@ -26,8 +26,9 @@ const SLOPE: f64 = 30.0;
 const SAFETY: (f64, f64) = (1.3, 10.0);
 
 /// Safety factor on the corrections of few numbers, and the part of each that those after it
-/// must reach: on the worst of some thousand series of reactions the first was 0.8.
-const FEW: (f64, f64) = (3.0, 1.0 / 64.0);
+/// must reach: of 1,800 forces, moments and energies of random leaves the largest error was 4.6 times
+/// the largest of the corrections so weighted.
+const FEW: (f64, f64) = (5.0, 1.0 / 32.0);
 
 /// The selected column of a table, and its error estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,6 +28,10 @@ pub const FINEST: usize = 16_384;
 /// Changes of the energy below this part of it, or of the leaf's bending energy, are rounding.
 const ENERGY_NOISE: f64 = 1e-11;
 
+/// Largest number of grids over which the energy is extrapolated: errors on those before, which the
+/// finest have no more, need not be small.
+const ENERGY_GRIDS: usize = 4;
+
 /// A leaf at rest on nested grids.
 pub struct NestedEquilibrium {
     /// The leaf on each grid, from coarse to fine. Where it failed the last is that of the failure.
@@ -334,7 +338,8 @@ impl NestedEquilibrium {
         if let Some(estimate) = &self.estimate {
             return (estimate.energy, Some(self.energy_error(estimate)));
         }
-        let (table, columns) = (energies(&self.levels), self.table.columns());
+        let finest = &self.levels[self.levels.len().saturating_sub(ENERGY_GRIDS)..];
+        let (table, columns) = (energies(finest), self.table.columns());
         let Some(best) = table.error_of_few() else {
             return (table.column(columns)[0], None);
         };

@@ -124,7 +124,10 @@ impl Stresses {
         found: &NestedEquilibrium,
     ) -> Self {
         let scale = found.levels[0].leaf.leaf.scale;
-        if let Some(errors) = found.field_errors().filter(|_| found.integrated().is_some()) {
+        if let Some(errors) = found
+            .field_errors()
+            .filter(|_| found.integrated().is_some())
+        {
             return self.integrated((scenario, stations), errors, scale);
         }
         let sigma = found.levels[0].leaf.grid.sigma();

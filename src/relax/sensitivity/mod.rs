@@ -67,7 +67,7 @@ pub(crate) fn sensitivities(
         .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
         .collect();
     let mut found: Vec<[Series; 6]> = rates.iter().map(|_| Default::default()).collect();
-    let mut eigenvalues: Vec<f64> = Vec::new();
+    let mut eigenvalues = Series::default();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
         let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
@@ -80,10 +80,9 @@ pub(crate) fn sensitivities(
         let Some((squared, changes)) = grid.changes(&known, &rates) else {
             return Vec::new();
         };
-        if !squared.is_empty() {
-            eigenvalues = squared;
-        }
         let segments = level.leaf.segments();
+        let squared = squared.into_iter().map(|value| DVec3::X * value);
+        eigenvalues.push(segments, squared.collect());
         for (series, changes) in found.iter_mut().zip(changes) {
             for (series, values) in series.iter_mut().zip(changes) {
                 series.push(segments, values);
@@ -91,6 +90,7 @@ pub(crate) fn sensitivities(
         }
     }
     let stations = coarsest.leaf.grid.sigma();
+    let (eigenvalues, _) = eigenvalues.extrapolated(tolerance);
     (known.iter().zip(found))
         .map(|((key, number, ..), series)| {
             let all = series.map(|series| series.extrapolated(tolerance));
@@ -105,7 +105,7 @@ fn sensitivity(
     (key, value): (&str, f64),
     (leaf, stations): (&Leaf, &[f64]),
     [tips, energy, eigenvalues, reaction, positions, grips]: [(Vec<DVec3>, Option<f64>); 6],
-    squared: &[f64],
+    squared: &[DVec3],
 ) -> Sensitivity {
     let scale = leaf.scale;
     let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
@@ -114,9 +114,9 @@ fn sensitivity(
     let lowest = eigenvalues.0.first().map(|value| value.x);
     let lowest = lowest.filter(|it| it.is_finite());
     // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
-    let frequency = |(change, squared): (&DVec3, &f64)| {
-        let known = *squared > 0.0 && change.x.is_finite();
-        known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
+    let frequency = |(change, squared): (&DVec3, &DVec3)| {
+        let known = squared.x > 0.0 && change.x.is_finite();
+        known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.x.sqrt()))
     };
     let places = positions.0.chunks(stations.len());
     let held = reaction.0.split_first().map(|(force, moments)| Reaction {

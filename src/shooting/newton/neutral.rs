@@ -1,6 +1,6 @@
 //! Directions in which the equations are nearly singular, and why there is no convergence.
 
-use super::{LARGEST_GROWTH, NEARLY_SINGULAR, NUDGE, Newton, ROUNDED, STATIONS, size_of};
+use super::{LARGEST_GROWTH, NEARLY_SINGULAR, NUDGE, Newton, STATIONS, size_of};
 use crate::largest::largest;
 use crate::shooting::solution::{Neutral, Reason};
 use crate::shooting::trajectory::{Nodes, Trajectory};
@@ -27,12 +27,10 @@ impl Newton<'_, '_, '_> {
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),
-            None if self.costs_too_much() || self.from_leaf && correction <= ROUNDED => {
-                Reason::Rounding {
-                    correction,
-                    growth: self.growth.iter().map(|growth| growth.log10()).sum(),
-                }
-            }
+            None if self.gives_up => Reason::Rounding {
+                correction,
+                growth: self.growth.iter().map(|growth| growth.log10()).sum(),
+            },
             None => {
                 let growths = self.growth.iter().map(|growth| growth.log10());
                 let growth = largest(growths);

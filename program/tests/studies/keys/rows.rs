@@ -78,7 +78,8 @@ pub fn rows(key: Key) -> Vec<Row> {
         ),
         Key::BladeThickness => smooth("blade", "blade.thickness=0.0305"),
         Key::BladeYoung => smooth("blade", "blade.young=5.1e4"),
-        Key::YoungAcross => always("blade", "blade.young_across=5e4"),
+        // Less is within the bar of the coarse grid.
+        Key::YoungAcross => always("blade", "blade.young_across=4e5"),
         Key::ShearModulus => always("blade", "blade.shear_modulus=1.5e4"),
         Key::BladePoisson => smooth("blade", "blade.poisson=0.32"),
         Key::BladeMassDensity => smooth("blade", "blade.mass_density=8.2e-6"),
