@@ -99,7 +99,7 @@ fn stay_below_and_leave_above(
         let mut options = on(64);
         options.every_node = true;
         let alone = relaxed(&scenario, &options);
-        if alone.tips[0].distance(rest.tips[0]) > 1e-2 {
+        if alone.tips[0].distance(rest.tips[0]) > 2e-3 {
             continue;
         }
         let grid = Grid::new(alone.shape.stations.len() - 1, leaf.kinks());

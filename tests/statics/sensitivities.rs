@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use leafdyn::relax::{GripReaction, Mode, Path, Reaction, Sensitivity, relax_from};
+use leafdyn::relax::{GripReaction, Mode, Path, Reaction, Sensitivity};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -247,21 +247,17 @@ pub fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
 }
 
 /// The same derivatives from eight relaxations, and how far those of four are off: much
-/// where modes come close to each other.
+/// where modes come close to each other. Empty if one of them comes to rest by another path.
 pub fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
     let value = base.value(key).unwrap();
     let size = if value == 0.0 { 1.0 } else { value.abs() };
-    let here = leafdyn_testing::relaxed(base.scenario(), options);
-    // On the way to its holders another leaf may snap: it is one with this equilibrium that counts.
-    let held = matches!(here.path, Some(Path::Held { .. }));
-    let from = (here.shape.stations.as_slice(), here.shape.rods.as_slice());
+    let word = |leaf: &Equilibrium| leaf.path.as_ref().map(Path::word);
+    let here = word(&leafdyn_testing::relaxed(base.scenario(), options));
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
         let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
-        let there = match held {
-            true => relax_from(&scenario, from, options, &mut |_| {}).unwrap(),
-            false => leafdyn_testing::relaxed(&scenario, options),
-        };
-        Some(results(&there).0)
+        let there = leafdyn_testing::relaxed(&scenario, options);
+        let same = word(&there) == here;
+        Some(if same { results(&there).0 } else { Vec::new() })
     };
     let central = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].as_slice();
     let forward = [-25.0, 48.0, -36.0, 16.0, -3.0];
@@ -270,6 +266,9 @@ pub fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)
         let mut sums: Vec<f64> = Vec::new();
         for (steps, weight) in rule {
             let values = at(*steps, step)?;
+            if values.is_empty() {
+                return Some(values);
+            }
             sums.resize(values.len(), 0.0);
             let terms = sums.iter_mut().zip(values);
             terms.for_each(|(sum, value)| *sum += weight * value / (12.0 * step));
@@ -304,6 +303,7 @@ pub fn of(found: &Sensitivity) -> Vec<f64> {
 /// Every key, on one grid, which leaves no doubt about what is differenced.
 #[test]
 fn they_are_those_of_whole_relaxations() {
+    let mut elsewhere = Vec::new();
     for number in 0..asked("LEAFDYN_LEAVES", LEAVES) {
         let (text, wanted) = random(number);
         let base = base(&text, "");
@@ -315,6 +315,10 @@ fn they_are_those_of_whole_relaxations() {
             let size = if value == 0.0 { 1.0 } else { value };
             let (ours, mut theirs) = (of(found), differenced(&base, key, &options));
             let (units, count) = results(&leaf);
+            if theirs.is_empty() {
+                elsewhere.push(number);
+                continue;
+            }
             if key.to_string().starts_with("load.tip_moment") {
                 // With a moment there are no modes.
                 theirs.truncate(count);
@@ -332,6 +336,9 @@ fn they_are_those_of_whole_relaxations() {
             }
         }
     }
+    // The way of one leaf to its holders nearly snaps.
+    elsewhere.dedup();
+    assert!(elsewhere.len() <= 2, "{elsewhere:?}");
 }
 
 /// Over several grids they are as accurate as they say, by one solution for each

@@ -75,7 +75,7 @@ docs/undulation.md: | Fig. 10, N = 5 | {} |
 docs/methods.md: instead of rising to [{}]
 docs/undulation.md: folded up: z = {}, 1 wave
 
-docs/methods.md: snaps at 16 % of joining; {}, 0.302
+docs/methods.md: Fig. 8, 21 veins | stable throughout; {}, 0.302
 docs/undulation.md: 1 wave 0.046 high | z = {}, no waves
 
 docs/methods.md: snaps four times; {}, 0.358
