@@ -256,7 +256,7 @@ pub fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
         let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
         let there = leafdyn_testing::relaxed(&scenario, options);
-        let same = word(&there) == here;
+        let same = here.is_none() || [here, None].contains(&word(&there));
         Some(if same { results(&there).0 } else { Vec::new() })
     };
     let central = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].as_slice();
@@ -336,7 +336,7 @@ fn they_are_those_of_whole_relaxations() {
             }
         }
     }
-    // The way of one leaf to its holders nearly snaps.
+    // The ways of two leaves to their holders nearly snap.
     elsewhere.dedup();
     assert!(elsewhere.len() <= 2, "{elsewhere:?}");
 }

@@ -328,7 +328,7 @@ impl Table {
                         bar / error
                     )
                 };
-                if !(error <= bar + uncertain) {
+                if error.is_nan() || error > bar + uncertain {
                     self.wrong.push(what());
                 }
                 let rows = kinds.iter().copied().chain([true]).zip(&mut self.rows);

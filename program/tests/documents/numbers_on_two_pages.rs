@@ -78,7 +78,7 @@ docs/undulation.md: folded up: z = {}, 1 wave
 docs/methods.md: Fig. 8, 21 veins | stable throughout; {}, 0.302
 docs/undulation.md: 1 wave 0.046 high | z = {}, no waves
 
-docs/methods.md: snaps four times; {}, 0.358
+docs/methods.md: Fig. 9, 21 veins | stable throughout; {}, 0.358
 docs/undulation.md: 1 wave 0.044 high | z = {}, no waves
 
 docs/methods.md: stable throughout; {}, 5.778
