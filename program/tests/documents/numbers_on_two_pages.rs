@@ -85,7 +85,7 @@ docs/methods.md: stable throughout; {}, 5.778
 docs/undulation.md: droops: z = -0.231, 1 wave 0.007 high | z = {}, 1 wave
 
 docs/methods.md: loads first {} of them are stable
-docs/tried.md: loads first, then tips along arcs | {} |
+docs/tried.md: as they are loaded now, {} are stable
 
 docs/how-to-read.md: [one of {}](tried.md
 docs/tried.md: softest vein | {} | 1:
