@@ -94,7 +94,7 @@ pub struct FitRequest {
     /// Time limit.
     pub limit: Limit,
     /// How often the leaves of all experiments are relaxed or followed at most; `None`:
-    /// [`MOST_EVALUATIONS`].
+    /// 1000.
     pub most_evaluations: Option<usize>,
 }
 
