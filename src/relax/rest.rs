@@ -6,6 +6,7 @@ use crate::leaf::{Grid, Leaf};
 use crate::relax::grids::{follow, solve};
 use crate::relax::loading::arrival::{arrive, guess, load_slowly, takes_loads_stably};
 use crate::relax::nested::{Found, History, NestedEquilibrium, along};
+use crate::relax::path::Path;
 use crate::relax::request::method::Method;
 use crate::relax::request::options::{
     Options, Progress, RelaxError, check_tolerance, points_somewhere, rests_in_wind,
@@ -158,6 +159,10 @@ pub(super) fn decided(
     let found = decision.found.after(effort.work);
     let outcome = report::outcome(problem, &found, stopped, effort.reached);
     let mut leaf = report::equilibrium(problem, &found, outcome, wall);
+    if matches!(leaf.path, Some(Path::Held { .. })) && !leaf.outcome.is_at_rest() {
+        // What the way was like, it did not end where the leaf is held.
+        leaf.path = None;
+    }
     leaf.doubts = plausible::doubts(problem.leaf.scenario(), &leaf);
     let doubt = (leaf.path.as_ref()).and_then(|path| path.doubt(problem.options.route));
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();

@@ -1,5 +1,6 @@
 //! Holders along veins.
 
+use leafdyn::relax::{Happening, Path, Stage};
 use leafdyn_testing::*;
 
 const ROD: &str = r#"
@@ -109,4 +110,83 @@ fn reactions_are_derivatives_of_the_energy() {
         upper.force.y < -0.1 && lower.force.y > 0.1,
         "{lower:?} {upper:?}"
     );
+}
+
+/// What happened on the way to the holders.
+#[track_caller]
+fn on_the_way(leaf: &Equilibrium) -> &[leafdyn::relax::Event] {
+    match &leaf.path {
+        Some(Path::Held { events }) => events,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A strut between a clamp and a pin that comes nearer turns aside at Euler's load, 20.1907 A/L^2: with
+/// EA = 1000 after a fiftieth of its length. Pulled it is stable all the way.
+#[test]
+fn a_strut_turns_aside_on_the_way_of_its_pin() {
+    let to = |x: f64| {
+        let strut = format!("{ROD}\ntip = {{ held = \"pinned\", position = [{x:?}, 0.0, 0.0] }}");
+        let strut = strut.replace("axial = 60.0", "axial = 1000.0");
+        settle(&parse(&strut), 1e-6)
+    };
+    let pressed = to(0.9);
+    let event = *only(on_the_way(&pressed));
+    assert_eq!(event.stage, Stage::Moving);
+    assert!(matches!(event.happening, Happening::Branched { .. }));
+    close("part", event.part, 0.0202 / 0.1, 1.0 / 32.0);
+    assert_eq!(on_the_way(&to(1.01)), []);
+}
+
+/// A taut rod whose middle is pulled aside by a third, with layers of a five-hundredth of its
+/// length at its clamp: on grids that do not know of them its holders are moved anew.
+#[test]
+fn a_stitch_comes_to_rest() {
+    for axial in [1e4, 1e5, 3e5, 1e6] {
+        let stitch = parse(&format!(
+            r#"
+            name = "stitch"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = {axial:?}, shear_2 = {axial:?}, shear_3 = {axial:?} }}
+            tip = {{ held = "pinned", position = [1.0, 0.0, 0.0] }}
+            grip = [{{ vein = 1, at = 0.5, move = [0.0, 0.0, 0.3] }}]"#
+        ));
+        let found = settle(&stitch, 1e-5);
+        assert_eq!(on_the_way(&found), []);
+        // Each half is stretched to sqrt(0.5^2 + 0.3^2), but for the layers at the clamp.
+        let stretched = 0.34_f64.sqrt();
+        let force = 2.0 * axial * (stretched / 0.5 - 1.0) * 0.3 / stretched;
+        let felt = -only(&found.grip_reactions).force.z;
+        close("force", felt / force, 1.0, 12.0 / axial.sqrt());
+    }
+}
+
+/// The equilibrium to which holders bring a leaf does not depend on the tolerance.
+#[test]
+fn holders_bring_a_leaf_to_one_equilibrium_at_all_tolerances() {
+    for seed in 1..=asked("HELD", 12) as u64 {
+        let mut draw = random::Draw(seed);
+        let held = ["pinned", "clamped"][usize::from(draw.chance(0.5))];
+        let (x, yz) = (draw.uniform(0.4, 0.9), draw.list(2, -0.2, 0.2));
+        let leaf = parse(&format!(
+            r#"
+            name = "held"
+            leaf = {{ rods = 1, length = 1.0, fan = [{:?}] }}
+            stiffness = {{ torsion = {:?}, bending_2 = {:?}, bending_3 = 1.0, axial = 1e4, shear_2 = 1e4, shear_3 = 1e4 }}
+            load = {{ gravity = [0.0, {:?}, {:?}] }}
+            tip = {{ held = {held:?}, position = [{x:?}, {:?}, {:?}] }}"#,
+            draw.uniform(-0.5, 0.5),
+            draw.log(0.1, 3.0),
+            draw.log(0.1, 10.0),
+            draw.uniform(-1.0, 1.0),
+            draw.uniform(-3.0, 3.0),
+            yz[0],
+            yz[1],
+        ));
+        let energy = |tolerance| settle(&leaf, tolerance).energy.unwrap();
+        let wanted = energy(1e-8);
+        for tolerance in [1e-3, 1e-4, 1e-6] {
+            close("energy", energy(tolerance) / wanted, 1.0, 0.01);
+        }
+    }
 }
