@@ -134,7 +134,7 @@ fn a_strut_turns_aside_on_the_way_of_its_pin() {
     let event = *only(on_the_way(&pressed));
     assert_eq!(event.stage, Stage::Moving);
     assert!(matches!(event.happening, Happening::Branched { .. }));
-    close("part", event.part, 0.0202 / 0.1, 1.0 / 32.0);
+    close("part", event.part, 0.0202 / 0.1, 2.0 / 32.0);
     assert_eq!(on_the_way(&to(1.01)), []);
 }
 

@@ -206,7 +206,14 @@ impl HeldWalk<'_> {
             shifted: false,
             cg_tolerance: FAR_FROM_REST,
         };
-        newton.solve(self.leaf, &mut self.held.state, &mut self.system, equations)
+        let (leaf, state, system) = (self.leaf, &mut self.held.state, &mut self.system);
+        let rest = newton.solve(leaf, state, system, equations)?;
+        // The last matrix was that of the state before.
+        let shift = leaf.neutral_shift();
+        match saddle::index(leaf, state, system, shift, self.held.work) {
+            Some(0) => Ok(rest),
+            _ => Err(Stop::Saddle),
+        }
     }
 
     /// Brings the leaf roughly to rest with its holders fixed.
