@@ -234,7 +234,7 @@ fn walks_left(effort: &Effort) -> usize {
     BUDGET_OF_WALKS.saturating_sub(effort.walked)
 }
 
-/// Whether the veins, apart, take their loads without losing their stability. A leaf that was
+/// Whether the veins, apart, take their loads without losing their stability. A leaf that
 /// came to rest at once, as was `found`, does not tell.
 pub fn takes_loads_stably(
     problem: &Problem,
