@@ -77,6 +77,9 @@ impl Difference {
     }
 }
 
+/// Stations (fractions of a vein's length) that are closer than this are one.
+pub(crate) const SAME_STATION: f64 = 1e-14;
+
 /// Stations that divide the length into `parts` equal parts.
 pub fn equally_spaced(parts: usize) -> Vec<f64> {
     (0..=parts).map(|i| i as f64 / parts as f64).collect()

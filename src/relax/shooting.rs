@@ -13,12 +13,11 @@ use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, S
 use crate::relax::result::plausible;
 use crate::relax::result::reaction::Reaction;
 use crate::relax::result::report::neutral_directions;
-use crate::relax::result::stations::SAME;
 use crate::relax::result::stress::Stresses;
 use crate::relax::settle::segments::coarsest;
 use crate::relax::stability::index::index_near;
 use crate::scenario::{Scenario, longest};
-use crate::shape::{RodShape, equally_spaced};
+use crate::shape::{RodShape, SAME_STATION, equally_spaced};
 use crate::shooting;
 use crate::shooting::{Reason, Solution, Start};
 use crate::undulation::Undulation;
@@ -44,8 +43,9 @@ fn with_requested(own: &[f64], parts: Option<usize>) -> Vec<f64> {
     let requested = parts.map(equally_spaced).unwrap_or_default();
     let mut all = own.to_vec();
     let is_own = |at: &f64| {
-        let next = own.partition_point(|station| at - station >= SAME);
-        own.get(next).is_some_and(|station| station - at < SAME)
+        let next = own.partition_point(|station| at - station >= SAME_STATION);
+        own.get(next)
+            .is_some_and(|station| station - at < SAME_STATION)
     };
     all.extend(requested.iter().filter(|at| !is_own(at)));
     all.sort_by(f64::total_cmp);

@@ -7,13 +7,10 @@ use crate::relax::result::equilibrium::{Equilibrium, Outcome, Shape};
 use crate::relax::result::stress::Stresses;
 use crate::relax::transfer::strains;
 use crate::scenario::Scenario;
-use crate::shape::equally_spaced;
+use crate::shape::{SAME_STATION, equally_spaced};
 
 /// Smallest number of parts into which the stations of a result divide a vein.
 const PARTS: usize = 16;
-
-/// Stations closer than this are the same.
-pub const SAME: f64 = 1e-14;
 
 /// Advice if interpolated stations are less accurate than the tolerance.
 const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
@@ -82,14 +79,18 @@ impl Equilibrium {
         let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
         let mut rest = to.as_slice();
         for (i, &station) in stations.iter().enumerate() {
-            if rest.first().is_some_and(|at| (at - station).abs() < SAME) {
+            if rest
+                .first()
+                .is_some_and(|at| (at - station).abs() < SAME_STATION)
+            {
                 for (rod, known) in rods.iter_mut().zip(known) {
                     rod.push(known.nodes[i]);
                 }
                 rest = &rest[1..];
             }
             let next = stations.get(i + 1).copied().unwrap_or(1.0);
-            let (points, others) = rest.split_at(rest.partition_point(|at| *at < next - SAME));
+            let (points, others) =
+                rest.split_at(rest.partition_point(|at| *at < next - SAME_STATION));
             rest = others;
             if points.is_empty() {
                 continue;

@@ -5,11 +5,10 @@ use crate::leaf::Scale;
 use crate::relax::accuracy::defect::Estimate;
 use crate::relax::nested::NestedEquilibrium;
 use crate::relax::result::reaction::extrapolated;
-use crate::relax::result::stations::SAME;
 use crate::relax::transfer::level::Level;
 use crate::relax::transfer::strains;
 use crate::scenario::{Moduli, Scenario, Stress};
-use crate::shape::RodShape;
+use crate::shape::{RodShape, SAME_STATION};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -87,7 +86,9 @@ impl Stresses {
         let places = estimate.errors[0].len() - 1;
         let (nodes, sigma) = (estimate.grid.segments(), estimate.grid.sigma());
         let error = |j: usize, station: f64| -> Option<f64> {
-            let i = sigma.partition_point(|at| *at < station - SAME).min(nodes);
+            let i = sigma
+                .partition_point(|at| *at < station - SAME_STATION)
+                .min(nodes);
             let fields = &estimate.rods[j][i];
             let along = |it: DVec3| fields.q.conjugate() * it;
             let moduli = scenario.moduli(j, station)?;
