@@ -137,7 +137,6 @@ impl HeldWalk<'_> {
         let jumped = drift > LARGEST_DRIFT || self.held.moved && drift > LARGEST_DRIFT_OUTSIDE;
         if !shortest && near_rest && (rest.is_err() || jumped) {
             (self.held.state, self.held.moved) = (before, moved);
-            self.held.near_rest = near_rest;
             return false;
         }
         self.held.moved |= moved;
