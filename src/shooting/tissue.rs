@@ -12,6 +12,9 @@ use num_dual::{DualNum, gradient, hessian};
 /// Numbers that perturb the two rods at a gap: displacement and spatial rotation of either.
 const BOTH: usize = 12;
 
+/// Numbers that turn both.
+const TURNS: usize = 6;
+
 /// A rod's force and moment by the tissue of a gap.
 pub type Load = [DVec3; 2];
 
@@ -83,18 +86,58 @@ impl<'a> Tissue<'a> {
         (energy, [0, 6].map(|k| [vector(k), vector(k + 3)]))
     }
 
-    /// The linearised loads of gap `g`.
+    /// The linearised loads of gap `g`: strains are linear in displacements, so that only rotations
+    /// need second derivatives.
     pub fn tangent(&self, g: usize, sigma: f64, rods: [&RodState; 2]) -> Tangent {
-        let (rest, rods) = (self.at_rest(g, sigma), rods.map(|rod| (rod.r, rod.q)));
+        let rest = self.at_rest(g, sigma);
         let k = self.stiffness(g, sigma);
-        let energy = |z| energy(&k, &rest, &z, &rods);
-        let (_, slopes, mut second) = hessian(energy, &SVector::<f64, BOTH>::zeros());
+        let apart = rods[1].r - rods[0].r;
+        let turned = |z: SVector<_, TURNS>| turned(&z, rods.map(|rod| rod.q));
+        let (frame, (fold, fold_slopes, fold_second)) =
+            hessian(turned, &SVector::<f64, TURNS>::zeros());
+        let excess = fold - rest[3];
+        // Second derivatives of the energy: by the displacement apart, by it and rotations, by rotations.
+        let mut apart_apart = SMatrix::<f64, 3, 3>::zeros();
+        let mut apart_turns = SMatrix::<f64, 3, TURNS>::zeros();
+        let mut turns_turns = (fold_slopes * fold_slopes.transpose() + fold_second * excess) * k[3];
+        let mut slopes = fold_slopes * (excess * k[3]);
+        for (i, row) in frame.iter().enumerate() {
+            let axis = SVector::<f64, 3>::from_fn(|c, _| row[c].0);
+            let turning = SMatrix::<f64, 3, TURNS>::from_fn(|c, t| row[c].1[t]);
+            let d = SVector::<f64, 3>::from(apart.to_array());
+            let strain_slopes = turning.transpose() * d;
+            let strain_second = row[0].2 * d[0] + row[1].2 * d[1] + row[2].2 * d[2];
+            let excess = axis.dot(&d) - rest[i];
+            apart_apart += axis * axis.transpose() * k[i];
+            apart_turns += (axis * strain_slopes.transpose() + turning * excess) * k[i];
+            turns_turns +=
+                (strain_slopes * strain_slopes.transpose() + strain_second * excess) * k[i];
+            slopes += strain_slopes * (excess * k[i]);
+        }
         // A rotation by theta and then by a is one by a + theta + a x theta/2.
-        for first in [3, 9] {
+        for first in [0, 3] {
             let m = &slopes.as_slice()[first..first + 3];
             for (r, c, value) in [(0, 1, -m[2]), (0, 2, m[1]), (1, 2, -m[0])] {
-                second[(first + r, first + c)] -= 0.5 * value;
-                second[(first + c, first + r)] += 0.5 * value;
+                turns_turns[(first + r, first + c)] -= 0.5 * value;
+                turns_turns[(first + c, first + r)] += 0.5 * value;
+            }
+        }
+        let mut second = SMatrix::<f64, BOTH, BOTH>::zeros();
+        for (rod, sign) in [(0, -1.0), (1, 1.0)] {
+            for (other, other_sign) in [(0, -1.0), (1, 1.0)] {
+                let (at, to) = (6 * rod, 6 * other);
+                let shifts = apart_apart * (sign * other_sign);
+                second.fixed_view_mut::<3, 3>(at, to).copy_from(&shifts);
+                let mixed = apart_turns.fixed_view::<3, 3>(0, 3 * other) * sign;
+                second.fixed_view_mut::<3, 3>(at, to + 3).copy_from(&mixed);
+                let transposed = mixed.transpose();
+                second
+                    .fixed_view_mut::<3, 3>(to + 3, at)
+                    .copy_from(&transposed);
+                let turns = turns_turns.fixed_view::<3, 3>(3 * rod, 3 * other);
+                second
+                    .fixed_view_mut::<3, 3>(at + 3, to + 3)
+                    .copy_from(&turns);
             }
         }
         Tangent(second)
@@ -117,6 +160,17 @@ fn energy<D: Number>(
 
 /// R^T (r_1 - r_0), R being the mean rotation, and the rotation between both about its first axis.
 fn strains<D: Number>(z: &SVector<D, BOTH>, rods: &[(DVec3, DQuat); 2]) -> [D; 4] {
+    let turns = SVector::from_fn(|k, _| z[3 + k + k / 3 * 3]);
+    let (frame, fold) = turned(&turns, rods.map(|(_, q)| q));
+    let apart = rods[1].0 - rods[0].0;
+    let d = [0, 1, 2].map(|c| z[6 + c] - z[c] + apart[c]);
+    let along = |i: usize| frame[i][0] * d[0] + frame[i][1] * d[1] + frame[i][2] * d[2];
+    [along(0), along(1), along(2), fold]
+}
+
+/// The columns of R, the mean of two rotations turned by `z`, and the rotation between both about its first
+/// axis.
+fn turned<D: Number>(z: &SVector<D, TURNS>, rods: [DQuat; 2]) -> ([[D; 3]; 3], D) {
     let one = D::one();
     let rotated = |first: usize, q: DQuat| -> [D; 4] {
         let t = [z[first], z[first + 1], z[first + 2]];
@@ -124,8 +178,8 @@ fn strains<D: Number>(z: &SVector<D, BOTH>, rods: &[(DVec3, DQuat); 2]) -> [D; 4
         let increment = [t[0] * 0.5, t[1] * 0.5, t[2] * 0.5, one - square * 0.125];
         product(increment, q.to_array().map(|c| one * c))
     };
-    let (p, mut q) = (rotated(3, rods[0].1), rotated(9, rods[1].1));
-    if rods[0].1.dot(rods[1].1) < 0.0 {
+    let (p, mut q) = (rotated(0, rods[0]), rotated(3, rods[1]));
+    if rods[0].dot(rods[1]) < 0.0 {
         q = q.map(|c| -c);
     }
     let conjugate = |q: [D; 4]| [-q[0], -q[1], -q[2], q[3]];
@@ -144,16 +198,17 @@ fn strains<D: Number>(z: &SVector<D, BOTH>, rods: &[(DVec3, DQuat); 2]) -> [D; 4
                 + 1.0
         }
     };
-    let apart = rods[1].0 - rods[0].0;
-    let d = [0, 1, 2].map(|c| z[6 + c] - z[c] + apart[c]);
-    let mut mean = [p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3]];
-    let length = mean.iter().fold(D::zero(), |sum, c| sum + *c * *c).sqrt();
-    mean = mean.map(|c| c / length);
-    let [x, y, z, _] = product(
-        product(conjugate(mean), [d[0], d[1], d[2], D::zero()]),
-        mean,
-    );
-    [x, y, z, between[0] * ratio * 2.0]
+    let [x, y, z, w] = [p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3]];
+    let twice = (x * x + y * y + z * z + w * w).recip() * 2.0;
+    let [wx, wy, wz] = [w * x * twice, w * y * twice, w * z * twice];
+    let [xx, yy, zz] = [x * x * twice, y * y * twice, z * z * twice];
+    let [xy, xz, yz] = [x * y * twice, x * z * twice, y * z * twice];
+    let frame = [
+        [one - yy - zz, xy + wz, xz - wy],
+        [xy - wz, one - xx - zz, yz + wx],
+        [xz + wy, yz - wx, one - xx - yy],
+    ];
+    (frame, between[0] * ratio * 2.0)
 }
 
 /// The product of quaternions (x, y, z, w).

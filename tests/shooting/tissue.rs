@@ -31,5 +31,7 @@ fn both_methods_find_leaves_with_tissue() {
         let shot = shot_near(&scenario, &leaf);
         agree(joined, &scenario, &leaf, &shot, 1e-9);
         assert!(shot.defect < 1e-11, "{joined}: {:.1e}", shot.defect);
+        // The linearised loads of the tissue are exact: one linearisation is enough near the solution.
+        assert_eq!(shot.work.linearizations, 1, "{joined}");
     }
 }
