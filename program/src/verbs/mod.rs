@@ -26,8 +26,8 @@ use std::time::Duration;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
 
-use crate::files::{self, Checkpointer};
-use crate::report::{FileError, Refused, json, numbers::brief};
+use crate::files;
+use crate::report::{Refused, json};
 use leafdyn::memory::TooMuch;
 use leafdyn::relax::{Limit, RefusedOption};
 use leafdyn::scenario::{ScenarioError, printable};
@@ -264,8 +264,6 @@ const GRACE: Duration = Duration::from_secs(10);
 enum OnInterrupt {
     /// It ends with what it has found, once this is `true`.
     Finish(Arc<AtomicBool>),
-    /// A simulation writes a checkpoint.
-    Write(Checkpointer),
     /// What is finished is on disk: how to go on.
     Tell(String),
 }
@@ -273,7 +271,7 @@ enum OnInterrupt {
 static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
 
 /// Makes Ctrl-C and other signals that ask the process to end do so at once, without half-written
-/// files and with a checkpoint of a simulation; or, where a part of a result is of use, with that.
+/// files; or, where a part of a result is of use, with that.
 #[cfg(unix)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     let hangup = (!ignores_hangup()).then_some(SIGHUP);
@@ -283,8 +281,8 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Makes Ctrl-C end the process at once, without half-written files and with a checkpoint of a
-/// simulation; or, where a part of a result is of use, with that.
+/// Makes Ctrl-C end the process at once, without half-written files; or, where a part of a result
+/// is of use, with that.
 #[cfg(windows)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| stop(SIGINT))?;
@@ -322,20 +320,14 @@ fn stop(signal: i32) {
 
 /// Ends the process after a signal, and says what is kept.
 fn end_now() -> ! {
-    let (kept, told) = match on_interrupt().as_ref() {
-        Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
-        Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
-        Some(OnInterrupt::Finish(_)) | None => {
-            (None, Some(format!("{}: {UNKEPT}", what_stopped())))
-        }
+    let told = match on_interrupt().as_ref() {
+        Some(OnInterrupt::Tell(how)) => how.clone(),
+        Some(OnInterrupt::Finish(_)) | None => format!("{}: {UNKEPT}", what_stopped()),
     };
     files::abandon_unfinished();
     clear_progress_line();
-    told.iter().for_each(|told| note(told));
-    let status = match kept {
-        Some(kept) if !show_checkpoint(&kept) => Status::Refused,
-        _ => Status::Interrupted,
-    };
+    note(&told);
+    let status = Status::Interrupted;
     if JSON.load(Ordering::Relaxed) {
         show_refused(what_stopped(), status.code());
     }
@@ -365,15 +357,6 @@ fn limit_until_interrupt() -> Limit {
 fn on_interrupt() -> MutexGuard<'static, Option<OnInterrupt>> {
     // It is only replaced as a whole, so it is valid even if the lock is poisoned.
     ON_INTERRUPT.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Reports the time of a checkpoint, or why it could not be written; returns whether it was.
-fn show_checkpoint(kept: &Result<f64, FileError>) -> bool {
-    note(&match kept {
-        Ok(time) => format!("stopped at t = {}; go on with --resume", brief(*time)),
-        Err(error) => format!("error: {error}"),
-    });
-    kept.is_ok()
 }
 
 /// Prints a line to standard error; failures are ignored.

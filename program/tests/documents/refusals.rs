@@ -65,7 +65,7 @@ const REFUSED: &str = "
     simulate leaf.toml --tolerance 1 => tolerance
     simulate leaf.toml --keep-unstable => --keep-unstable
     simulate leaf.toml --out leaf.toml/out => --out DIR
-    simulate leaf.toml --resume => cannot resume: there is no out/small/checkpoint.json; leave out --resume
+    simulate leaf.toml --resume => --resume is gone: a motion that is stopped has whole files up to its last output
     simulate leaf.toml --set dynamics.start=1 => start
     simulate absent.toml => absent.toml
     trace leaf.toml --vary coupling.y[5]=1..2 => --vary: with coupling.y[5]=1.0: coupling.y[5]: there

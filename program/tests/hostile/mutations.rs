@@ -1,4 +1,4 @@
-//! Scenarios, tables, map files and checkpoints that are changed at random: each is
+//! Scenarios, tables and map files that are changed at random: each is
 //! accepted or refused in one message, none ends in a panic, runs on, or damages a
 //! file. `LEAFDYN_MUTATIONS` asks for so many times as many.
 
@@ -126,30 +126,16 @@ fn measured_data() {
     }
 }
 
-/// Checkpoints and the files that they belong to.
-#[test]
-fn checkpoints() {
-    let (folder, _) = bodies::stopped();
-    let files = bodies::contents(folder.path());
-    assert_eq!(files.len(), 3, "{files:?}");
-    for (file, bytes) in files {
-        let name = file.file_name().unwrap().to_str().unwrap();
-        let text = String::from_utf8(bytes).unwrap();
-        each(name, &text, 40, |data| bodies::resumed(name, data));
-    }
-}
-
 /// Seeds and finds of the fuzz targets.
 #[test]
 fn the_corpus_of_the_fuzz_targets() {
     let corpus = root().join("fuzz/corpus");
     type Body = fn(&[u8]);
-    let bodies: [(&str, Body); 5] = [
+    let bodies: [(&str, Body); 4] = [
         ("scenario", bodies::scenario),
         ("typed", bodies::typed),
         ("peers", bodies::peers),
         ("measurements", bodies::measurements),
-        ("checkpoint", bodies::checkpoint),
     ];
     for (target, body) in bodies {
         let inputs = bodies::contents(&corpus.join(target));
