@@ -3,7 +3,6 @@
 
 mod atomic;
 mod format;
-mod journal;
 mod peers;
 mod recording;
 mod source;
@@ -16,7 +15,6 @@ use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable, write_new};
 pub use format::{Format, Kind, LIVE, Written};
-pub use journal::{Journal, belongs, claim, write_rows};
 pub use peers::read_peers;
 pub use recording::Recording;
 pub use source::{check_inputs, check_source, check_table, source};

@@ -260,15 +260,9 @@ fn what_stopped() -> &'static str {
 /// Time after a signal in which a run ends by itself, with what it has found.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// What a run does when the process is stopped, if more than to end at once.
-enum OnInterrupt {
-    /// It ends with what it has found, once this is `true`.
-    Finish(Arc<AtomicBool>),
-    /// What is finished is on disk: how to go on.
-    Tell(String),
-}
-
-static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
+/// A run that ends with what it has found, once this is `true`; without one the process ends at
+/// once.
+static CANCEL: Mutex<Option<Arc<AtomicBool>>> = Mutex::new(None);
 
 /// Makes Ctrl-C and other signals that ask the process to end do so at once, without half-written
 /// files; or, where a part of a result is of use, with that.
@@ -301,7 +295,7 @@ fn ignores_hangup() -> bool {
 
 /// Ends the process after a signal: at once, or with what it has found.
 fn stop(signal: i32) {
-    if let Some(OnInterrupt::Finish(cancel)) = on_interrupt().as_ref()
+    if let Some(cancel) = cancel().as_ref()
         && !cancel.load(Ordering::Relaxed)
     {
         SIGNAL.store(signal, Ordering::Relaxed);
@@ -318,24 +312,20 @@ fn stop(signal: i32) {
     end_now();
 }
 
-/// Ends the process after a signal, and says what is kept.
+/// Ends the process after a signal.
 fn end_now() -> ! {
-    let told = match on_interrupt().as_ref() {
-        Some(OnInterrupt::Tell(how)) => how.clone(),
-        Some(OnInterrupt::Finish(_)) | None => format!("{}: {UNKEPT}", what_stopped()),
-    };
     files::abandon_unfinished();
     clear_progress_line();
-    note(&told);
-    let status = Status::Interrupted;
+    let stopped = what_stopped();
+    note(&format!(
+        "{stopped}: nothing of an unfinished result is kept"
+    ));
+    let status = Status::Interrupted.code();
     if JSON.load(Ordering::Relaxed) {
-        show_refused(what_stopped(), status.code());
+        show_refused(stopped, status);
     }
-    process::exit(status.code());
+    process::exit(status);
 }
-
-/// What is told where nothing of an unfinished result is kept.
-const UNKEPT: &str = "nothing of an unfinished result is kept";
 
 fn clear_progress_line() {
     if io::stderr().is_terminal() {
@@ -346,17 +336,17 @@ fn clear_progress_line() {
 /// The limit of a run that ends with what it has found when the process is stopped.
 fn limit_until_interrupt() -> Limit {
     let cancel = Arc::new(AtomicBool::new(false));
-    *on_interrupt() = Some(OnInterrupt::Finish(cancel.clone()));
+    *self::cancel() = Some(cancel.clone());
     Limit {
         cancel: Some(cancel),
         ..Limit::default()
     }
 }
 
-/// What Ctrl-C does from now on.
-fn on_interrupt() -> MutexGuard<'static, Option<OnInterrupt>> {
+/// What Ctrl-C cancels.
+fn cancel() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
     // It is only replaced as a whole, so it is valid even if the lock is poisoned.
-    ON_INTERRUPT.lock().unwrap_or_else(PoisonError::into_inner)
+    CANCEL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Prints a line to standard error; failures are ignored.

@@ -107,8 +107,8 @@ const REFUSED: &str = "
     map leaf.toml --vary stiffness.torsion=1..2:2 --set method.steps=1 => method.step and method.segments
     map leaf.toml --vary stiffness.torsion=1..2:2 --cell-seconds 0 => cell-seconds
     map leaf.toml --vary stiffness.torsion=1..2:2 --tolerance 1 => tolerance
-    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 3/2 => --shard <I/K>
-    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 1/2 --draw a.csv => --draw
+    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 1/2 => --shard is gone: give each job a part of the range
+    map leaf.toml --vary stiffness.torsion=1..2:2 --draw a.csv => --draw
     map leaf.toml --vary stiffness.torsion=1..2:2 --set leaf.rods=0 => rods
     map leaf.toml --vary stiffness.torsion=1..2:2 --out leaf.toml/out => --out DIR
     chart leaf.toml --seconds 0 => seconds 0: must be greater than 0

@@ -107,6 +107,29 @@ fn a_motion_ends_whole_with_its_last_output() {
     }
 }
 
+/// Cells of a map that are finished.
+#[test]
+fn finished_cells_are_kept() {
+    let place = Workplace::new();
+    let many = "--vary load.gravity[2]=-1..-3:10000 --methods semi-implicit";
+    let run = interrupted(place.start(&format!("map leaf.toml {many} --write json,csv")));
+    contains(&run.out, &[" of 10000, reference", "written"]);
+    place.holds("out/small", "map.csv map.json");
+    let json = place.json("out/small/map.json");
+    assert_eq!(
+        (&json["exit_status"], &json["error"]),
+        (&130.into(), &"stopped by Ctrl-C".into())
+    );
+    let counts = json["outcomes"][0]["counts"].as_object().unwrap();
+    let rows: f64 = counts.values().map(Json::number).sum();
+    assert!(
+        rows > 0.0 && !counts.contains_key("out-of-time"),
+        "{counts:?}"
+    );
+    let table = place.read("out/small/map.csv");
+    assert_eq!(table.lines().count(), 1 + rows as usize);
+}
+
 /// Of several scenarios those that are finished have their files and their rows.
 #[test]
 fn finished_scenarios_are_kept() {

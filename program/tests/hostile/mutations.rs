@@ -1,6 +1,5 @@
-//! Scenarios, tables and map files that are changed at random: each is
-//! accepted or refused in one message, none ends in a panic, runs on, or damages a
-//! file. `LEAFDYN_MUTATIONS` asks for so many times as many.
+//! Scenarios and tables that are changed at random: each is accepted or refused in one
+//! message, none ends in a panic or runs on. `LEAFDYN_MUTATIONS` asks for so many times as many.
 
 #[path = "../../../fuzz/bodies.rs"]
 mod bodies;
@@ -11,7 +10,6 @@ use std::time::{Duration, Instant};
 
 use leafdyn::scenario::Scenario;
 use leafdyn_testing::root;
-use leafdyn_testing::workplace::Workplace;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
@@ -141,34 +139,5 @@ fn the_corpus_of_the_fuzz_targets() {
         let inputs = bodies::contents(&corpus.join(target));
         assert!(!inputs.is_empty(), "{target}");
         inputs.iter().for_each(|(_, data)| body(data));
-    }
-}
-
-/// Rows of a map that were there before: taken up or refused, and then they are as
-/// they were.
-#[test]
-fn map_files() {
-    let place = Workplace::new();
-    let asked = "map leaf.toml --set leaf.rods=1 --set coupling.y=0 --set coupling.z=0 \
-                 --vary load.gravity[2]=-1..0:2 --methods semi-implicit,shooting";
-    place.ok(asked);
-    for name in ["out/small/map.csv", "out/small/map.json"] {
-        let written = place.read(name);
-        each("map", &written, 12, |data| {
-            place.write(name, data);
-            let run = place.run(asked);
-            match run.status {
-                Some(0) => {
-                    place.picture("out/small/map");
-                }
-                Some(2) => {
-                    assert!(run.err.starts_with("error: "), "{}", run.err);
-                    assert_eq!(place.read(name).as_bytes(), data);
-                }
-                other => panic!("{other:?}: {}", run.err),
-            }
-        });
-        place.write(name, &written);
-        place.ok(asked);
     }
 }
