@@ -12,7 +12,7 @@ const REFUSED: &str = "
     relax leaf.toml --method implicit => semi-implicit
     relax absent.toml => absent.toml: cannot be read
     relax leaf.toml --segments few => invalid value 'few' for '--segments <N>'
-    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
+    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: 
     relax leaf.toml --modes 101 => --modes
     relax leaf.toml --modes -1 => --modes
     relax leaf.toml --modes 3 --method shooting => --modes 3: modes are those of a relaxed leaf: use the method semi-implicit
