@@ -1,5 +1,5 @@
 //! What is done with an input, whatever it is: by the fuzz targets beside this
-//! file, and by `tests/hostile_mutations.rs`. None may panic or run on.
+//! file, and by `program/tests/hostile/mutations.rs`. None may panic or run on.
 #![allow(dead_code)]
 
 use std::fs;
@@ -10,8 +10,7 @@ use std::time::Duration;
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
 use leafdyn::study::{Base, Data, FitRequest, Vary};
-use leafdyn_program::files::{Recording, Selection, read_peers};
-use tempfile::TempDir;
+use leafdyn_program::files::read_peers;
 
 /// A leaf with something of everything.
 pub const LEAF: &str = r#"
@@ -110,20 +109,6 @@ pub fn measurements(data: &[u8]) {
     }
 }
 
-/// A simulation of [`LEAF`], stopped after one output.
-pub fn stopped() -> (TempDir, Scenario) {
-    let scenario = Scenario::from_toml(&LEAF.replace("inf", "100.0")).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let mut simulation = Simulation::new(&scenario, &Options::default()).unwrap();
-    let mut recording =
-        Recording::begin(folder.path(), &mut simulation, &Selection::default()).unwrap();
-    let frame = simulation.next_frame().unwrap();
-    recording.add(&mut simulation, &frame).unwrap();
-    recording.checkpointer().write().unwrap().unwrap();
-    drop(recording);
-    (folder, scenario)
-}
-
 /// What the files in a folder hold.
 pub fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let entries = fs::read_dir(folder).unwrap();
@@ -131,30 +116,4 @@ pub fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     files.sort();
     let read = |file: PathBuf| (file.clone(), fs::read(file).unwrap());
     files.into_iter().map(read).collect()
-}
-
-/// `checkpoint.json` of a simulation that was stopped.
-pub fn checkpoint(data: &[u8]) {
-    resumed("checkpoint.json", data);
-}
-
-/// A simulation goes on where nothing that counts has changed; if not it is
-/// refused, and every file is as it was.
-pub fn resumed(name: &str, data: &[u8]) {
-    static STOPPED: LazyLock<(TempDir, Scenario)> = LazyLock::new(stopped);
-    let (whole, scenario) = &*STOPPED;
-    let folder = tempfile::tempdir().unwrap();
-    for (file, bytes) in contents(whole.path()) {
-        fs::write(folder.path().join(file.file_name().unwrap()), bytes).unwrap();
-    }
-    fs::write(folder.path().join(name), data).unwrap();
-    let before = contents(folder.path());
-    let mut simulation = Simulation::new(scenario, &Options::default()).unwrap();
-    match Recording::resume(folder.path(), &mut simulation, &Selection::default()) {
-        Ok(_) => assert_eq!(simulation.frames().1, 1),
-        Err(error) => {
-            assert!(error.to_string().len() < 2_000, "{error}");
-            assert_eq!(contents(folder.path()), before);
-        }
-    }
 }

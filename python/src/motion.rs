@@ -95,6 +95,7 @@ impl Motion {
             segments,
             step,
             tolerance,
+            ..Options::default()
         };
         let scenario = scenario.checked.clone();
         let (leaf, asked) = (scenario.clone(), options.clone());

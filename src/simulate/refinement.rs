@@ -141,11 +141,6 @@ impl Refinement {
         self.options.segments.is_none() && self.options.step.is_none()
     }
 
-    /// The first run, before it has begun.
-    pub fn first(&self) -> Option<&Simulation> {
-        self.next.as_ref().filter(|_| self.runs == 0)
-    }
-
     /// Steps and seconds that the next run is expected to take, as far as they are known.
     pub fn expected(&self) -> Option<(f64, f64)> {
         match self.runs {
@@ -160,12 +155,12 @@ impl Refinement {
     }
 
     /// The next run, at time 0; none behind the last, or if `watch`, which sees runs that it is
-    /// compared with, ends them.
+    /// compared with, or the limit ends them.
     pub fn next_run(&mut self, watch: &mut Watch) -> Option<Simulation> {
         let mut simulation = self.next.take()?;
         let comparison = match self.runs {
             0 => self.compare_first(&mut simulation, watch)?,
-            _ => self.compare_next(&mut simulation, watch)?,
+            _ => self.compare_next(&mut simulation),
         };
         simulation.choice = self.choice;
         simulation.aim = self.aim;
@@ -177,8 +172,6 @@ impl Refinement {
     /// to it.
     pub fn end_run(&mut self, simulation: &mut Simulation, stopped: Option<Stopped>) {
         let trajectory = simulation.trajectory.take();
-        let outputs = simulation.frames().1 + 1;
-        let whole = trajectory.filter(|points| points.outputs() == outputs);
         self.seconds += simulation.seconds();
         self.runs += 1;
         let bar = simulation.error_bar().filter(|_| stopped.is_none());
@@ -189,7 +182,7 @@ impl Refinement {
             self.refine(simulation, stopped);
         }
         if self.next.is_some() {
-            let others = (simulation.segments(), whole.unwrap_or_default());
+            let others = (simulation.segments(), trajectory.unwrap_or_default());
             let before = self.coarser.replace(others);
             if self.last {
                 // The run before once more, compared with what it was compared with.
@@ -212,6 +205,9 @@ impl Refinement {
 
     /// Builds the next run, if there is one.
     fn refine(&mut self, ended: &Simulation, stopped: Option<Stopped>) {
+        if matches!(stopped, Some(Stopped::Interrupted { .. })) {
+            return;
+        }
         if stopped.is_some() && self.completed {
             // The finer grid fails: what the coarser one found is the result.
             if let Some(before) = self.before {
@@ -269,8 +265,11 @@ impl Refinement {
             segments: Some(at.segments),
             step: at.step,
             tolerance: Some(at.tolerance),
+            limit: self.options.limit.clone(),
         };
-        let from = |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, start_tolerance);
+        let from = |leaf: &Leaf, grid: &Grid| {
+            start::state(leaf, grid, start_tolerance, options.limit.clone())
+        };
         Simulation::from(&self.scenario, &options, &from)
     }
 
@@ -284,7 +283,8 @@ impl Refinement {
         }
     }
 
-    /// The points of a run that is not recorded, as far as it goes; none if it is ended.
+    /// The points of a run that is not recorded, as far as it goes; none if `watch` or the limit
+    /// ends it.
     fn follow(&mut self, mut run: Simulation, watch: &mut Watch) -> Option<Trajectory> {
         run.choice = self.choice;
         run.compare_with(None, true);
@@ -292,6 +292,9 @@ impl Refinement {
             if !watch(&run) {
                 return None;
             }
+        }
+        if self.options.limit.reached() {
+            return None;
         }
         self.seconds += run.seconds();
         run.trajectory
@@ -363,30 +366,11 @@ impl Refinement {
     }
 
     /// The comparison of a later run with the one before.
-    fn compare_next(
-        &mut self,
-        next: &mut Simulation,
-        watch: &mut Watch,
-    ) -> Option<Option<Comparison>> {
-        let Some((segments, mut trajectory)) = self.coarser.clone() else {
-            return Some(None);
-        };
-        if trajectory.outputs() == 0
-            && let Some(before) = self.before
-        {
-            // It went on from a checkpoint, and is followed from its beginning.
-            let Ok(mut run) = self.build(before) else {
-                return Some(None);
-            };
-            if let Some((_, coarsest)) = &self.coarsest {
-                run.limit_steps_by(coarsest);
-            }
-            trajectory = self.follow(run, watch)?;
-            self.coarser = Some((segments, trajectory.clone()));
-        }
+    fn compare_next(&self, next: &mut Simulation) -> Option<Comparison> {
+        let (segments, trajectory) = self.coarser.clone()?;
         next.limit_steps_by(&trajectory);
-        let comparison = Comparison::new(next.segments(), (segments, trajectory), self.length);
-        Some(Some(comparison))
+        let run = (segments, trajectory);
+        Some(Comparison::new(next.segments(), run, self.length))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Refused;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::limit::Limit;
 use crate::motion::unstrained;
 use crate::relax::{self, Route};
 use crate::scenario::{Scenario, Schedule, Start};
@@ -13,11 +14,16 @@ use std::f64::consts::PI;
 const LARGEST_FORCE: f64 = 256.0 * PI * PI;
 
 /// The positions and rotations at time 0.
-pub(super) fn state(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
+pub(super) fn state(
+    leaf: &Leaf,
+    grid: &Grid,
+    tolerance: f64,
+    limit: Limit,
+) -> Result<State, Refused> {
     match leaf.scenario().dynamics.start {
         Start::Released if !leaf.is_held() => Ok(released(&DiscreteLeaf::new(leaf, grid.clone()))),
         // Held tips and grips are moved to their positions by the relaxation.
-        Start::Released | Start::AtRest => at_rest(leaf, grid, tolerance),
+        Start::Released | Start::AtRest => at_rest(leaf, grid, tolerance, limit),
     }
 }
 
@@ -36,11 +42,12 @@ fn released(leaf: &DiscreteLeaf) -> State {
 }
 
 /// The equilibrium under the loads, in the wind and with the rest shape at time 0.
-fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
+fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64, limit: Limit) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
         method: relax::Method::default().on_grid(Some(grid.segments())),
         tolerance: Some(tolerance),
+        limit,
         route: match scenario.wind {
             Some(_) => Route::Release,
             None => Route::default(),

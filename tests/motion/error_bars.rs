@@ -53,6 +53,7 @@ fn truth(scenario: &Scenario, found: &Simulation) -> Vec<Frame> {
         segments: Some(8 * found.segments()),
         step,
         tolerance: Some((found.tolerance() / 64.0).max(1e-12)),
+        ..Options::default()
     };
     let quarter = found.longest_step().map(|step| step / 4.0);
     let fine = Simulation::new(scenario, &options(quarter));

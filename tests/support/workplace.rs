@@ -332,6 +332,25 @@ pub fn send(child: &Child, signal: &str) {
     assert!(kill.status().unwrap().success());
 }
 
+/// What makes a small leaf whole: its stiffness, and a motion.
+pub fn stiffness(shear_3: &str, duration: &str) -> String {
+    format!(
+        "
+[stiffness]
+torsion = 0.7
+bending_2 = 0.8
+bending_3 = 1.2
+axial = 100.0
+shear_2 = 80.0
+shear_3 = {shear_3}
+[dynamics]
+density = 1.0
+duration = {duration}
+internal_damping = 0.01
+"
+    )
+}
+
 /// A leaf of the paper with so many rods.
 pub fn leaf(name: &str, rods: usize) -> String {
     format!(

@@ -57,8 +57,8 @@ pub fn write_new(file: &Path, bytes: &[u8]) -> io::Result<()> {
     })
 }
 
-/// The path of a file that is being written. A file begun here and not renamed is removed
-/// when this is dropped.
+/// The path of a file that is being written. A file that is not renamed is removed when this
+/// is dropped.
 pub(super) struct Draft(PathBuf);
 
 impl Draft {
@@ -68,11 +68,6 @@ impl Draft {
         let (created, path) = create_draft(file)?.keep().map_err(|kept| kept.error)?;
         paths.push(path.clone());
         Ok((Draft(path), created))
-    }
-
-    /// A draft left by an earlier process, which is kept when this is dropped.
-    pub fn resume(path: &Path) -> Self {
-        Draft(path.into())
     }
 
     pub fn path(&self) -> &Path {

@@ -3,7 +3,6 @@
 
 mod atomic;
 mod format;
-mod journal;
 mod peers;
 mod recording;
 mod source;
@@ -16,9 +15,8 @@ use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable, write_new};
 pub use format::{Format, Kind, LIVE, Written};
-pub use journal::{Journal, belongs, claim, write_rows};
 pub use peers::read_peers;
-pub use recording::{Checkpointer, Recording};
+pub use recording::Recording;
 pub use source::{check_inputs, check_source, check_table, source};
 
 use crate::figure;
@@ -111,8 +109,7 @@ impl Written for Boundary {
 
 impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
-    const BESIDES: &'static [&'static str] =
-        &["motion.csv", "motion.npy", "energy.csv", "checkpoint.json"];
+    const BESIDES: &'static [&'static str] = &["motion.csv", "motion.npy", "energy.csv"];
     const FORMATS: &'static [Format<Self>] = &[
         Format::Figure(["energy.svg", "energy.png"], figure::energy),
         Format::Figure(["filmstrip.svg", "filmstrip.png"], figure::filmstrip),

@@ -65,7 +65,7 @@ fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -
 impl Viewed for Equilibria {
     const STILL: Figure<Self> = figure::equilibria;
 
-    /// Equilibria equilibria side by side.
+    /// Equilibria side by side.
     fn fill(&self, view: &mut View, units: &Units) {
         view.kind = "equilibria";
         let count = self.found.len();

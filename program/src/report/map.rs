@@ -1,20 +1,14 @@
-//! A map as text, and its rows as CSV, written and read.
+//! A map as text, and its rows as CSV.
 
-use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
 
-use csv::StringRecord;
-
-use super::FileError;
 use crate::report::Reported;
 use crate::report::numbers::{brief, in_unit, in_unit_of_key, seconds};
-use crate::report::table::{Lines, append_csv, labelled, text_cell, text_of_cell};
+use crate::report::table::{Lines, append_csv, labelled, text_cell};
 use crate::report::words::map_shows;
 use leafdyn::scenario::Units;
-use leafdyn::study::{Map, MapOutcome, MapRequest, MapRow};
+use leafdyn::study::{Map, MapOutcome, MapRow};
 
 /// The columns after those of the varied keys.
 const COLUMNS: &str = "method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,\
@@ -26,10 +20,6 @@ const JUMPS: usize = 5;
 /// A map, and the work that was done for it.
 pub struct MapWork<'m> {
     pub map: &'m Map,
-    /// Rows that were known before.
-    pub known: usize,
-    /// Rows that were computed.
-    pub computed: usize,
     /// Total time.
     pub seconds: f64,
 }
@@ -57,8 +47,8 @@ impl Reported for MapWork<'_> {
         let cells = request.cells();
         let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
         lines.push(("cells", cells));
-        let (known, computed, time) = (self.known, self.computed, seconds(self.seconds));
-        let rows = format!("{known} were there, {computed} computed in {time}");
+        let (count, time) = (self.map.rows.len(), seconds(self.seconds));
+        let rows = format!("{count} computed in {time}");
         lines.push(("rows", rows));
         lines.extend(labelled("found", counts(self.map)));
         lines.extend(labelled("jumps", jumps(self.map, units)));
@@ -110,24 +100,12 @@ fn counts(map: &Map) -> Vec<String> {
 
 /// `map.csv`: one row per cell and method.
 pub fn map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
-    table(&map.request, &map.rows, out)
-}
-
-fn header(request: &MapRequest) -> StringRecord {
+    let request = &map.request;
     let keys = request.axes.iter().map(|axis| axis.keys.to_string());
-    keys.chain(COLUMNS.split(',').map(String::from)).collect()
-}
-
-/// The header and all rows.
-pub fn table(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
-    append_csv([header(request).iter().collect::<Vec<_>>()], out)?;
-    lines(request, rows, out)
-}
-
-/// The rows alone, each a whole line.
-pub fn lines(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::Result<()> {
+    let header: Vec<String> = keys.chain(COLUMNS.split(',').map(String::from)).collect();
+    append_csv([header], out)?;
     // The columns of the axes, then those of the row.
-    let rows = rows.iter().map(|row| {
+    let rows = map.rows.iter().map(|row| {
         let detail = text_cell(&row.detail).into();
         let row = MapRow {
             detail,
@@ -136,69 +114,4 @@ pub fn lines(request: &MapRequest, rows: &[MapRow], out: &mut dyn Write) -> io::
         (request.texts(row.cell), row)
     });
     append_csv(rows, out)
-}
-
-/// Reads the rows of a file. Header lines may repeat, as in concatenated files. An
-/// unterminated last line, as left by a killed run, is ignored.
-pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileError> {
-    let bytes = fs::read(file).map_err(|reason| FileError::read(file, reason))?;
-    let whole = bytes.iter().rposition(|&byte| byte == b'\n');
-    let bytes = &bytes[..whole.map_or(0, |end| end + 1)];
-    let cells: HashMap<Vec<String>, usize> = (0..request.cells())
-        .map(|cell| (request.texts(cell), cell))
-        .collect();
-    let header = header(request);
-    let mut table = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(bytes);
-    let mut rows = Vec::new();
-    for (count, record) in table.records().enumerate() {
-        let refuse = |line: u64, why: String| {
-            let change = "give the same --vary as when it was made, or another --out DIR";
-            let file = file.display();
-            FileError(format!(
-                "{file}:{line}: is no row of this map: {why}; {change}"
-            ))
-        };
-        let record = record.map_err(|error| refuse(count as u64 + 1, error.to_string()))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        if record == header {
-            continue;
-        }
-        if count == 0 {
-            let wanted = header.iter().collect::<Vec<_>>().join(", ");
-            return Err(refuse(line, format!("the columns are not {wanted}")));
-        }
-        let row = row(&record, &header, request, &cells);
-        rows.push(row.map_err(|why| refuse(line, why))?);
-    }
-    Ok(rows)
-}
-
-fn row(
-    record: &StringRecord,
-    header: &StringRecord,
-    request: &MapRequest,
-    cells: &HashMap<Vec<String>, usize>,
-) -> Result<MapRow, String> {
-    if record.len() != header.len() {
-        return Err(format!("it has {} columns", record.len()));
-    }
-    let place = record.iter().take(request.axes.len());
-    let place: Vec<String> = place.map(String::from).collect();
-    let Some(&cell) = cells.get(&place) else {
-        return Err(format!("it has no cell {}", place.join(", ")));
-    };
-    match record.deserialize::<MapRow>(Some(header)) {
-        Ok(row) => Ok(MapRow {
-            cell,
-            detail: text_of_cell(&row.detail).into(),
-            ..row
-        }),
-        Err(error) => Err(match error.kind() {
-            csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
-            _ => error.to_string(),
-        }),
-    }
 }

@@ -29,7 +29,7 @@ use leafdyn::scenario::{Scenario, Units, printable};
 pub use centerlines::{centerlines, modes_table, sensitivity_table};
 pub use chart::{chart_table, scaling_table};
 pub use fit::{fitted, table as fit_table};
-pub use map::{MapWork, lines, map_table, read_rows, table};
+pub use map::{MapWork, map_table};
 pub use trace::{
     boundary_table, error_location, is_special, passes_crossings, sides, slope_unit, trace_table,
 };

@@ -26,8 +26,8 @@ use std::time::Duration;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
 
-use crate::files::{self, Checkpointer};
-use crate::report::{FileError, Refused, json, numbers::brief};
+use crate::files;
+use crate::report::{Refused, json};
 use leafdyn::memory::TooMuch;
 use leafdyn::relax::{Limit, RefusedOption};
 use leafdyn::scenario::{ScenarioError, printable};
@@ -260,20 +260,12 @@ fn what_stopped() -> &'static str {
 /// Time after a signal in which a run ends by itself, with what it has found.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// What a run does when the process is stopped, if more than to end at once.
-enum OnInterrupt {
-    /// It ends with what it has found, once this is `true`.
-    Finish(Arc<AtomicBool>),
-    /// A simulation writes a checkpoint.
-    Write(Checkpointer),
-    /// What is finished is on disk: how to go on.
-    Tell(String),
-}
-
-static ON_INTERRUPT: Mutex<Option<OnInterrupt>> = Mutex::new(None);
+/// A run that ends with what it has found, once this is `true`; without one the process ends at
+/// once.
+static CANCEL: Mutex<Option<Arc<AtomicBool>>> = Mutex::new(None);
 
 /// Makes Ctrl-C and other signals that ask the process to end do so at once, without half-written
-/// files and with a checkpoint of a simulation; or, where a part of a result is of use, with that.
+/// files; or, where a part of a result is of use, with that.
 #[cfg(unix)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     let hangup = (!ignores_hangup()).then_some(SIGHUP);
@@ -283,8 +275,8 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Makes Ctrl-C end the process at once, without half-written files and with a checkpoint of a
-/// simulation; or, where a part of a result is of use, with that.
+/// Makes Ctrl-C end the process at once, without half-written files; or, where a part of a result
+/// is of use, with that.
 #[cfg(windows)]
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| stop(SIGINT))?;
@@ -303,7 +295,7 @@ fn ignores_hangup() -> bool {
 
 /// Ends the process after a signal: at once, or with what it has found.
 fn stop(signal: i32) {
-    if let Some(OnInterrupt::Finish(cancel)) = on_interrupt().as_ref()
+    if let Some(cancel) = cancel().as_ref()
         && !cancel.load(Ordering::Relaxed)
     {
         SIGNAL.store(signal, Ordering::Relaxed);
@@ -320,30 +312,20 @@ fn stop(signal: i32) {
     end_now();
 }
 
-/// Ends the process after a signal, and says what is kept.
+/// Ends the process after a signal.
 fn end_now() -> ! {
-    let (kept, told) = match on_interrupt().as_ref() {
-        Some(OnInterrupt::Write(checkpointer)) => (checkpointer.write_and_stop(), None),
-        Some(OnInterrupt::Tell(how)) => (None, Some(how.clone())),
-        Some(OnInterrupt::Finish(_)) | None => {
-            (None, Some(format!("{}: {UNKEPT}", what_stopped())))
-        }
-    };
     files::abandon_unfinished();
     clear_progress_line();
-    told.iter().for_each(|told| note(told));
-    let status = match kept {
-        Some(kept) if !show_checkpoint(&kept) => Status::Refused,
-        _ => Status::Interrupted,
-    };
+    let stopped = what_stopped();
+    note(&format!(
+        "{stopped}: nothing of an unfinished result is kept"
+    ));
+    let status = Status::Interrupted.code();
     if JSON.load(Ordering::Relaxed) {
-        show_refused(what_stopped(), status.code());
+        show_refused(stopped, status);
     }
-    process::exit(status.code());
+    process::exit(status);
 }
-
-/// What is told where nothing of an unfinished result is kept.
-const UNKEPT: &str = "nothing of an unfinished result is kept";
 
 fn clear_progress_line() {
     if io::stderr().is_terminal() {
@@ -354,26 +336,17 @@ fn clear_progress_line() {
 /// The limit of a run that ends with what it has found when the process is stopped.
 fn limit_until_interrupt() -> Limit {
     let cancel = Arc::new(AtomicBool::new(false));
-    *on_interrupt() = Some(OnInterrupt::Finish(cancel.clone()));
+    *self::cancel() = Some(cancel.clone());
     Limit {
         cancel: Some(cancel),
         ..Limit::default()
     }
 }
 
-/// What Ctrl-C does from now on.
-fn on_interrupt() -> MutexGuard<'static, Option<OnInterrupt>> {
+/// What Ctrl-C cancels.
+fn cancel() -> MutexGuard<'static, Option<Arc<AtomicBool>>> {
     // It is only replaced as a whole, so it is valid even if the lock is poisoned.
-    ON_INTERRUPT.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Reports the time of a checkpoint, or why it could not be written; returns whether it was.
-fn show_checkpoint(kept: &Result<f64, FileError>) -> bool {
-    note(&match kept {
-        Ok(time) => format!("stopped at t = {}; go on with --resume", brief(*time)),
-        Err(error) => format!("error: {error}"),
-    });
-    kept.is_ok()
+    CANCEL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Prints a line to standard error; failures are ignored.

@@ -3,8 +3,7 @@
 use super::job::{Delivered, Job};
 use super::progress::{ProgressLine, duration, fraction_between};
 use super::request::{Request, VerbTraits, words};
-use super::{OnInterrupt, note, on_interrupt, show_checkpoint};
-use super::{Refusal, Status};
+use super::{Interrupted, Refusal, Status, note};
 use crate::files::Recording;
 use crate::report::numbers::brief;
 use clap::Args;
@@ -19,11 +18,19 @@ const FINER_ANNOUNCED: f64 = 5.0;
 /// Larger recordings, in bytes, are announced with their expected size.
 const LARGE: u64 = 1_000_000_000;
 
+/// What is told of an option that is gone.
+const RESUME: &str = "--resume is gone: a motion that is stopped has whole files up to its last output, and \
+                      none is continued; leave it out to simulate from the beginning";
+
+/// What is told where no output but the first was made.
+const NOT_MOVED: Interrupted = Interrupted("no output was made");
+
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
 /// Exit status: 0 followed to its end; 1 ended early, as the motion could not
 /// be trusted any more (the files are still written and say how far it came);
-/// 2 the request was refused; 130 stopped by Ctrl-C (--resume goes on).
+/// 2 the request was refused; 130 stopped by Ctrl-C (the files are whole, up
+/// to the last output).
 #[derive(Debug, Args)]
 pub struct Simulate {
     #[command(flatten)]
@@ -41,8 +48,8 @@ pub struct Simulate {
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     step: Option<f64>,
 
-    /// Go on where the same run was stopped by Ctrl-C
-    #[arg(long)]
+    /// Refused: replaced by files that end with the last output
+    #[arg(long, hide = true)]
     resume: bool,
 }
 
@@ -50,8 +57,12 @@ impl Simulate {
     pub fn run(self) -> Result<Status, Refusal> {
         let traits = VerbTraits {
             stations: true,
+            partial: true,
             ..VerbTraits::default()
         };
+        if self.resume {
+            return Err(RESUME.into());
+        }
         self.request.each::<Record>(traits, |job| self.one(job))
     }
 
@@ -61,11 +72,12 @@ impl Simulate {
             segments: self.segments,
             step: self.step,
             tolerance: self.request.tolerance,
+            limit: job.limit.clone(),
         };
-        let mut motion = Refinement::new(&job.scenario, &options)?;
-        if self.resume {
-            Recording::check_resumable(&job.folder, &motion, &job.selection)?;
-        }
+        let mut motion = match Refinement::new(&job.scenario, &options) {
+            Err(_) if job.is_interrupted() => return Err(NOT_MOVED.into()),
+            motion => motion?,
+        };
         announce(&motion, job, ANNOUNCED);
         let mut line = job.progress();
         let mut last = None;
@@ -74,24 +86,22 @@ impl Simulate {
             true
         }) {
             let (simulation, recording, stopped) = self.record(run, &mut line, job)?;
+            if job.is_interrupted() && (last.is_some() || simulation.frames().1 == 0) {
+                // A run on a coarser grid is whole.
+                break;
+            }
             let (simulation, _, stopped) = last.insert((simulation, recording, stopped));
             motion.end_run(simulation, *stopped);
             announce(&motion, job, FINER_ANNOUNCED);
-            if motion.expected().is_some() {
-                // Nothing of this run is kept.
-                *on_interrupt() = None;
-                last = None;
-            }
         }
-        let Some((simulation, mut recording, stopped)) = last else {
-            return Err("the motion was not followed".into());
-        };
         drop(line);
-        let delivered = self.deliver(&simulation, &mut recording, stopped, job);
-        if delivered.is_err() {
-            write_checkpoint(&recording);
+        match last {
+            Some((simulation, mut recording, stopped)) => {
+                self.deliver(&simulation, &mut recording, stopped, job)
+            }
+            None if job.is_interrupted() => Err(NOT_MOVED.into()),
+            None => Err("the motion was not followed".into()),
         }
-        delivered
     }
 
     /// Runs a simulation to its end, or until it stops early, and records it.
@@ -102,26 +112,18 @@ impl Simulate {
         job: &Job,
     ) -> Result<(Simulation, Recording, Option<Stopped>), Refusal> {
         let (folder, selection) = (&job.folder, &job.selection);
-        let mut recording = match self.resume && Recording::is_kept(folder, &simulation, selection)
-        {
-            true => Recording::resume(folder, &mut simulation, selection)?,
-            false => Recording::begin(folder, &mut simulation, selection)?,
-        };
+        let mut recording = Recording::begin(folder, &mut simulation, selection)?;
         let bytes = recording.expected_bytes(&simulation);
         if bytes > LARGE {
             let (name, size) = (&job.scenario.name, memory::size(bytes));
             note(&format!("{name}: some {size} to record"));
         }
-        *on_interrupt() = Some(OnInterrupt::Write(recording.checkpointer()));
         let mut stopped = None;
         while stopped.is_none() && !simulation.done() {
             match simulation.next_frame() {
                 Err(why) => stopped = Some(why),
                 Ok(frame) => {
-                    if let Err(error) = recording.add(&mut simulation, &frame) {
-                        write_checkpoint(&recording);
-                        return Err(error.into());
-                    }
+                    recording.add(&simulation, &frame)?;
                     show_progress(line, &simulation);
                 }
             }
@@ -142,20 +144,9 @@ impl Simulate {
             job.remark(Some(doubt));
         }
         let written = recording.finish(&job.document(&record));
-        if written.is_err() {
-            // The motion so far need not be lost.
-            write_checkpoint(recording);
-        }
         let written = written.map(|files| job.list_files(&files));
         let written = [written.map_err(Refusal::from)];
         job.deliver_written(&record, stopped.is_none(), &record, written)
-    }
-}
-
-/// Writes a checkpoint, if possible, and reports it.
-fn write_checkpoint(recording: &Recording) {
-    if let Some(kept) = recording.checkpointer().write() {
-        show_checkpoint(&kept);
     }
 }
 

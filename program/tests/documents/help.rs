@@ -5,9 +5,9 @@ use leafdyn_testing::workplace::{Workplace, contains, pairs};
 const OPTIONS: &str = "
     relax => --method --segments --tolerance --set --out --json --keep-unstable --modes semi-implicit
     check => --tolerance --set --out --json --intervals --keep-unstable
-    simulate => --tolerance --set --out --json --method explicit semi-implicit --segments --step --resume
+    simulate => --tolerance --set --out --json --method explicit semi-implicit --segments --step
     chart => --seconds --methods --peers --rods --tolerance --set --out --json shooting-from-rest
-    map => --vary --methods --cell-seconds --shard --show --tolerance --set --out --json
+    map => --vary --methods --cell-seconds --show --tolerance --set --out --json
     trace => --vary --switch --until --keep-unstable --segments --points --tolerance --set --out --json
 ";
 

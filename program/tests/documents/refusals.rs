@@ -12,7 +12,7 @@ const REFUSED: &str = "
     relax leaf.toml --method implicit => semi-implicit
     relax absent.toml => absent.toml: cannot be read
     relax leaf.toml --segments few => invalid value 'few' for '--segments <N>'
-    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: must be a whole number
+    relax leaf.toml --set leaf.rods=0 => leaf.rods = 0: 
     relax leaf.toml --modes 101 => --modes
     relax leaf.toml --modes -1 => --modes
     relax leaf.toml --modes 3 --method shooting => --modes 3: modes are those of a relaxed leaf: use the method semi-implicit
@@ -65,7 +65,7 @@ const REFUSED: &str = "
     simulate leaf.toml --tolerance 1 => tolerance
     simulate leaf.toml --keep-unstable => --keep-unstable
     simulate leaf.toml --out leaf.toml/out => --out DIR
-    simulate leaf.toml --resume => cannot resume: there is no out/small/checkpoint.json; leave out --resume
+    simulate leaf.toml --resume => --resume is gone: a motion that is stopped has whole files up to its last output
     simulate leaf.toml --set dynamics.start=1 => start
     simulate absent.toml => absent.toml
     trace leaf.toml --vary coupling.y[5]=1..2 => --vary: with coupling.y[5]=1.0: coupling.y[5]: there
@@ -107,8 +107,8 @@ const REFUSED: &str = "
     map leaf.toml --vary stiffness.torsion=1..2:2 --set method.steps=1 => method.step and method.segments
     map leaf.toml --vary stiffness.torsion=1..2:2 --cell-seconds 0 => cell-seconds
     map leaf.toml --vary stiffness.torsion=1..2:2 --tolerance 1 => tolerance
-    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 3/2 => --shard <I/K>
-    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 1/2 --draw a.csv => --draw
+    map leaf.toml --vary stiffness.torsion=1..2:2 --shard 1/2 => --shard is gone: give each job a part of the range
+    map leaf.toml --vary stiffness.torsion=1..2:2 --draw a.csv => --draw
     map leaf.toml --vary stiffness.torsion=1..2:2 --set leaf.rods=0 => rods
     map leaf.toml --vary stiffness.torsion=1..2:2 --out leaf.toml/out => --out DIR
     chart leaf.toml --seconds 0 => seconds 0: must be greater than 0

@@ -38,6 +38,98 @@ fn points_of_a_branch_are_kept() {
     assert!(points > 1.0, "{points}");
 }
 
+/// Waits until a motion in this folder has made outputs.
+fn wait_for_outputs(place: &Workplace, folder: &str) {
+    let folder = place.path(folder);
+    let lines = || -> usize {
+        let files = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+        let drafts = files.filter(|file| file.file_name().to_string_lossy().contains("energy.csv"));
+        let texts = drafts.map(|file| std::fs::read_to_string(file.path()).unwrap_or_default());
+        texts.map(|text| text.lines().count()).sum()
+    };
+    let start = std::time::Instant::now();
+    while lines() < 20 {
+        assert!(start.elapsed() < Duration::from_secs(60), "nothing happens");
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// A motion ends with its last output, as a table and as an array.
+#[test]
+fn a_motion_ends_whole_with_its_last_output() {
+    let place = Workplace::new();
+    let table = "[dynamics]\nduration = 90\noutput_interval = 0.5\ninternal_damping = 0.002\n";
+    let array = "[dynamics]\nduration = 6\noutput_interval = 0.0025\ninternal_damping = 0.01\n";
+    place.write("table.toml", leaf("table", 5) + table);
+    place.write("array.toml", leaf("array", 5) + array);
+    for (name, file, segments, how) in [
+        ("table", "motion.csv", 64, "--method explicit"),
+        (
+            "array",
+            "motion.npy",
+            16,
+            "--method semi-implicit --tolerance 1e-5",
+        ),
+    ] {
+        let how = format!("{how} --segments {segments} --write json,csv --json");
+        let child = place.start(&format!("simulate {name}.toml {how}"));
+        let out = format!("out/{name}");
+        wait_for_outputs(&place, &out);
+        interrupt(&child);
+        let run = Run::from(child.wait_with_output().unwrap()).ends(130);
+        place.holds(&out, &format!("energy.csv motion.json {file}"));
+        let json = place.json(&format!("{out}/motion.json"));
+        assert_eq!(json, run.json());
+        let told = (&json["outcome"], &json["exit_status"], &json["error"]);
+        let interrupted = (
+            &"interrupted".into(),
+            &130.into(),
+            &"stopped by Ctrl-C".into(),
+        );
+        assert_eq!(told, interrupted);
+        let outputs = json["frames"].number() as usize;
+        let energies = place.read(&format!("{out}/energy.csv"));
+        assert_eq!(energies.lines().count(), 1 + outputs);
+        let cells: Vec<&str> = energies.lines().last().unwrap().split(',').collect();
+        assert_eq!(cells.len(), 12);
+        assert_eq!(cells[0].parse::<f64>().unwrap(), json["time"].number());
+        let motion = std::fs::read(place.path(&format!("{out}/{file}"))).unwrap();
+        let nodes = 5 * (segments + 1);
+        if name == "table" {
+            let lines = motion.iter().filter(|byte| **byte == b'\n').count();
+            assert_eq!(lines, 1 + outputs * nodes);
+            assert_eq!(motion.last(), Some(&b'\n'));
+        } else {
+            assert_eq!(motion.len(), 128 + outputs * nodes * 13 * 8);
+            let header = String::from_utf8_lossy(&motion[..128]).into_owned();
+            contains(&header, &[&format!("({outputs}, 5, {}, 13)", segments + 1)]);
+        }
+    }
+}
+
+/// Cells of a map that are finished.
+#[test]
+fn finished_cells_are_kept() {
+    let place = Workplace::new();
+    let many = "--vary load.gravity[2]=-1..-3:10000 --methods semi-implicit";
+    let run = interrupted(place.start(&format!("map leaf.toml {many} --write json,csv")));
+    contains(&run.out, &[" of 10000, reference", "written"]);
+    place.holds("out/small", "map.csv map.json");
+    let json = place.json("out/small/map.json");
+    assert_eq!(
+        (&json["exit_status"], &json["error"]),
+        (&130.into(), &"stopped by Ctrl-C".into())
+    );
+    let counts = json["outcomes"][0]["counts"].as_object().unwrap();
+    let rows: f64 = counts.values().map(Json::number).sum();
+    assert!(
+        rows > 0.0 && !counts.contains_key("out-of-time"),
+        "{counts:?}"
+    );
+    let table = place.read("out/small/map.csv");
+    assert_eq!(table.lines().count(), 1 + rows as usize);
+}
+
 /// Of several scenarios those that are finished have their files and their rows.
 #[test]
 fn finished_scenarios_are_kept() {

@@ -1,6 +1,5 @@
-//! Scenarios, tables, map files and checkpoints that are changed at random: each is
-//! accepted or refused in one message, none ends in a panic, runs on, or damages a
-//! file. `LEAFDYN_MUTATIONS` asks for so many times as many.
+//! Scenarios and tables that are changed at random: each is accepted or refused in one
+//! message, none ends in a panic or runs on. `LEAFDYN_MUTATIONS` asks for so many times as many.
 
 #[path = "../../../fuzz/bodies.rs"]
 mod bodies;
@@ -11,7 +10,6 @@ use std::time::{Duration, Instant};
 
 use leafdyn::scenario::Scenario;
 use leafdyn_testing::root;
-use leafdyn_testing::workplace::Workplace;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
@@ -126,63 +124,20 @@ fn measured_data() {
     }
 }
 
-/// Checkpoints and the files that they belong to.
-#[test]
-fn checkpoints() {
-    let (folder, _) = bodies::stopped();
-    let files = bodies::contents(folder.path());
-    assert_eq!(files.len(), 3, "{files:?}");
-    for (file, bytes) in files {
-        let name = file.file_name().unwrap().to_str().unwrap();
-        let text = String::from_utf8(bytes).unwrap();
-        each(name, &text, 40, |data| bodies::resumed(name, data));
-    }
-}
-
 /// Seeds and finds of the fuzz targets.
 #[test]
 fn the_corpus_of_the_fuzz_targets() {
     let corpus = root().join("fuzz/corpus");
     type Body = fn(&[u8]);
-    let bodies: [(&str, Body); 5] = [
+    let bodies: [(&str, Body); 4] = [
         ("scenario", bodies::scenario),
         ("typed", bodies::typed),
         ("peers", bodies::peers),
         ("measurements", bodies::measurements),
-        ("checkpoint", bodies::checkpoint),
     ];
     for (target, body) in bodies {
         let inputs = bodies::contents(&corpus.join(target));
         assert!(!inputs.is_empty(), "{target}");
         inputs.iter().for_each(|(_, data)| body(data));
-    }
-}
-
-/// Rows of a map that were there before: taken up or refused, and then they are as
-/// they were.
-#[test]
-fn map_files() {
-    let place = Workplace::new();
-    let asked = "map leaf.toml --set leaf.rods=1 --set coupling.y=0 --set coupling.z=0 \
-                 --vary load.gravity[2]=-1..0:2 --methods semi-implicit,shooting";
-    place.ok(asked);
-    for name in ["out/small/map.csv", "out/small/map.json"] {
-        let written = place.read(name);
-        each("map", &written, 12, |data| {
-            place.write(name, data);
-            let run = place.run(asked);
-            match run.status {
-                Some(0) => {
-                    place.picture("out/small/map");
-                }
-                Some(2) => {
-                    assert!(run.err.starts_with("error: "), "{}", run.err);
-                    assert_eq!(place.read(name).as_bytes(), data);
-                }
-                other => panic!("{other:?}: {}", run.err),
-            }
-        });
-        place.write(name, &written);
-        place.ok(asked);
     }
 }

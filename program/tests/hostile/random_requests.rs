@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use leafdyn::scenario::{Scenario, schema};
 use leafdyn_testing::random::Draw;
-use leafdyn_testing::workplace::{Run, Workplace};
+use leafdyn_testing::workplace::{Run, Workplace, stiffness};
 use leafdyn_testing::{asked, root};
 use rayon::prelude::*;
 use serde_json::Value;
@@ -52,20 +52,11 @@ load = { gravity = [0.0, 0.0, -0.6] }
 wind = { velocity = [0.5, 0.8, 1.0], density = 1.2, drag = 2.0, width = 0.2 }",
 ];
 
-/// What makes a small leaf whole.
-const STIFFNESS: &str = "
-[stiffness]
-torsion = 0.7
-bending_2 = 0.8
-bending_3 = 1.2
-axial = 100.0
-shear_2 = 80.0
-shear_3 = inf
-[dynamics]
-density = 1.0
-duration = 0.03
-internal_damping = 0.01
-";
+/// A small leaf of this name.
+fn small_leaf(name: &str, leaf: &str) -> String {
+    // Rigid in one shear.
+    format!("name = \"{name}\"\n{leaf}{}", stiffness("inf", "0.03"))
+}
 
 /// Numbers that hardly anyone means.
 const WILD: &str = "0 0.0 -0.0 -1 -1.0 1e-320 1e-300 1e-12 -1e-9 1e-6 1e6 -1e9 1e12 1e50 -1e300 1e308 inf -inf \
@@ -211,7 +202,7 @@ impl<'s> Generator<'s> {
         };
         generator.wild = [0.0, 0.0, 0.02, 0.15][generator.below(4)];
         let mut scenario = match generator.draw.chance(0.7) {
-            true => format!("name = \"leaf\"\n{}{STIFFNESS}", generator.one(SMALL)),
+            true => small_leaf("leaf", generator.one(SMALL)),
             false => scenarios[generator.below(scenarios.len())].clone(),
         };
         let read = Scenario::from_toml(&scenario).unwrap();
@@ -592,10 +583,7 @@ fn status_of(child: &mut Child, longest: Duration) -> Option<i32> {
 fn run(request: &Request, longest: Duration) -> Option<(Workplace, Run)> {
     let place = Workplace::new();
     place.write("leaf.toml", &request.scenario);
-    place.write(
-        "other.toml",
-        format!("name = \"other\"\n{}{STIFFNESS}", SMALL[0]),
-    );
+    place.write("other.toml", small_leaf("other", SMALL[0]));
     place.write(
         "data.csv",
         "experiment,load.tip_force[2],tip_z,sd_tip_z\n1,0.1,-0.12,0.01\n2,0.2,-0.1,0.02\n",

@@ -11,5 +11,4 @@ mod margin;
 mod simulate_choice;
 mod simulate_cli;
 mod simulate_doubts;
-mod simulate_resume;
 mod trace_cli;

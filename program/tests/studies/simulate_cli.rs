@@ -1,5 +1,4 @@
-//! What scripts rely on when they simulate a leaf: streams, files, exit
-//! statuses, and that a run that was stopped goes on as if it had not been.
+//! What scripts rely on when they simulate a leaf: streams, files and exit statuses.
 
 use std::fs;
 

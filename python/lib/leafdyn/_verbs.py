@@ -118,7 +118,7 @@ def stability_map(
 ) -> Map:
     """Solve a leaf by several methods over one or two numbers, and tell where each method fails.
 
-    Parameters that are not listed are those of `relax`. A map shared among machines: ``leafdyn map --shard``.
+    Parameters that are not listed are those of `relax`.
 
     Parameters
     ----------

@@ -1,12 +1,13 @@
-//! Motion to a given time, snapshots, and saved states.
+//! Motion to a given time, and snapshots.
 
 use super::Explicit;
 use super::applied::Applied;
 use super::kernel::Forces;
-use super::packs::{Pack, vector};
+use super::packs::vector;
 use crate::leaf::State;
+use crate::limit::Limit;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::method::{Method, Snapshot, Stopped, Velocity, pass_count};
+use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use glam::DVec3;
 
 /// Part of a step below which differences of time are rounding.
@@ -69,6 +70,10 @@ impl Method for Explicit {
         self.steps
     }
 
+    fn set_limit(&mut self, limit: Limit) {
+        self.limit = limit;
+    }
+
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         let h = self.step;
         loop {
@@ -76,6 +81,9 @@ impl Method for Explicit {
             let next = self.begin.0 + h * (self.steps + 1 - self.begin.1) as f64;
             if next > until + NO_TIME * h {
                 break;
+            }
+            if self.limit.reached() {
+                return Err(Stopped::Interrupted { time: self.time });
             }
             let (exchange, _) = self.kick_and_drift(h);
             self.balance.add(exchange);
@@ -128,22 +136,5 @@ impl Method for Explicit {
             state,
             velocity,
         }
-    }
-
-    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        each(&mut self.stepped);
-        each(&mut self.time);
-        pass_count(&mut self.steps, each);
-        each(&mut self.begin.0);
-        pass_count(&mut self.begin.1, each);
-        self.widths.iter_mut().for_each(&mut *each);
-        self.work.each_number(each);
-        if let Some(applied) = &mut self.applied {
-            applied.each_number(each);
-        }
-        self.balance.each_number(each);
-        let moving = self.packs.iter_mut().flat_map(Pack::moving_arrays);
-        let arrays = self.positions.iter_mut().chain(moving);
-        arrays.flat_map(|array| array.iter_mut()).for_each(each);
     }
 }

@@ -139,10 +139,4 @@ impl Applied {
             blown.velocity = past;
         }
     }
-
-    /// Passes all numbers that determine the further motion to `each`.
-    pub fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let past = self.blown.iter_mut().flat_map(|blown| &mut blown.velocity);
-        past.flat_map(|velocity| velocity.as_mut()).for_each(each);
-    }
 }

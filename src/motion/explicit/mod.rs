@@ -38,6 +38,7 @@ use super::physics::Physics;
 use crate::lanes::widest_arch;
 use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Loads, State};
+use crate::limit::Limit;
 use crate::rod::RESOLVED_TURN;
 use glam::{DQuat, DVec3};
 use kernel::{Array, Block, Law, Layout, Step};
@@ -93,6 +94,7 @@ pub struct Explicit {
     balance: EnergyBalance,
     work: VaryingWork,
     parallel: bool,
+    limit: Limit,
 }
 
 /// A rigid rod, whose stiffness the method cannot handle.
@@ -141,6 +143,7 @@ impl Explicit {
             parallel: layout.packs() > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
+            limit: Limit::default(),
             leaf,
             physics,
         };

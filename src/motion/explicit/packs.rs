@@ -147,18 +147,6 @@ impl Pack {
         material.weight[i]
     }
 
-    /// The arrays that determine the motion, without positions.
-    pub fn moving_arrays(&mut self) -> impl Iterator<Item = &mut Array> {
-        let Motion { q, v, p, .. } = &mut self.motion;
-        let past = self
-            .past
-            .last
-            .iter_mut()
-            .chain(&mut self.past.earlier)
-            .flatten();
-        q.iter_mut().chain(v).chain(p).chain(past)
-    }
-
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn spin(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
         let d1 = q * DVec3::X;

@@ -56,11 +56,6 @@ impl VaryingWork {
         (self.half_impulse, self.turned) = (half_impulse, turned);
         work
     }
-
-    pub(super) fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        each(&mut self.half_impulse);
-        each(&mut self.turned);
-    }
 }
 
 impl Explicit {

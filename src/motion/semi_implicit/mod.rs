@@ -22,13 +22,14 @@ mod initial;
 mod step;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};
-use super::method::{Method, Snapshot, Stopped, Velocity, pass_count};
+use super::method::{Method, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use super::wind::Wind;
-use crate::leaf::{DirectSolver, DiscreteLeaf, Loads, State, System};
+use crate::leaf::{DiscreteLeaf, Loads, State, System};
+use crate::limit::Limit;
 use crate::newton::Definite;
 use crate::rod::Section;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Spectral radius rho_inf at infinite frequency: the part of unresolved motion that
 /// remains after a step. Smaller values also damp more of what is resolved.
@@ -149,6 +150,7 @@ pub struct SemiImplicit {
     corrected: Loads,
     /// Those of the tissue's strips at the start.
     alignments: Vec<bool>,
+    limit: Limit,
 }
 
 impl SemiImplicit {
@@ -183,6 +185,7 @@ impl SemiImplicit {
             balance: EnergyBalance::default(),
             corrected: Loads::default(),
             alignments: leaf.alignments(state),
+            limit: Limit::default(),
             leaf,
             physics,
         };
@@ -272,8 +275,15 @@ impl Method for SemiImplicit {
         std::mem::take(&mut self.longest_made)
     }
 
+    fn set_limit(&mut self, limit: Limit) {
+        self.limit = limit;
+    }
+
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         while self.time < until {
+            if self.limit.reached() {
+                return Err(Stopped::Interrupted { time: self.time });
+            }
             // Within a step loads are linear in time: no pulse is stepped over.
             let knot = self.physics.next_knot(self.time);
             self.step_towards(until.min(knot))?;
@@ -296,35 +306,6 @@ impl Method for SemiImplicit {
             energy: self.balance.complete(energy, Exchange::default()),
             state,
             velocity,
-        }
-    }
-
-    fn each_number(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        each(&mut self.time);
-        pass_count(&mut self.count, each);
-        each(&mut self.step);
-        each(&mut self.past_step);
-        each(&mut self.friction_power);
-        let mut direct = f64::from(u8::from(self.solver.direct.is_some()));
-        each(&mut direct);
-        self.balance.each_number(each);
-        let State { x, q, n, .. } = &mut self.state;
-        x.iter_mut().flat_map(<_>::as_mut).for_each(&mut *each);
-        for q in q {
-            let mut numbers = q.to_array();
-            numbers.iter_mut().for_each(&mut *each);
-            *q = DQuat::from_array(numbers);
-        }
-        let moving = (self.moving.iter_mut()).flat_map(|m| [&mut m.v, &mut m.a, &mut m.w]);
-        let past = self.past.iter_mut().flatten();
-        let vectors = n.iter_mut().chain(moving.chain(past).flatten());
-        vectors.flat_map(<_>::as_mut).for_each(each);
-        // Results depend on the present solver in the last digits.
-        if direct == 0.0 {
-            self.solver.direct = None;
-        } else if self.solver.direct.is_none() {
-            self.leaf.assemble(&self.state, &mut self.system);
-            self.solver.direct = DirectSolver::new(&self.system).ok();
         }
     }
 }

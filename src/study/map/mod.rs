@@ -27,7 +27,7 @@ use serde::{Serialize, Serializer};
 pub struct Map {
     /// The request.
     pub request: MapRequest,
-    /// The rows so far, sorted by cell and method, without duplicates.
+    /// The rows so far, sorted by cell and method.
     pub rows: Vec<MapRow>,
     /// What the figure shows.
     pub show: MapShow,
@@ -36,10 +36,9 @@ pub struct Map {
 }
 
 impl Map {
-    /// Sorts the rows; of duplicates the first is kept.
+    /// Sorts the rows.
     pub fn new(request: MapRequest, mut rows: Vec<MapRow>) -> Self {
         rows.sort_by_key(|row| (row.cell, row.method));
-        rows.dedup_by_key(|row| (row.cell, row.method));
         Map {
             request,
             rows,
@@ -65,8 +64,7 @@ impl Map {
     }
 }
 
-/// `map.json`: the request, which identifies the map of the rows in the table, and how often each
-/// method had each outcome; zero counts are left out.
+/// `map.json`: the request, and how often each method had each outcome; zero counts are left out.
 impl Serialize for Map {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -103,12 +101,12 @@ impl Serialize for Map {
     }
 }
 
-/// Solves cells, each by its methods, and passes the rows of each to a callback as it
+/// Solves these cells by all methods of a request, and passes the rows of each to a callback as it
 /// is finished; if that returns `false` the run ends. As many cells at a time as
 /// rayon has threads, each on a single thread, so that no cell's time includes another's work.
 pub fn map(
     request: &MapRequest,
-    cells: &[(usize, Vec<MapMethod>)],
+    cells: &[usize],
     done: &mut (dyn FnMut(Vec<MapRow>) -> bool + Send),
 ) {
     // A panic in a thread ends the run anyway.
@@ -116,8 +114,8 @@ pub fn map(
     let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
     let done = Mutex::new(done);
     let work = || {
-        while let Some((cell, methods)) = next() {
-            let rows = request.solve(*cell, methods);
+        while let Some(&cell) = next() {
+            let rows = request.solve(cell, &request.methods);
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             if !(*done)(rows) {
                 *left.lock().unwrap_or_else(PoisonError::into_inner) = [].iter();

@@ -56,7 +56,8 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
             let (Stopped::Unresolved { time, .. }
             | Stopped::HalfTurn { time, .. }
             | Stopped::Diverged { time, .. }
-            | Stopped::StepTooShort { time, .. }) = stopped;
+            | Stopped::StepTooShort { time, .. }
+            | Stopped::Interrupted { time }) = stopped;
             let at = format!("at t = {:.3e}", time * physics.time);
             return match stopped {
                 Stopped::Unresolved { turn, .. } => {

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Serialize, Serializer};
 
 use crate::relax::Method;
 use crate::study::judge::Answer;
@@ -119,7 +119,7 @@ read_and_write!(MapMethod);
 
 /// One method in one cell: a row of `map.csv`, in the order of its columns.
 /// Lengths except the tip's coordinates are relative to the longest rod.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MapRow {
     /// The number of the cell, the last axis varying fastest; the table gives its values instead.
     #[serde(skip)]
@@ -166,7 +166,7 @@ pub struct MapRow {
     pub reference: Confidence,
 }
 
-/// As in Rust's notation, which is read back exactly.
+/// As in Rust's notation, from which every bit can be read.
 fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     match value {
         // Adding zero turns -0 into 0.

@@ -1,35 +1,19 @@
-//! A file that grows during a run, and that can be left unfinished for another process
-//! to continue.
+//! A file that grows during a run.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::{self, BufReader, Seek, Write};
+use std::path::PathBuf;
 
-use super::checkpoint::{Extent, damaged, unreadable};
 use crate::files::atomic::{self, Draft};
 use crate::report::FileError;
-use crc32fast::Hasher;
 
 pub struct GrowingFile {
     /// The finished file.
     file: PathBuf,
     draft: Draft,
     out: File,
-    bytes: u64,
-    checksum: Hasher,
     /// Data to be appended.
     buffer: Vec<u8>,
-}
-
-/// A CRC-32 checksum as text.
-fn digits(checksum: Hasher) -> String {
-    format!("{:08x}", checksum.finalize())
-}
-
-/// Where an unfinished file is kept: `motion.csv.part`.
-pub fn kept_path(file: &Path) -> PathBuf {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    file.with_file_name(format!("{name}.part"))
 }
 
 impl GrowingFile {
@@ -41,61 +25,10 @@ impl GrowingFile {
             file,
             draft,
             out,
-            bytes: 0,
-            checksum: Hasher::new(),
             buffer: Vec::new(),
         };
         begun.append(|out| out.write_all(start))?;
         Ok(begun)
-    }
-
-    /// Continues a kept file after this extent. It is not changed if its content differs
-    /// from what was kept.
-    pub fn resume(file: PathBuf, extent: &Extent) -> Result<Self, FileError> {
-        let kept = kept_path(&file);
-        let resume = || -> io::Result<Option<Self>> {
-            let mut out = OpenOptions::new().read(true).write(true).open(&kept)?;
-            let (mut bytes, mut checksum) = (0, Hasher::new());
-            let mut reader = BufReader::new(&out).take(extent.bytes);
-            let mut buffer = vec![0; 1 << 16];
-            loop {
-                let read = reader.read(&mut buffer)?;
-                if read == 0 {
-                    break;
-                }
-                bytes += read as u64;
-                checksum.update(&buffer[..read]);
-            }
-            if bytes != extent.bytes || digits(checksum.clone()) != extent.checksum {
-                return Ok(None);
-            }
-            out.set_len(bytes)?;
-            out.seek(SeekFrom::Start(bytes))?;
-            Ok(Some(GrowingFile {
-                draft: Draft::resume(&kept),
-                file,
-                out,
-                bytes,
-                checksum,
-                buffer,
-            }))
-        };
-        let resumed = resume().map_err(|reason| unreadable(&kept, reason))?;
-        resumed.ok_or_else(|| damaged(&kept, "it is not as checkpoint.json says"))
-    }
-
-    /// The path of the unfinished file, and the one where another process looks for it.
-    pub fn unfinished(&self) -> [PathBuf; 2] {
-        [self.draft.path().into(), kept_path(&self.file)]
-    }
-
-    pub fn extent(&self) -> Extent {
-        let name = self.file.file_name().unwrap_or_default();
-        Extent {
-            file: name.to_string_lossy().into(),
-            bytes: self.bytes,
-            checksum: digits(self.checksum.clone()),
-        }
     }
 
     /// Appends to the file what `fill` adds to a buffer.
@@ -105,10 +38,7 @@ impl GrowingFile {
     ) -> Result<(), FileError> {
         self.buffer.clear();
         let filled = fill(&mut self.buffer).and_then(|()| self.out.write_all(&self.buffer));
-        filled.map_err(|reason| self.failed(reason))?;
-        self.bytes += self.buffer.len() as u64;
-        self.checksum.update(&self.buffer);
-        Ok(())
+        filled.map_err(|reason| self.failed(reason))
     }
 
     /// Replaces the beginning of the file; nothing can be appended after that.
@@ -143,30 +73,6 @@ mod tests {
     use std::fs;
 
     use super::*;
-
-    fn write(file: &mut GrowingFile, text: &str) -> Extent {
-        file.append(|out| out.write_all(text.as_bytes())).unwrap();
-        file.extent()
-    }
-
-    #[test]
-    fn a_kept_file_goes_on_where_it_was() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.csv");
-        let mut file = GrowingFile::begin(path.clone(), b"one ").unwrap();
-        let extent = write(&mut file, "two ");
-        write(&mut file, "and a half-written thr");
-        let [draft, kept] = file.unfinished();
-        atomic::rename(&draft, &kept).unwrap();
-        drop(file);
-        assert!(kept_path(&path).exists());
-
-        let mut file = GrowingFile::resume(path.clone(), &extent).unwrap();
-        write(&mut file, "three");
-        file.finish().unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), "one two three");
-        assert!(!kept_path(&path).exists());
-    }
 
     #[test]
     fn an_unfinished_file_that_is_dropped_is_removed() {

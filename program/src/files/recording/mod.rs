@@ -2,10 +2,8 @@
 //!
 //! Every output is written at once to `motion.csv` (or `motion.npy`) and `energy.csv`,
 //! under temporary names, so that memory does not grow. At the end of the run the files
-//! get their final names, and figures and a summary are made from them. A run that is
-//! stopped can be kept instead, and resumed.
+//! get their final names, and figures and a summary are made from them.
 
-mod checkpoint;
 mod energy;
 mod growing;
 mod motion;
@@ -13,22 +11,16 @@ mod motion;
 use std::fs;
 use std::mem;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use glam::DVec3;
-
-pub use checkpoint::Checkpointer;
 
 use super::{Kind, Selection, atomic, write_all};
 use crate::report::table::header;
 use crate::report::{Document, FileError};
-use checkpoint::{Checkpoint, Identity, Latest, damaged};
-use growing::{GrowingFile, kept_path};
+use growing::GrowingFile;
 use leafdyn::scenario;
 use leafdyn::shape::equally_spaced;
-use leafdyn::simulate::{
-    Frame, Moment, Record, Refinement, Simulation, Still, Stopped, film, stills,
-};
+use leafdyn::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
 use motion::{MotionFormat, Size};
 
 /// Shapes that a film strip shows.
@@ -54,7 +46,7 @@ const STILLS: usize = 8;
 /// let mut recording = Recording::begin(folder, &mut simulation, &Selection::default())?;
 /// while !simulation.done() {
 ///     let frame = simulation.next_frame()?;
-///     recording.add(&mut simulation, &frame)?;
+///     recording.add(&simulation, &frame)?;
 /// }
 /// let record = recording.record(&simulation, None)?;
 /// let files = recording.finish(&Document::new(&record, &scenario, None))?;
@@ -63,7 +55,6 @@ const STILLS: usize = 8;
 /// ```
 pub struct Recording {
     folder: PathBuf,
-    run: Identity,
     format: MotionFormat,
     size: Size,
     stations: Vec<f64>,
@@ -74,15 +65,12 @@ pub struct Recording {
     /// Positions at the last output, if there are no growing files.
     last: Vec<DVec3>,
     moments: Vec<Moment>,
-    /// Wall time in earlier processes.
-    wall: Duration,
-    checkpointer: Checkpointer,
 }
 
 impl Recording {
     /// Begins the files of a simulation in `folder`, which is created if missing, with the
     /// current state of the leaf. Without tables and figures nothing is written during
-    /// the run, and there is nothing to resume.
+    /// the run.
     pub fn begin(
         folder: &Path,
         simulation: &mut Simulation,
@@ -95,7 +83,7 @@ impl Recording {
     /// The same with another first output.
     pub fn begin_with(
         folder: &Path,
-        simulation: &mut Simulation,
+        simulation: &Simulation,
         selection: &Selection,
         first: &Frame,
     ) -> Result<Self, FileError> {
@@ -113,69 +101,6 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Whether the run that was stopped with a checkpoint in `folder` is one of a motion.
-    ///
-    /// # Errors
-    /// If there is no checkpoint, or it is damaged or of another motion.
-    pub fn check_resumable(
-        folder: &Path,
-        motion: &Refinement,
-        selection: &Selection,
-    ) -> Result<(), FileError> {
-        let Some(first) = motion.first() else {
-            return Ok(());
-        };
-        let asked = Identity::of(first, selection.stations);
-        Checkpoint::read_as(folder, |found| match motion.refines() {
-            true => asked.refined_to(found),
-            false => asked,
-        })?;
-        Ok(())
-    }
-
-    /// Whether this run was stopped with a checkpoint in `folder`.
-    pub fn is_kept(folder: &Path, simulation: &Simulation, selection: &Selection) -> bool {
-        let asked = Identity::of(simulation, selection.stations);
-        Checkpoint::read(folder, &asked).is_ok()
-    }
-
-    /// Resumes a simulation of the same leaf and options that was stopped with a checkpoint
-    /// in `folder`; also restores the state of `simulation`.
-    ///
-    /// # Errors
-    /// If there is no checkpoint, or it does not fit; the kept files are not changed then.
-    pub fn resume(
-        folder: &Path,
-        simulation: &mut Simulation,
-        selection: &Selection,
-    ) -> Result<Self, FileError> {
-        let mut recording = Recording::new(folder, simulation, selection);
-        let found = Checkpoint::read(folder, &recording.run)?;
-        let state = found.state().filter(|state| simulation.restore(state));
-        if state.is_none() {
-            let why = "it does not fit the leaf, or a number of it is impossible";
-            return Err(damaged(&folder.join(checkpoint::FILE_NAME), why));
-        }
-        let time = simulation.time();
-        // As text a number may lose its last digit.
-        let close = (found.time - time).abs() <= 1e-12 * time;
-        if !close {
-            let why = format!("its time {:e} is not that of its state", found.time);
-            return Err(damaged(&folder.join(checkpoint::FILE_NAME), &why));
-        }
-        let motion = folder.join(recording.format.file_name());
-        let motion = GrowingFile::resume(motion, &found.motion)?;
-        let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
-        let moments = energy.read(energy::read).ok();
-        recording.growing = Some([motion, energy]);
-        recording.moments = moments
-            .filter(|moments| moments.len() == simulation.frames().1 + 1)
-            .ok_or_else(|| damaged(&folder.join(energy::FILE_NAME), "outputs are missing"))?;
-        recording.wall = Duration::from_nanos(found.wall_nanoseconds);
-        recording.update_checkpointer(simulation);
-        Ok(recording)
-    }
-
     fn new(folder: &Path, simulation: &Simulation, selection: &Selection) -> Self {
         let stations = match selection.stations {
             Some(count) => equally_spaced(count),
@@ -187,7 +112,6 @@ impl Recording {
         };
         Recording {
             folder: folder.into(),
-            run: Identity::of(simulation, selection.stations),
             format: MotionFormat::of(size, outputs(simulation)),
             size,
             stations,
@@ -196,8 +120,6 @@ impl Recording {
             selection: selection.clone(),
             last: Vec::new(),
             moments: Vec::new(),
-            wall: Duration::ZERO,
-            checkpointer: Checkpointer::default(),
         }
     }
 
@@ -211,13 +133,8 @@ impl Recording {
         }
     }
 
-    /// Writes checkpoints of this recording, e.g. when the program is stopped.
-    pub fn checkpointer(&self) -> Checkpointer {
-        self.checkpointer.clone()
-    }
-
     /// Adds an output: the current state of `simulation`.
-    pub fn add(&mut self, simulation: &mut Simulation, frame: &Frame) -> Result<(), FileError> {
+    pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), FileError> {
         self.moments.push(Moment::of(frame, self.joined));
         let Some([motion, energy]) = &mut self.growing else {
             self.last = frame.positions.clone();
@@ -232,24 +149,7 @@ impl Recording {
         if let Some(moment) = self.moments.last() {
             energy.append(|out| energy::write(moment, out))?;
         }
-        self.update_checkpointer(simulation);
         Ok(())
-    }
-
-    fn update_checkpointer(&self, simulation: &mut Simulation) {
-        let Some(files) = &self.growing else {
-            return;
-        };
-        let wall = (self.wall + simulation.wall_time()).as_nanos();
-        let wall = wall.min(u128::from(u64::MAX)) as u64;
-        let extents = files.each_ref().map(GrowingFile::extent);
-        let time = simulation.time();
-        *self.checkpointer.latest() = Some(Latest {
-            folder: self.folder.clone(),
-            files: files.each_ref().map(GrowingFile::unfinished),
-            checkpoint: Checkpoint::new(self.run.clone(), extents, time, wall),
-            state: simulation.save(),
-        });
     }
 
     /// The record of a simulation that has ended; nothing can be added after that.
@@ -277,7 +177,6 @@ impl Recording {
             record.stations.clone_from(&self.stations);
         }
         record.film = self.film(record.moments.len())?;
-        record.wall_seconds += self.wall.as_secs_f64();
         Ok(record)
     }
 
@@ -303,42 +202,28 @@ impl Recording {
         Ok(split(outputs, &positions, size))
     }
 
-    /// Writes the remaining files, gives all files their final names, and removes those left
-    /// by a stopped run. Returns the files.
+    /// Writes the remaining files, gives all files their final names, and removes the motion
+    /// of another run in the other format. Returns the files.
     ///
     /// # Errors
-    /// If a file cannot be written; a checkpoint can then still be.
+    /// If a file cannot be written.
     pub fn finish(&mut self, record: &Document<Record>) -> Result<Vec<PathBuf>, FileError> {
         let kinds = &self.selection.kinds;
         let mut files = write_all(&self.folder, record, kinds)?;
         let Some([motion, energy]) = &mut self.growing else {
             return Ok(files);
         };
-        // From here on there is nothing to resume.
-        let mut latest = self.checkpointer.latest();
         if kinds.contains(&Kind::Csv) {
             let outputs = record.result.moments.len();
             motion.replace_start(&self.format.start(self.size, outputs))?;
             files.push(motion.finish()?);
             files.push(energy.finish()?);
-        }
-        latest.take();
-        drop(latest);
-        let file = |name: &str| self.folder.join(name);
-        let mut obsolete = vec![
-            file(checkpoint::FILE_NAME),
-            kept_path(&file(energy::FILE_NAME)),
-        ];
-        for format in [MotionFormat::Csv, MotionFormat::Npy] {
-            let motion = file(format.file_name());
-            obsolete.push(kept_path(&motion));
-            if format != self.format && kinds.contains(&Kind::Csv) {
-                obsolete.push(motion);
-            }
-        }
-        for file in obsolete {
+            let other = match self.format {
+                MotionFormat::Csv => MotionFormat::Npy,
+                MotionFormat::Npy => MotionFormat::Csv,
+            };
             // It may not exist.
-            let _ = fs::remove_file(file);
+            let _ = fs::remove_file(self.folder.join(other.file_name()));
         }
         Ok(files)
     }

@@ -1,5 +1,7 @@
 //! Small leaves in which the keys of the format matter.
 
+use leafdyn_testing::workplace::stiffness;
+
 /// A leaf and what is asked of it.
 pub struct TestLeaf {
     pub name: &'static str,
@@ -13,20 +15,6 @@ pub struct TestLeaf {
     /// second number in the rows of its own key.
     pub boundary: Option<[&'static str; 3]>,
 }
-
-const STIFFNESS: &str = "
-[stiffness]
-torsion = 0.7
-bending_2 = 0.8
-bending_3 = 1.2
-axial = 100.0
-shear_2 = 80.0
-shear_3 = 90.0
-[dynamics]
-density = 1.0
-duration = 0.3
-internal_damping = 0.01
-";
 
 const PULLS: [&str; 2] = [
     "load.tip_force[2]=-0.3..-0.33",
@@ -248,9 +236,10 @@ impl TestLeaf {
         let stiffness = match follows {
             true if self.name == "blade" => {
                 "[dynamics]\nduration = 0.2\nexternal_damping = 3e-7\n[solve]\ntolerance = 1e-4\n"
+                    .into()
             }
-            true => "[dynamics]\nduration = 0.1\ninternal_damping = 1e-3\n",
-            false => STIFFNESS,
+            true => "[dynamics]\nduration = 0.1\ninternal_damping = 1e-3\n".into(),
+            false => stiffness("90.0", "0.3"),
         };
         format!("name = \"{}\"\n{}{stiffness}", self.name, self.text)
     }
