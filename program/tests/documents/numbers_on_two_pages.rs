@@ -52,7 +52,7 @@ src/leaf/system/mod.rs: PARALLEL_NODES: usize = {};
 docs/command-line.md: in leaves of {} nodes
 
 src/study/trace/mod.rs: MOST_POINTS: usize = {};
-docs/command-line.md: number of points of a branch; default {} |
+docs/command-line.md: number of points of a branch; default {} - `--show
 
 src/study/trace/mod.rs: MOST_BRANCHES: usize = {};
 docs/command-line.md: that cross these, at most {} in all
