@@ -12,7 +12,6 @@ export CARGO_INSTALL_ROOT="$top/target/docs"
 cargo install --path program
 export PATH="$CARGO_INSTALL_ROOT/bin:$PATH"
 
-# A map that is there already would be continued, not drawn anew.
 ln -s "$top/scenarios" "$work/scenarios"
 cd "$work"
 
