@@ -1,6 +1,7 @@
 //! Documents, files and figures say what the program does.
 
 mod documented_commands;
+mod documented_keys;
 mod figure_trace;
 mod first_minute;
 mod fit_figure;

@@ -52,16 +52,13 @@ src/leaf/system/mod.rs: PARALLEL_NODES: usize = {};
 docs/command-line.md: in leaves of {} nodes
 
 src/study/trace/mod.rs: MOST_POINTS: usize = {};
-docs/command-line.md: number of points of a branch; default {} |
+docs/command-line.md: number of points of a branch; default {} - `--show
 
 src/study/trace/mod.rs: MOST_BRANCHES: usize = {};
 docs/command-line.md: that cross these, at most {} in all
 
 src/study/equilibria.rs: IN_VAIN: usize = {};
 docs/command-line.md: ends when {} consecutive starts
-
-docs/command-line.md: at most {} instants of a motion
-docs/formats.md: instants of a motion, at most {} of them
 
 docs/command-line.md: equilibria from {} starts
 docs/tried.md: [{} starts](command-line.md
@@ -83,9 +80,6 @@ docs/undulation.md: 1 wave 0.044 high | z = {}, no waves
 
 docs/methods.md: stable throughout; {}, 5.778
 docs/undulation.md: droops: z = -0.231, 1 wave 0.007 high | z = {}, 1 wave
-
-docs/methods.md: loads first {} of them are stable
-docs/tried.md: as they are loaded now, {} are stable
 
 docs/how-to-read.md: [one of {}](tried.md
 docs/tried.md: softest vein | {} | 1:
