@@ -10,10 +10,15 @@ pub const GRIDS: usize = 4;
 /// Eigenvalues below this part of the largest have errors relative to that part.
 const SMALL: f64 = 1e-3;
 
-/// Safety factor on the errors of eigenvalues, and lower bound of the last change of an
-/// eigenvalue as a part of the change before: that of a single number may be small by chance,
-/// and is also combined with those of the other eigenvalues. From two grids the error is at
-/// least so many of their differences, as there is no other change.
+/// Where all grids show the orders of their columns: the factor on the largest correction of an
+/// eigenvalue, and the part of each that those after it must reach, as that of a single number may be
+/// small by chance. Of 512 eigenvalues of 180 random leaves on three grids, and of 320 on finer or four,
+/// the largest error was 0.7 of the bar that follows.
+const CORRECTIONS: (f64, f64) = (3.5, 1.0 / 128.0);
+
+/// Elsewhere: the safety factor on the error of an eigenvalue, and lower bound of its last change as a
+/// part of the change before. From two grids the error is at least so many of their differences, as
+/// there is no other change.
 const SAFETY: f64 = 2.0;
 const LEAST_CHANGE: f64 = 0.1;
 const OF_TWO_GRIDS: f64 = 1.0;
@@ -65,8 +70,8 @@ impl Series {
         if unit > 0.0 { unit } else { 1.0 }
     }
 
-    /// The extrapolated value of the eigenvalue with this number, and its error if there are at
-    /// least two grids, in its unit.
+    /// The extrapolated value of the eigenvalue with this number, and a bound on its error by its own
+    /// changes if there are at least two grids, in its unit.
     fn judge(&self, k: usize) -> (f64, Option<f64>) {
         // A coarse grid may have fewer modes.
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
@@ -76,11 +81,16 @@ impl Series {
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
         let error = |best: Best| {
-            let least = match all {
-                2 => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
-                _ => LEAST_CHANGE * table.change_before(best.columns),
+            if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
+                let (factor, part) = CORRECTIONS;
+                return factor * table.largest_correction(best.columns, part);
+            }
+            let least = match (all, best.columns) {
+                (2, _) => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
+                (_, 0) => LEAST_CHANGE * table.change_before(),
+                _ => 0.0,
             };
-            best.error.max(least)
+            SAFETY * best.error.max(least)
         };
         (table.extrapolated()[0], table.best().map(error))
     }
@@ -90,14 +100,15 @@ impl Series {
         self.grids[self.grids.len() - 2][k] / self.unit(k)
     }
 
-    /// Extrapolated values, ascending, and their errors if there are at least two grids.
+    /// Extrapolated values, ascending, and their errors if there are at least two grids: the
+    /// geometric mean of its own bound, which may be small by chance, and the largest of all.
     pub fn values(&self) -> Vec<Extrapolated> {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.judge(k))
             .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
-        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * self.tolerance;
+        let bound = |error: f64| (error * largest).sqrt() + UNFINISHED * self.tolerance;
         let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
             let unit = self.unit(number);
             Extrapolated {
