@@ -16,6 +16,10 @@ const SMALL: f64 = 1e-3;
 /// the largest error was 0.7 of the bar that follows.
 const CORRECTIONS: (f64, f64) = (3.5, 1.0 / 128.0);
 
+/// From this tolerance on signs alone are needed, and that part is this.
+const SIGNS: f64 = 1e-2;
+const OF_SIGNS: f64 = 0.06;
+
 /// Elsewhere: the safety factor on the error of an eigenvalue, and lower bound of its last change as a
 /// part of the change before. From two grids the error is at least so many of their differences, as
 /// there is no other change.
@@ -83,6 +87,8 @@ impl Series {
         let error = |best: Best| {
             if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
                 let (factor, part) = CORRECTIONS;
+                // Where signs alone are needed, grids go on until they are certain.
+                let part = if self.tolerance < SIGNS { part } else { OF_SIGNS };
                 return factor * table.largest_correction(best.columns, part);
             }
             let least = match (all, best.columns) {
