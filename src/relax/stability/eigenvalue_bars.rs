@@ -88,7 +88,11 @@ impl Series {
             if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
                 let (factor, part) = CORRECTIONS;
                 // Where signs alone are needed, grids go on until they are certain.
-                let part = if self.tolerance < SIGNS { part } else { OF_SIGNS };
+                let part = if self.tolerance < SIGNS {
+                    part
+                } else {
+                    OF_SIGNS
+                };
                 return factor * table.largest_correction(best.columns, part);
             }
             let least = match (all, best.columns) {
