@@ -138,10 +138,15 @@ impl Richardson {
         if best.columns == 0 || best.columns + 1 < self.table.len() {
             return Some(best);
         }
-        let corrections = (1..=best.columns).rev().zip(0..);
-        let parts = corrections.map(|(m, before)| FEW.1.powi(before) * self.correction(m));
-        let error = FEW.0 * largest(parts);
+        let error = FEW.0 * self.largest_correction(best.columns, FEW.1);
         Some(Best { error, ..best })
+    }
+
+    /// The largest of the corrections on the finest grid by the first so many `columns`, of each
+    /// this `part` for every column after it.
+    pub fn largest_correction(&self, columns: usize, part: f64) -> f64 {
+        let corrections = (1..=columns).rev().zip(0..);
+        largest(corrections.map(|(m, after)| part.powi(after) * self.correction(m)))
     }
 
     /// Terms of the series that may be removed, as the changes from grid to grid of all columns
@@ -192,15 +197,11 @@ impl Richardson {
         distance(&row[m], &row[m - 1])
     }
 
-    /// The change preceding the one in the error estimate of the best column, `columns`: on
-    /// the finest grid by the column before or, if nothing is extrapolated, from grid to grid.
-    /// Zero if there is none.
-    pub fn change_before(&self, columns: usize) -> f64 {
+    /// The change from grid to grid of the values that are not extrapolated before their last one;
+    /// zero if there is none.
+    pub fn change_before(&self) -> f64 {
         match self.table.as_slice() {
-            [.., row] if columns > 1 && columns + 1 == row.len() => {
-                distance(&row[columns - 1], &row[columns - 2])
-            }
-            [.., coarse, before, _] if columns == 0 => distance(&before[0], &coarse[0]),
+            [.., coarse, before, _] => distance(&before[0], &coarse[0]),
             _ => 0.0,
         }
     }

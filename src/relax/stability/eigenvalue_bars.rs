@@ -10,10 +10,19 @@ pub const GRIDS: usize = 4;
 /// Eigenvalues below this part of the largest have errors relative to that part.
 const SMALL: f64 = 1e-3;
 
-/// Safety factor on the errors of eigenvalues, and lower bound of the last change of an
-/// eigenvalue as a part of the change before: that of a single number may be small by chance,
-/// and is also combined with those of the other eigenvalues. From two grids the error is at
-/// least so many of their differences, as there is no other change.
+/// Where all grids show the orders of their columns: the factor on the largest correction of an
+/// eigenvalue, and the part of each that those after it must reach, as that of a single number may be
+/// small by chance. Of 895 eigenvalues of 390 random leaves on three grids, and of 542 on finer or four,
+/// the largest error was 0.7 of the bar that follows.
+const CORRECTIONS: (f64, f64) = (3.5, 1.0 / 128.0);
+
+/// From this tolerance on signs alone are needed, and that part is this.
+const SIGNS: f64 = 1e-2;
+const OF_SIGNS: f64 = 0.06;
+
+/// Elsewhere: the safety factor on the error of an eigenvalue, and lower bound of its last change as a
+/// part of the change before. From two grids the error is at least so many of their differences, as
+/// there is no other change.
 const SAFETY: f64 = 2.0;
 const LEAST_CHANGE: f64 = 0.1;
 const OF_TWO_GRIDS: f64 = 1.0;
@@ -65,8 +74,8 @@ impl Series {
         if unit > 0.0 { unit } else { 1.0 }
     }
 
-    /// The extrapolated value of the eigenvalue with this number, and its error if there are at
-    /// least two grids, in its unit.
+    /// The extrapolated value of the eigenvalue with this number, and a bound on its error by its own
+    /// changes if there are at least two grids, in its unit.
     fn judge(&self, k: usize) -> (f64, Option<f64>) {
         // A coarse grid may have fewer modes.
         let values = self.grids.iter().filter_map(|grid| grid.get(k));
@@ -76,11 +85,22 @@ impl Series {
             .map(|(grid, value)| (1 << grid, vec![value / self.unit(k)]))
             .collect();
         let error = |best: Best| {
-            let least = match all {
-                2 => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
-                _ => LEAST_CHANGE * table.change_before(best.columns),
+            if best.columns > 1 && best.columns + 1 == all.min(GRIDS) {
+                let (factor, part) = CORRECTIONS;
+                // Where signs alone are needed, grids go on until they are certain.
+                let part = if self.tolerance < SIGNS {
+                    part
+                } else {
+                    OF_SIGNS
+                };
+                return factor * table.largest_correction(best.columns, part);
+            }
+            let least = match (all, best.columns) {
+                (2, _) => OF_TWO_GRIDS * (table.column(0)[0] - self.coarser(k)).abs(),
+                (_, 0) => LEAST_CHANGE * table.change_before(),
+                _ => 0.0,
             };
-            best.error.max(least)
+            SAFETY * best.error.max(least)
         };
         (table.extrapolated()[0], table.best().map(error))
     }
@@ -90,14 +110,15 @@ impl Series {
         self.grids[self.grids.len() - 2][k] / self.unit(k)
     }
 
-    /// Extrapolated values, ascending, and their errors if there are at least two grids.
+    /// Extrapolated values, ascending, and their errors if there are at least two grids: the
+    /// geometric mean of its own bound, which may be small by chance, and the largest of all.
     pub fn values(&self) -> Vec<Extrapolated> {
         let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
             .map(|k| self.judge(k))
             .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
-        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * self.tolerance;
+        let bound = |error: f64| (error * largest).sqrt() + UNFINISHED * self.tolerance;
         let in_units = |(number, (value, error)): (usize, &(f64, Option<f64>))| {
             let unit = self.unit(number);
             Extrapolated {
@@ -229,5 +250,41 @@ mod tests {
         assert_eq!(found.negative(), None);
         assert_eq!(found.signs(), [Some(true), None]);
         assert!(found.undecided().is_some());
+    }
+
+    /// Three grids that all show their order are enough for four digits, as of the leaf of Fig. 4; and
+    /// bars hold where a correction is small by chance, as of the second eigenvalue of the other.
+    #[test]
+    fn bars_of_three_grids_are_sharp_and_hold() {
+        let clean = [
+            [9.903412659666342, 13.602527055778914, 157.34451496161233],
+            [9.953795168391427, 13.645755884168217, 154.03985346878787],
+            [9.966411897478249, 13.656210070423265, 153.21977582734732],
+        ];
+        let by_chance = [
+            [82.79846690507394, 317.03889486239086, 542.6450861019146],
+            [82.32413540973374, 314.8886227429113, 520.7184772730885],
+            [82.21864067230136, 314.34042804515803, 514.6549830608891],
+        ];
+        let exact = [
+            [9.970619237, 13.659663422, 152.947095561],
+            [82.184376, 314.139966, 512.585365],
+        ];
+        for (grids, exact) in [clean, by_chance].into_iter().zip(exact) {
+            let found = Series {
+                index: 0,
+                single: false,
+                grids: grids.map(Vec::from).into(),
+                tolerance: 1e-6,
+                wanted: 4e-5,
+                rounding: 0.0,
+                turns: false,
+            };
+            assert_eq!(found.accurate(), grids == clean);
+            for (it, exact) in found.values().iter().zip(exact) {
+                let (error, bar) = ((it.value - exact).abs(), it.error.unwrap());
+                assert!(error <= bar, "{} within {bar}: {error}", it.value);
+            }
+        }
     }
 }

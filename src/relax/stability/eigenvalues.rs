@@ -50,8 +50,8 @@ const COMPARED: usize = 3;
 /// Largest relative error of frequencies that are listed without their shapes, over the tolerance
 /// and in itself, but never asked to be less than the tolerance: by default eigenvalues have four
 /// digits.
-const LISTED_OVER_TOLERANCE: f64 = 25.0;
-const LARGEST_LISTED: f64 = 2.5e-5;
+const LISTED_OVER_TOLERANCE: f64 = 40.0;
+const LARGEST_LISTED: f64 = 4e-5;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
