@@ -149,7 +149,7 @@ pub mod internals {
     }
     pub mod motion {
         pub use crate::motion::{
-            Energy, Explicit, Inertia, Method, Physics, SemiImplicit, Snapshot, Steps, Stopped,
+            Energy, Explicit, Inertia, TimeIntegrator, Physics, SemiImplicit, Snapshot, Steps, Stopped,
         };
     }
     pub mod rod {

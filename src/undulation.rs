@@ -30,7 +30,8 @@ use std::f64::consts::PI;
 
 use glam::{DQuat, DVec2, DVec3};
 use serde::Serialize;
-use serde::ser::{SerializeStruct, Serializer};
+use serde::Serializer;
+use serde::ser::SerializeStruct;
 
 use crate::rotation;
 use crate::scenario::Scenario;

@@ -57,7 +57,7 @@ macro_rules! read_and_write {
         impl std::str::FromStr for $type {
             type Err = $crate::study::UnknownWord;
 
-            fn from_str(text: &str) -> Result<Self, Self::Err> {
+            fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
                 let found = Self::ALL.into_iter().find(|it| it.word() == text);
                 found.ok_or_else(|| $crate::study::UnknownWord {
                     found: text.into(),
@@ -67,13 +67,13 @@ macro_rules! read_and_write {
         }
 
         impl serde::Serialize for $type {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
                 serializer.serialize_str(self.word())
             }
         }
 
         impl<'de> serde::Deserialize<'de> for $type {
-            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
                 let word = <String as serde::Deserialize>::deserialize(deserializer)?;
                 word.parse().map_err(serde::de::Error::custom)
             }

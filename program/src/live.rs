@@ -53,7 +53,7 @@ pub fn page(text: &str, name: &str, sliders: &[Slider]) -> Result<String, NotBui
     };
     let mut data = Vec::new();
     // Writing to memory cannot fail.
-    let _ = json::write(&given, &mut data);
+    let _ = json::write_json(&given, &mut data);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     Ok(page.replacen(GIVEN, &GIVEN.replace("null", &data), 1))

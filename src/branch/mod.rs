@@ -33,7 +33,7 @@ mod walk;
 pub use crate::branch::events::critical::{Critical, Kind};
 pub use crate::branch::problem::equations::{Equations, Stuck};
 pub use crate::branch::problem::family::{Family, Range, between as value_between};
-pub(crate) use crate::branch::problem::field::{between, prolong as prolong_field, times};
+pub(crate) use crate::branch::problem::field::{between, prolong_field, times};
 pub(crate) use crate::branch::verify::critical::NEARLY_RIGID;
 pub use crate::branch::verify::refined::{Doubt, Refined};
 pub(crate) use crate::branch::verify::regular::{on_finer, refine_at};

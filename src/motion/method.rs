@@ -70,7 +70,7 @@ pub struct Snapshot {
     pub energy: Energy,
 }
 
-/// Why a motion ended early. Times are dimensionless as a [`Method`]
+/// Why a motion ended early. Times are dimensionless as a [`TimeIntegrator`]
 /// returns them, and in the scenario's unit in a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Stopped {
@@ -152,7 +152,7 @@ impl Stopped {
 }
 
 /// A method that integrates the motion of a leaf. Dimensionless throughout.
-pub trait Method {
+pub trait TimeIntegrator {
     /// Present time.
     fn time(&self) -> f64;
 

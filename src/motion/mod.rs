@@ -10,7 +10,7 @@ mod unstrained;
 mod wind;
 
 pub use explicit::{Explicit, Rigid, StableStep};
-pub use method::{Energy, Method, Snapshot, Stopped, Velocity};
+pub use method::{Energy, TimeIntegrator, Snapshot, Stopped, Velocity};
 pub use physics::{Inertia, Physics};
 pub use semi_implicit::{SemiImplicit, Steps};
 pub use unstrained::unstrained;

@@ -4,6 +4,7 @@ use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Grid, State, System};
 use crate::newton::{Newton, Stop, Work};
 use crate::relax::accuracy::richardson::distance;
+use crate::relax::loading::arrival::SAME_EQUILIBRIUM;
 use crate::relax::nested::{Found, NestedEquilibrium};
 use crate::relax::path::Path;
 use crate::relax::request::problem::Problem;
@@ -15,10 +16,6 @@ use crate::relax::settle::segments::COARSEST_TURN;
 use crate::relax::transfer::level::{Level, positions};
 use crate::relax::transfer::predict::predict;
 use crate::relax::transfer::prolong::{prolong, restrict};
-
-/// Two grids on which the leaf moved far count as settled at the same equilibrium if no
-/// common nodes are farther apart than this, in lengths.
-const SAME_PLACE: f64 = 0.05;
 
 /// The finest grid for this comparison.
 const FINEST_COMPARED: usize = 256;
@@ -207,7 +204,7 @@ fn settle_from_start(problem: &Problem, mut grid: Grid, effort: &mut Effort) -> 
             Ok(_) if !moved || fixed => return Ok(found.with(level)),
             Ok(_) => {
                 if let Some(coarser) = before.take()
-                    && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_PLACE
+                    && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_EQUILIBRIUM
                 {
                     return Ok(found.on(vec![coarser, level]));
                 }
@@ -258,7 +255,7 @@ fn is_confirmed_on(
         level: other, rest, ..
     } = settle(problem, &mut found.history, from_start, effort);
     let (a, b) = (positions(level, 4), positions(&other, 3));
-    rest.is_ok() && distance(&a, &b) < SAME_PLACE
+    rest.is_ok() && distance(&a, &b) < SAME_EQUILIBRIUM
 }
 
 /// With up to two of the coarser grids that failed from the start, settled from the
@@ -274,7 +271,7 @@ fn with_coarser(
         let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
         let restricted = (grid.clone(), InitialGuess::Coarser(guess));
         let settled = settle(problem, &mut found.history, restricted, effort);
-        let there = distance(&positions(&settled.level, 1), &fine) < SAME_PLACE;
+        let there = distance(&positions(&settled.level, 1), &fine) < SAME_EQUILIBRIUM;
         if settled.rest.is_err() || settled.moved || !there {
             break;
         }

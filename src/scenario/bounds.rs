@@ -1,6 +1,6 @@
 //! Bounds on dimensionless numbers, and what the checks of combinations of values share.
 
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::{Profile, Rod, Scale};
@@ -16,7 +16,7 @@ pub(super) struct Limit {
 }
 
 impl Limit {
-    pub fn check(&self, item: Item, value: f64) -> Result<()> {
+    pub fn check(&self, item: Item, value: f64) -> ScenarioResult<()> {
         let limit = match value {
             _ if value > self.most => self.most,
             _ if value < self.least => self.least,
@@ -29,7 +29,7 @@ impl Limit {
     }
 
     /// Checks the extremes of a profile of each rod, in this unit.
-    pub fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> Result<()> {
+    pub fn check_profiles(&self, item: Item, profiles: &[Profile], unit: f64) -> ScenarioResult<()> {
         for (index, profile) in profiles.iter().enumerate() {
             for value in extremes(profile) {
                 self.check(item.entry(index), value / unit)?;

@@ -3,7 +3,7 @@
 
 use super::dynamics::{OUTPUTS, round_inertia};
 use super::entries::{Entries, MOST_RODS};
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::loads::on_one_rod;
@@ -30,14 +30,14 @@ impl Entries {
     ///
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
-    pub fn check(&self) -> Result<Scenario> {
+    pub fn check(&self) -> ScenarioResult<Scenario> {
         let scenario = self.read().map_err(|error| self.with_others(error))?;
         limits::check(self, &scenario)?;
         Ok(scenario)
     }
 
     /// The scenario, entry by entry.
-    pub(super) fn read(&self) -> Result<Scenario> {
+    pub(super) fn read(&self) -> ScenarioResult<Scenario> {
         let name = match self.given(Key::Name) {
             Some(item) => name(item)?,
             None => self.name_of_file(),
@@ -111,7 +111,7 @@ impl Entries {
     }
 }
 
-fn name(item: Item) -> Result<String> {
+fn name(item: Item) -> ScenarioResult<String> {
     let name = item.text()?;
     item.ensure(
         is_name(name),
@@ -131,7 +131,7 @@ fn is_name(name: &str) -> bool {
     starts_well && ends_well && name.len() <= LONGEST_NAME && name.chars().all(allowed)
 }
 
-fn unit(item: Item) -> Result<String> {
+fn unit(item: Item) -> ScenarioResult<String> {
     let unit = item.text()?;
     let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
     item.ensure(
@@ -142,7 +142,7 @@ fn unit(item: Item) -> Result<String> {
 }
 
 /// The unit of time, which is that of the others only if the mass is given.
-fn unit_of_time(entries: &Entries, item: Item) -> Result<String> {
+fn unit_of_time(entries: &Entries, item: Item) -> ScenarioResult<String> {
     let densities = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
     item.ensure(
         densities.iter().any(|key| entries.is_given(*key)),
@@ -152,7 +152,7 @@ fn unit_of_time(entries: &Entries, item: Item) -> Result<String> {
     unit(item)
 }
 
-fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {
+fn coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
     for (axis, key) in Key::COUPLING.into_iter().enumerate() {
         let stiffness = entries.item(key)?.one_each(gaps)?;
@@ -163,7 +163,7 @@ fn coupling(entries: &Entries, gaps: usize) -> Result<Vec<[f64; 3]>> {
     Ok(coupling)
 }
 
-fn tolerance(item: Item) -> Result<f64> {
+fn tolerance(item: Item) -> ScenarioResult<f64> {
     let tolerance = item.number()?;
     item.ensure(
         tolerance > 0.0 && tolerance <= TOLERANCE_MOST,
@@ -188,7 +188,7 @@ fn dynamics(
     rods: &[Rod],
     made: &Made,
     loads: [[f64; 3]; 3],
-) -> Result<Dynamics> {
+) -> ScenarioResult<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
     let mass = [Key::MassDensity, Key::BladeMassDensity];
     let mass = mass.into_iter().find(|key| entries.is_given(*key));
@@ -251,7 +251,7 @@ fn dynamics(
     })
 }
 
-fn rotary_inertia(entries: &Entries, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
+fn rotary_inertia(entries: &Entries, density: &[Profile]) -> ScenarioResult<Option<Vec<Profile>>> {
     let quantity = |item: Item| item.quantity(density.len());
     let inertia = entries
         .given(Key::RotaryInertia)
@@ -274,7 +274,7 @@ fn rotary_inertia(entries: &Entries, density: &[Profile]) -> Result<Option<Vec<P
     ))
 }
 
-fn output_interval(item: Item, duration: f64) -> Result<f64> {
+fn output_interval(item: Item, duration: f64) -> ScenarioResult<f64> {
     let interval = item.number()?;
     item.ensure(
         interval <= duration,
@@ -285,7 +285,7 @@ fn output_interval(item: Item, duration: f64) -> Result<f64> {
     Ok(interval)
 }
 
-fn clamped(item: Item, rods: usize) -> Result<bool> {
+fn clamped(item: Item, rods: usize) -> ScenarioResult<bool> {
     let clamped = item.switch()?;
     item.ensure(
         clamped || rods == 1,
@@ -296,7 +296,7 @@ fn clamped(item: Item, rods: usize) -> Result<bool> {
     Ok(clamped)
 }
 
-fn start(item: Item, clamped: bool) -> Result<Start> {
+fn start(item: Item, clamped: bool) -> ScenarioResult<Start> {
     let start = item.word(
         "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
          (in equilibrium under the loads at time 0)",

@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 
 use toml::{Table, Value};
 
-use super::error::{Place, Result, ScenarioError};
+use super::error::{Place, ScenarioResult, ScenarioError};
 use super::excerpt::shorten;
 use super::form::{Form, LeftOut};
 use super::key::{Key, split};
@@ -51,7 +51,7 @@ impl Entries {
     ///
     /// # Errors
     /// If it cannot be parsed, or has an unknown key.
-    pub fn of_text(text: &str, file: &str) -> Result<Self> {
+    pub fn of_text(text: &str, file: &str) -> ScenarioResult<Self> {
         let (source, table) = Source::parse(text, file)?;
         Entries::of(source, table)
     }
@@ -60,11 +60,11 @@ impl Entries {
     ///
     /// # Errors
     /// If it has an unknown key.
-    pub fn of_table(table: Table) -> Result<Self> {
+    pub fn of_table(table: Table) -> ScenarioResult<Self> {
         Entries::of(Source::default(), table)
     }
 
-    fn of(source: Source, table: Table) -> Result<Self> {
+    fn of(source: Source, table: Table) -> ScenarioResult<Self> {
         let mut entries = Entries {
             entries: [const { Vec::new() }; Key::COUNT],
             rows: [0; Key::REPEATED.len()],
@@ -132,7 +132,7 @@ impl Entries {
     ///
     /// # Errors
     /// If one cannot be.
-    pub fn replaced(&self, overrides: &[String]) -> Result<Self> {
+    pub fn replaced(&self, overrides: &[String]) -> ScenarioResult<Self> {
         let mut entries = self.clone();
         for given in overrides {
             let refuse = |problem: String| ScenarioError {

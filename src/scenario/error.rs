@@ -5,7 +5,7 @@ use std::fmt;
 use super::excerpt::printable;
 use super::key::Key;
 
-pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
+pub(super) type ScenarioResult<T> = std::result::Result<T, ScenarioError>;
 
 /// Why a scenario was refused. Its text is the whole message: the place, the key, the
 /// value found, and what to change.

@@ -1,13 +1,13 @@
 //! Holders along a vein: the tables `[[grip]]`; and how bases are held.
 
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::{Hold, Rod, Scenario, longest};
 
 /// Largest way of a grip, in lengths of the longest rod.
-const FARTHEST: f64 = 10.0;
+const FARTHEST_MOVE: f64 = 10.0;
 
 /// A holder somewhere along a vein. It holds a stretch, or a point, where that is in the natural
 /// leaf (every vein in its rest shape from its base), moved by a given displacement.
@@ -45,13 +45,13 @@ impl Scenario {
 
 impl Item<'_> {
     /// One of the words of a [`Hold`].
-    pub(super) fn hold(&self) -> Result<Hold> {
+    pub(super) fn hold(&self) -> ScenarioResult<Hold> {
         self.word("must be \"pinned\" (the position is held) or \"clamped\" (the directions, too)")
     }
 }
 
 /// Reads `leaf.base_held`.
-pub(super) fn of_bases(entries: &Entries) -> Result<Hold> {
+pub(super) fn of_bases(entries: &Entries) -> ScenarioResult<Hold> {
     let item = entries.item(Key::BaseHeld)?;
     let held = item.hold()?;
     item.ensure(
@@ -63,16 +63,16 @@ pub(super) fn of_bases(entries: &Entries) -> Result<Hold> {
 
 /// Reads `[[grip]]` of a leaf of these rods. `shared`: whether the tip is one that several rods
 /// share, or that is held.
-pub(super) fn grips(entries: &Entries, rods: &[Rod], shared: bool) -> Result<Vec<Grip>> {
+pub(super) fn grips(entries: &Entries, rods: &[Rod], shared: bool) -> ScenarioResult<Vec<Grip>> {
     let count = entries.rows("grip").unwrap_or(0);
     let grips: Vec<Grip> = (0..count)
         .map(|row| grip(entries, row, rods, shared))
-        .collect::<Result<_>>()?;
+        .collect::<ScenarioResult<_>>()?;
     refuse_overlaps(entries, &grips)?;
     Ok(grips)
 }
 
-fn grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> Result<Grip> {
+fn grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> ScenarioResult<Grip> {
     let item = |key| entries.item_of(key, row);
     let place = item(Key::GripAt)?;
     let at = place.stretch()?;
@@ -83,8 +83,8 @@ fn grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> Result<Gri
     let way = item(Key::GripMove)?;
     let [x, y, z] = way.vector()?;
     way.ensure(
-        x.hypot(y).hypot(z) <= FARTHEST * longest(rods),
-        format_args!("must be at most {FARTHEST} times the longest rod"),
+        x.hypot(y).hypot(z) <= FARTHEST_MOVE * longest(rods),
+        format_args!("must be at most {FARTHEST_MOVE} times the longest rod"),
     )?;
     Ok(Grip {
         vein: item(Key::GripVein)?.whole(rods.len())? - 1,
@@ -95,7 +95,7 @@ fn grip(entries: &Entries, row: usize, rods: &[Rod], shared: bool) -> Result<Gri
 }
 
 /// No point has two holders.
-fn refuse_overlaps(entries: &Entries, grips: &[Grip]) -> Result<()> {
+fn refuse_overlaps(entries: &Entries, grips: &[Grip]) -> ScenarioResult<()> {
     let mut order: Vec<usize> = (0..grips.len()).collect();
     let begin = |grip: &Grip| (grip.vein, grip.at[0]);
     order.sort_by(|&a, &b| {

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use toml::Value;
 
 use super::entries::Entries;
-use super::error::{Result, ScenarioError};
+use super::error::{ScenarioResult, ScenarioError};
 use super::excerpt::shorten;
 use super::form::{Form, LeftOut, Range};
 use super::key::Key;
@@ -47,12 +47,12 @@ impl Entries {
     }
 
     /// The value of a key as given, or its default.
-    pub(super) fn item(&self, key: Key) -> Result<Item<'_>> {
+    pub(super) fn item(&self, key: Key) -> ScenarioResult<Item<'_>> {
         self.item_of(key, 0)
     }
 
     /// The same in one of its tables, if there may be several.
-    pub(super) fn item_of(&self, key: Key, row: usize) -> Result<Item<'_>> {
+    pub(super) fn item_of(&self, key: Key, row: usize) -> ScenarioResult<Item<'_>> {
         match self.get(key, row) {
             Some(value) => Ok(Item {
                 entries: self,
@@ -140,7 +140,7 @@ impl<'e> Item<'e> {
 
     /// The two lists, `at` and `other`, of a table that may have no others. `form`
     /// describes such a table.
-    pub(super) fn pair(&self, other: &'static str, form: &str) -> Result<[Item<'e>; 2]> {
+    pub(super) fn pair(&self, other: &'static str, form: &str) -> ScenarioResult<[Item<'e>; 2]> {
         let Some(table) = self.value.as_table() else {
             return Err(self.refuse(format_args!("must be a table: {form}")));
         };
@@ -161,7 +161,7 @@ impl<'e> Item<'e> {
     }
 
     /// Refuses this value unless a condition `holds`.
-    pub(super) fn ensure(&self, holds: bool, problem: impl Display) -> Result<()> {
+    pub(super) fn ensure(&self, holds: bool, problem: impl Display) -> ScenarioResult<()> {
         match holds {
             true => Ok(()),
             false => Err(self.refuse(problem)),
@@ -192,22 +192,22 @@ impl<'e> Item<'e> {
         }
     }
 
-    pub(super) fn text(&self) -> Result<&'e str> {
+    pub(super) fn text(&self) -> ScenarioResult<&'e str> {
         (self.value.as_str()).ok_or_else(|| self.refuse("must be text in quotes"))
     }
 
     /// One of the words that `allowed` names.
-    pub(super) fn word<T: FromStr>(&self, allowed: &str) -> Result<T> {
+    pub(super) fn word<T: FromStr>(&self, allowed: &str) -> ScenarioResult<T> {
         let word = self.value.as_str().and_then(|word| word.parse().ok());
         word.ok_or_else(|| self.refuse(allowed))
     }
 
-    pub(super) fn switch(&self) -> Result<bool> {
+    pub(super) fn switch(&self) -> ScenarioResult<bool> {
         (self.value.as_bool()).ok_or_else(|| self.refuse("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
-    pub(super) fn whole(&self, most: usize) -> Result<usize> {
+    pub(super) fn whole(&self, most: usize) -> ScenarioResult<usize> {
         let whole = self.value.as_integer();
         let whole = whole.and_then(|whole| usize::try_from(whole).ok());
         let whole = whole.filter(|whole| (1..=most).contains(whole));
@@ -224,11 +224,11 @@ impl<'e> Item<'e> {
     }
 
     /// A number in the range of its key.
-    pub(super) fn number(&self) -> Result<f64> {
+    pub(super) fn number(&self) -> ScenarioResult<f64> {
         self.number_in(self.key().form().range())
     }
 
-    pub(super) fn number_in(&self, range: Range) -> Result<f64> {
+    pub(super) fn number_in(&self, range: Range) -> ScenarioResult<f64> {
         let value = number(self.value);
         let value = value.ok_or_else(|| match self.number_meant() {
             Some(meant) => self.refuse(format_args!("must be a number: {meant}")),
@@ -254,7 +254,7 @@ impl<'e> Item<'e> {
     }
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
-    pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
+    pub(super) fn one_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
         if number(self.value).is_some() || self.number_meant().is_some() {
             return Ok(vec![self.number()?; count]);
         }
@@ -272,7 +272,7 @@ impl<'e> Item<'e> {
     }
 
     /// A profile for each of `rods` rods.
-    pub(super) fn quantity(&self, rods: usize) -> Result<Vec<Profile>> {
+    pub(super) fn quantity(&self, rods: usize) -> ScenarioResult<Vec<Profile>> {
         if !self.value.is_table() {
             let numbers = self.one_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
@@ -289,16 +289,16 @@ impl<'e> Item<'e> {
     }
 
     /// Knots and the numbers there, of a profile that is not one per rod.
-    pub(super) fn knots(&self) -> Result<(Vec<f64>, Vec<f64>)> {
+    pub(super) fn knots(&self) -> ScenarioResult<(Vec<f64>, Vec<f64>)> {
         let [at, value] = self.pair("value", PROFILE_IS)?;
         let at = at.increasing(true)?;
         let list = value.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
-        let value = list.map(|item| item.number()).collect::<Result<_>>()?;
+        let value = list.map(|item| item.number()).collect::<ScenarioResult<_>>()?;
         Ok((at, value))
     }
 
     /// A profile that has these values at the knots `at`.
-    fn linear(&self, at: &[f64]) -> Result<Profile> {
+    fn linear(&self, at: &[f64]) -> ScenarioResult<Profile> {
         // Infinity cannot be interpolated between knots.
         let range = match self.key().form().range() {
             Range::PositiveOrInfinite => Range::Positive,
@@ -307,22 +307,22 @@ impl<'e> Item<'e> {
         let values = self.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = values
             .map(|item| item.number_in(range))
-            .collect::<Result<_>>()?;
+            .collect::<ScenarioResult<_>>()?;
         let at = at.to_vec();
         Ok(Profile::Linear { at, value })
     }
 
     /// A factor in time.
-    pub(super) fn factors_in_time(&self) -> Result<Schedule<f64>> {
+    pub(super) fn factors_in_time(&self) -> ScenarioResult<Schedule<f64>> {
         let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
         let at = at.increasing(false)?;
         let value = factor.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
-        let value = value.map(|item| item.number()).collect::<Result<_>>()?;
+        let value = value.map(|item| item.number()).collect::<ScenarioResult<_>>()?;
         Ok(Schedule { at, value })
     }
 
     /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
-    pub(super) fn increasing(&self, fractions: bool) -> Result<Vec<f64>> {
+    pub(super) fn increasing(&self, fractions: bool) -> ScenarioResult<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -359,7 +359,7 @@ impl<'e> Item<'e> {
     pub(super) fn array(
         &self,
         needed: &str,
-    ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+    ) -> ScenarioResult<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
         let Some(list) = self.value.as_array() else {
             return Err(self.refuse(format_args!("must be {needed}")));
         };
@@ -374,7 +374,7 @@ impl<'e> Item<'e> {
         count: usize,
         because: &str,
         needed: &str,
-    ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+    ) -> ScenarioResult<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
         let list = self.array(needed)?;
         let found = list.len();
         self.ensure(

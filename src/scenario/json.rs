@@ -181,7 +181,7 @@ impl Scenario {
         let wind = self.wind.as_ref()?;
         Some(match key {
             Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
-            Key::WindVelocity => schedule(&wind.velocity, "value", list),
+            Key::WindVelocity => schedule_value(&wind.velocity, "value", list),
             Key::WindDensity => number(wind.density),
             Key::WindDrag => number(wind.drag),
             _ => quantity(wind.width.iter()),
@@ -383,10 +383,10 @@ fn in_time<T: Copy + PartialEq>(
     written: impl Fn(T) -> Value,
 ) -> Option<Value> {
     let constant = *schedule == Schedule::constant(at_rest);
-    (!constant).then(|| self::schedule(schedule, name, written))
+    (!constant).then(|| schedule_value(schedule, name, written))
 }
 
-fn schedule<T: Copy>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
+fn schedule_value<T: Copy>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
     let values: Value = of.value.iter().map(|&value| written(value)).collect();
     json!({ "at": of.at, name: values })
 }

@@ -7,7 +7,7 @@ use super::bounds::{
     smallest_unit, softest,
 };
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::form::Form;
 use super::item::{Item, MAGNITUDES};
 use super::key::Key;
@@ -77,7 +77,7 @@ const TOO_MANY: &str =
 const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
-pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
+pub(super) fn check(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     magnitudes(entries, scenario)?;
     rods(entries, &scenario.rods)?;
     for (key, load, limit) in [
@@ -92,11 +92,11 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     dynamics(entries, scenario)?;
     masses(entries, scenario)?;
     in_time(entries, scenario)?;
-    load_limits::check(entries, scenario)
+    load_limits::check_loads(entries, scenario)
 }
 
 /// Refuses stiffnesses and masses that are too large or too small, where they follow from a size.
-fn magnitudes(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn magnitudes(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let Some(size) = material::size(entries) else {
         return Ok(());
     };
@@ -116,7 +116,7 @@ fn magnitudes(entries: &Entries, scenario: &Scenario) -> Result<()> {
     tissue.try_for_each(|profile| is_moderate(size, profile))
 }
 
-fn is_moderate(item: Item, profile: &Profile) -> Result<()> {
+fn is_moderate(item: Item, profile: &Profile) -> ScenarioResult<()> {
     for value in extremes(profile) {
         item.ensure(
             MAGNITUDES.contains(&value),
@@ -129,7 +129,7 @@ fn is_moderate(item: Item, profile: &Profile) -> Result<()> {
     Ok(())
 }
 
-fn rods(entries: &Entries, rods: &[Rod]) -> Result<()> {
+fn rods(entries: &Entries, rods: &[Rod]) -> ScenarioResult<()> {
     // The outline of a blade determines lengths and shapes.
     let outline = |key: Key| match key.follows_from_blade() {
         true => entries.given(Key::BladeWidth),
@@ -173,7 +173,7 @@ fn rods(entries: &Entries, rods: &[Rod]) -> Result<()> {
     Ok(())
 }
 
-fn coupling(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn coupling(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let gaps = scenario.coupling.iter().zip(scenario.rods.windows(2));
     for (gap, (stiffness, rods)) in gaps.enumerate() {
         let [one, other] = [softest(&rods[0]), softest(&rods[1])];
@@ -190,7 +190,7 @@ fn coupling(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn dynamics(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn dynamics(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let (scale, time) = (scenario.scale(), scenario.time());
     for (key, limit) in &DYNAMICS {
         let Some(item) = entries.given(*key) else {
@@ -207,7 +207,7 @@ fn dynamics(entries: &Entries, scenario: &Scenario) -> Result<()> {
 }
 
 /// Masses that follow from sections.
-fn masses(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn masses(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let mass = [Key::MassDensity, Key::BladeMassDensity];
     let mass = mass.into_iter().find_map(|key| entries.given(key));
     let (Some(size), Some(density)) = (material::size(entries), mass) else {
@@ -229,7 +229,7 @@ fn masses(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn in_time(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
     if let Some(item) = entries.given(Key::OutputInterval) {
         // Rounding of the quotient must not count as an output.

@@ -4,7 +4,7 @@ use super::bounds::{
     GRAVITY, Limit, TIME, TIP_FORCE, TIP_MOMENT, UNIT, most, near_one, norm, smallest_unit, softest,
 };
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::key::Key;
 use super::{Profile, Rod, Scale, Scenario, longest};
 
@@ -19,7 +19,7 @@ const PULLED_POINT: Limit = most("|g| m L^2/A", 1e8, HEAVY);
 const MASS: Limit = most("m/(rho_mean L)", 1e12, UNIT);
 const DRAG: Limit = most("rho C_D w |U|^2 L^3/(2 A)", 1e8, STORM);
 const VELOCITY: Limit = most("|U| T/L", 1e12, UNIT);
-const WIDTH: Limit = near_one("w/L", 1e6, WIDE);
+const WIDTH: Limit = near_one("w/L", 1e6, WIDE_LOAD);
 
 const FAR: &str = "L is the longest rod; \
      beyond the limit positions lose digits: choose an origin closer to the leaf";
@@ -29,9 +29,9 @@ const HEAVY: &str = "A is the smallest bending stiffness of a rod, L its length 
      length; beyond the limit bending is confined to less than 1e-4 of the length: check both units";
 const STORM: &str = "A is the smallest bending stiffness of a rod and L its length; \
      beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity";
-const WIDE: &str = "L is the longest rod: choose one closer to the width of a rod";
+const WIDE_LOAD: &str = "L is the longest rod: choose one closer to the width of a rod";
 
-pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
+pub(super) fn check_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     bases(entries, scenario)?;
     tissue(entries, scenario)?;
     weights(entries, scenario)?;
@@ -40,7 +40,7 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> Result<()> {
     wind(entries, scenario)
 }
 
-fn bases(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn bases(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let Some(item) = entries.given(Key::Base) else {
         return Ok(());
     };
@@ -49,7 +49,7 @@ fn bases(entries: &Entries, scenario: &Scenario) -> Result<()> {
     rods.try_for_each(|rod| BASE.check(item, norm(rod.base) / longest))
 }
 
-fn tissue(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn tissue(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let gaps = scenario
         .tissue
         .iter()
@@ -89,7 +89,7 @@ fn tissue(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn weights(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let unit = smallest_unit(Key::Gravity, &scenario.rods);
     if let Some(item) = entries.given(Key::Gravity) {
         GRAVITY.check(item, norm(scenario.gravity) / unit)?;
@@ -107,7 +107,7 @@ fn weights(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn distributed(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn distributed(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let Some(item) = entries.given(Key::Distributed) else {
         return Ok(());
     };
@@ -120,7 +120,7 @@ fn distributed(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn points(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn points(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let unit = |key| smallest_unit(key, &scenario.rods);
     let (force, moment) = (unit(Key::PointForce), unit(Key::PointMoment));
     let mass = scenario.unit(Key::PointMass);
@@ -135,7 +135,7 @@ fn points(entries: &Entries, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-fn wind(entries: &Entries, scenario: &Scenario) -> Result<()> {
+fn wind(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let Some(wind) = &scenario.wind else {
         return Ok(());
     };

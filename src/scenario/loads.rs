@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::{Profile, Scenario};
@@ -138,7 +138,7 @@ impl Scenario {
 
 /// Reads `load.gravity`: the weight that all rods share, and their own besides; empty if these do
 /// not differ.
-pub(super) fn gravity(entries: &Entries, rods: usize) -> Result<([f64; 3], Vec<[f64; 3]>)> {
+pub(super) fn gravity(entries: &Entries, rods: usize) -> ScenarioResult<([f64; 3], Vec<[f64; 3]>)> {
     let item = entries.item(Key::Gravity)?;
     let each = item.vectors(rods)?;
     let first = each.first().copied().unwrap_or([0.0; 3]);
@@ -153,7 +153,7 @@ pub(super) fn gravity(entries: &Entries, rods: usize) -> Result<([f64; 3], Vec<[
 }
 
 /// Reads `load.g`, which needs a mass.
-pub(super) fn g(entries: &Entries) -> Result<[f64; 3]> {
+pub(super) fn g(entries: &Entries) -> ScenarioResult<[f64; 3]> {
     let item = entries.item(Key::G)?;
     let g = item.vector()?;
     let masses = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
@@ -167,7 +167,7 @@ pub(super) fn g(entries: &Entries) -> Result<[f64; 3]> {
 }
 
 /// Reads `load.distributed`; `None` if it is left out or zero.
-pub(super) fn distributed(entries: &Entries, rods: usize) -> Result<Option<Vec<[Profile; 3]>>> {
+pub(super) fn distributed(entries: &Entries, rods: usize) -> ScenarioResult<Option<Vec<[Profile; 3]>>> {
     let Some(item) = entries.given(Key::Distributed) else {
         return Ok(None);
     };
@@ -177,12 +177,12 @@ pub(super) fn distributed(entries: &Entries, rods: usize) -> Result<Option<Vec<[
 }
 
 /// Reads `[[load.point]]`.
-pub(super) fn points(entries: &Entries, rods: usize) -> Result<Vec<PointLoad>> {
+pub(super) fn points(entries: &Entries, rods: usize) -> ScenarioResult<Vec<PointLoad>> {
     let count = entries.rows("load.point").unwrap_or(0);
     (0..count).map(|row| point(entries, row, rods)).collect()
 }
 
-fn point(entries: &Entries, row: usize, rods: usize) -> Result<PointLoad> {
+fn point(entries: &Entries, row: usize, rods: usize) -> ScenarioResult<PointLoad> {
     let item = |key| entries.item_of(key, row);
     let turned = item(Key::PointMoment)?;
     let moment = turned.vector()?;
@@ -197,7 +197,7 @@ fn point(entries: &Entries, row: usize, rods: usize) -> Result<PointLoad> {
 }
 
 /// Refuses moments on more than one rod.
-pub(super) fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> Result<()> {
+pub(super) fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> ScenarioResult<()> {
     let allowed = rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]);
     let (what, why) = match item.key() {
         Key::PointMoment => ("on a point", "a dead moment has no potential"),

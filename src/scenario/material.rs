@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Profile;
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::outline::Outline;
@@ -23,7 +23,7 @@ pub(super) fn profiles(sections: &[Arc<Section>], property: Property) -> Vec<Pro
 }
 
 /// The sections of the rods, which determine the stiffnesses; `None` if there is no such table.
-pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<Section>>>> {
+pub(super) fn sections(entries: &Entries, rods: usize) -> ScenarioResult<Option<Vec<Arc<Section>>>> {
     let mut table = Key::all().filter(|key| key.parts().0 == "section");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
@@ -66,7 +66,7 @@ pub(super) fn sections(entries: &Entries, rods: usize) -> Result<Option<Vec<Arc<
 }
 
 /// Refuses flat sections of auxetic materials, for which Cowper's formula has no meaning.
-fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
+fn check(entries: &Entries, sections: &[Arc<Section>]) -> ScenarioResult<()> {
     for (rod, section) in sections.iter().enumerate() {
         entries.item(Key::Poisson)?.entry(rod).ensure(
             section.shear_factors().all(|k| k > 0.0 && k <= 1.0),
@@ -79,7 +79,7 @@ fn check(entries: &Entries, sections: &[Arc<Section>]) -> Result<()> {
 }
 
 /// The outline, and the keys of its two sides.
-fn outline(entries: &Entries) -> Result<(Outline, [Key; 2])> {
+fn outline(entries: &Entries) -> ScenarioResult<(Outline, [Key; 2])> {
     let item = entries.item(Key::SectionShape)?;
     let outline = item.word("must be \"circle\", \"ellipse\" or \"rectangle\"")?;
     let (sides, diameter) = ([Key::Width, Key::Thickness], [Key::Diameter; 2]);
@@ -101,7 +101,7 @@ fn hollow(
     entries: &Entries,
     outline: Outline,
     [width, thickness]: [&[Profile]; 2],
-) -> Result<Option<Vec<Hollow>>> {
+) -> ScenarioResult<Option<Vec<Hollow>>> {
     let (bore, wall) = (entries.given(Key::InnerDiameter), entries.given(Key::Wall));
     let Some(item) = bore.or(wall) else {
         return Ok(None);
@@ -140,7 +140,7 @@ fn hollow(
     Ok(Some(profiles.into_iter().map(of).collect()))
 }
 
-pub(super) fn poisson(item: Item, rods: usize) -> Result<Vec<Profile>> {
+pub(super) fn poisson(item: Item, rods: usize) -> ScenarioResult<Vec<Profile>> {
     let poisson = item.quantity(rods)?;
     for (rod, profile) in poisson.iter().enumerate() {
         let most = profile.scaled(-1.0).min();

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::form::Range;
 use super::item::Item;
 use super::key::Key;
@@ -82,7 +82,7 @@ impl PhotoRate {
 }
 
 /// Reads `[photo]`; `None` if there is no such table.
-pub(super) fn photo(entries: &Entries) -> Result<Option<Photo>> {
+pub(super) fn photo(entries: &Entries) -> ScenarioResult<Option<Photo>> {
     let mut table = Key::all().filter(|key| key.parts().0 == "photo");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
@@ -107,7 +107,7 @@ pub(super) fn photo(entries: &Entries) -> Result<Option<Photo>> {
 }
 
 /// The length of a pixel, as given or by a ruler in the picture.
-fn scale(entries: &Entries) -> Result<f64> {
+fn scale(entries: &Entries) -> ScenarioResult<f64> {
     let ruler = [Key::RulerFrom, Key::RulerTo, Key::RulerLength];
     let given = ruler.into_iter().find(|key| entries.is_given(*key));
     match (entries.given(Key::PhotoScale), given) {
@@ -129,7 +129,7 @@ fn scale(entries: &Entries) -> Result<f64> {
     }
 }
 
-fn pixel(item: Item) -> Result<[f64; 2]> {
+fn pixel(item: Item) -> ScenarioResult<[f64; 2]> {
     let needed = "a list of two numbers: pixels to the right, and down";
     let mut pixel = [0.0; 2];
     let numbers = item.list_of(2, "pixels to the right, and down", needed)?;
@@ -139,7 +139,7 @@ fn pixel(item: Item) -> Result<[f64; 2]> {
     Ok(pixel)
 }
 
-fn direction(item: Item) -> Result<DVec3> {
+fn direction(item: Item) -> ScenarioResult<DVec3> {
     let (sign, axis) = match item.text()?.strip_prefix('-') {
         Some(axis) => (-1.0, axis),
         None => (1.0, item.text()?),

@@ -7,7 +7,7 @@ use serde_json::Value as Json;
 use toml::de::{DeTable, DeValue, Error};
 use toml::{Spanned, Table, Value};
 
-use super::error::{Place, Result, ScenarioError};
+use super::error::{Place, ScenarioResult, ScenarioError};
 use super::excerpt::{line_of, shorten, snippet};
 use super::key::{Key, split};
 use super::part::Part;
@@ -34,7 +34,7 @@ pub(super) struct Spans {
 
 impl Source {
     /// Parses TOML, or the JSON of a scenario or of a result with its `input`.
-    pub fn parse(text: &str, file: &str) -> Result<(Source, Table)> {
+    pub fn parse(text: &str, file: &str) -> ScenarioResult<(Source, Table)> {
         // A mark that some editors write.
         let text = text.trim_start_matches('\u{feff}');
         let mut source = Source {
@@ -196,7 +196,7 @@ struct Outcome {
 }
 
 /// A scenario in JSON, or the `input` of a result.
-fn from_json(text: &str, file: &str) -> Result<Table> {
+fn from_json(text: &str, file: &str) -> ScenarioResult<Table> {
     let refuse = |line: Option<usize>, problem| ScenarioError::in_file(file, line, problem);
     let at = |error: serde_json::Error, what: &str| {
         refuse(Some(error.line()), format!("{what}: {error}"))

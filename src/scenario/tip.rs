@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DQuat;
 
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::{Rod, longest};
@@ -43,7 +43,7 @@ impl Clamp {
 }
 
 /// Reads `[tip]` of a leaf of these rods; `None` if the tips are free.
-pub(super) fn held(entries: &Entries, rods: &[Rod], joined: bool) -> Result<Option<HeldTip>> {
+pub(super) fn held(entries: &Entries, rods: &[Rod], joined: bool) -> ScenarioResult<Option<HeldTip>> {
     let item = entries.item(Key::TipHeld)?;
     let word = item.text()?;
     let clamped = word == "clamped";
@@ -105,7 +105,7 @@ pub(super) fn held(entries: &Entries, rods: &[Rod], joined: bool) -> Result<Opti
 }
 
 /// Refuses positions that the rods cannot reach.
-fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<()> {
+fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> ScenarioResult<()> {
     let distance_from = |rod: &Rod| {
         let [from_x, from_y, from_z] = rod.base;
         (x - from_x).hypot(y - from_y).hypot(z - from_z)

@@ -2,7 +2,7 @@
 
 use super::Profile;
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::key::Key;
 
 /// Tissue that fills the gap between two neighbouring veins and turns with them. It is without
@@ -35,7 +35,7 @@ impl Tissue {
 }
 
 /// Reads `[tissue]` of a leaf with so many gaps; `None` if no gap has any.
-pub(super) fn tissue(entries: &Entries, gaps: usize) -> Result<Option<Vec<Tissue>>> {
+pub(super) fn tissue(entries: &Entries, gaps: usize) -> ScenarioResult<Option<Vec<Tissue>>> {
     let mut tissue = vec![Tissue::default(); gaps];
     for (which, key) in Key::TISSUE.into_iter().enumerate() {
         let Some(item) = entries.given(key) else {

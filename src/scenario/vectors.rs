@@ -1,12 +1,12 @@
 //! Vectors, and places along a rod, as values of keys.
 
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::form::{Form, Range};
 use super::item::{Item, ONE_PER_KNOT, ONE_PER_ROD};
 use super::values::number;
 use super::{Profile, Schedule};
 
-const PROFILE_IS: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
+const VECTOR_PROFILE_IS: &str = "a load along the rods is a list [x, y, z], one such list per rod, or \
      { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 const LOAD_IN_TIME: &str =
     "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
@@ -14,7 +14,7 @@ const VECTORS: &str = "a list of lists of three numbers [x, y, z]";
 
 impl Item<'_> {
     /// Three numbers.
-    pub(super) fn vector(&self) -> Result<[f64; 3]> {
+    pub(super) fn vector(&self) -> ScenarioResult<[f64; 3]> {
         let needed = "a list of three numbers [x, y, z]";
         let mut vector = [0.0; 3];
         let components = self.list_of(3, "one per axis x, y, z", needed)?;
@@ -25,7 +25,7 @@ impl Item<'_> {
     }
 
     /// A vector for each of `rods` rods: one for all, or a list.
-    pub(super) fn vectors(&self, rods: usize) -> Result<Vec<[f64; 3]>> {
+    pub(super) fn vectors(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {
             let each = self.list_of(rods, ONE_PER_ROD, VECTORS)?;
             return each.map(|item| item.vector()).collect();
@@ -40,16 +40,16 @@ impl Item<'_> {
     }
 
     /// A vector along each of `rods` rods, one profile for each component.
-    pub(super) fn vector_profiles(&self, rods: usize) -> Result<Vec<[Profile; 3]>> {
+    pub(super) fn vector_profiles(&self, rods: usize) -> ScenarioResult<Vec<[Profile; 3]>> {
         if !self.value.is_table() {
             let each = self.vectors(rods)?.into_iter();
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
-        let [at, value] = self.pair("value", PROFILE_IS)?;
+        let [at, value] = self.pair("value", VECTOR_PROFILE_IS)?;
         let at = at.increasing(true)?;
-        let profiles = |list: Item| -> Result<[Profile; 3]> {
+        let profiles = |list: Item| -> ScenarioResult<[Profile; 3]> {
             let each = list.list_of(at.len(), ONE_PER_KNOT, VECTORS)?;
-            let each: Vec<[f64; 3]> = each.map(|item| item.vector()).collect::<Result<_>>()?;
+            let each: Vec<[f64; 3]> = each.map(|item| item.vector()).collect::<ScenarioResult<_>>()?;
             Ok([0, 1, 2].map(|axis| Profile::Linear {
                 at: at.clone(),
                 value: each.iter().map(|vector| vector[axis]).collect(),
@@ -66,19 +66,19 @@ impl Item<'_> {
     }
 
     /// A load in time; of some keys, or one that is always the same.
-    pub(super) fn vectors_in_time(&self) -> Result<Schedule<[f64; 3]>> {
+    pub(super) fn vectors_in_time(&self) -> ScenarioResult<Schedule<[f64; 3]>> {
         if self.key().form() == Form::VectorOrInTime && self.value.is_array() {
             return Ok(Schedule::constant(self.vector()?));
         }
         let [at, value] = self.pair("value", LOAD_IN_TIME)?;
         let at = at.increasing(false)?;
         let value = value.list_of(at.len(), ONE_PER_KNOT, VECTORS)?;
-        let value = value.map(|item| item.vector()).collect::<Result<_>>()?;
+        let value = value.map(|item| item.vector()).collect::<ScenarioResult<_>>()?;
         Ok(Schedule { at, value })
     }
 
     /// A fraction of the length behind the base.
-    pub(super) fn fraction(&self) -> Result<f64> {
+    pub(super) fn fraction(&self) -> ScenarioResult<f64> {
         let at = self.number_in(Range::Finite)?;
         self.ensure(
             at > 0.0 && at <= 1.0,
@@ -88,7 +88,7 @@ impl Item<'_> {
     }
 
     /// A stretch of a rod, `[from, to]`, or one point of it.
-    pub(super) fn stretch(&self) -> Result<[f64; 2]> {
+    pub(super) fn stretch(&self) -> ScenarioResult<[f64; 2]> {
         if number(self.value).is_some() {
             return Ok([self.fraction()?; 2]);
         }

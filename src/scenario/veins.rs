@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::blade::{Blade, BladeProperty, Parts, blade};
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::item::Item;
 use super::key::Key;
 use super::material;
@@ -21,7 +21,7 @@ pub(super) enum Made {
 }
 
 impl Made {
-    pub fn from(entries: &Entries, rods: usize) -> Result<Made> {
+    pub fn from(entries: &Entries, rods: usize) -> ScenarioResult<Made> {
         if let Some(blade) = blade(entries, rods)? {
             let parts = blade.parts();
             return Ok(Made::Blade(Arc::new(blade), parts));
@@ -57,7 +57,7 @@ impl Made {
 }
 
 /// Whether the tips are joined: those of a blade are if it ends in a point.
-pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> Result<bool> {
+pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> ScenarioResult<bool> {
     let item = entries.item(Key::Joined)?;
     let Some(blade) = blade else {
         return item.switch();
@@ -73,9 +73,9 @@ pub(super) fn joined(entries: &Entries, blade: Option<&Arc<Blade>>) -> Result<bo
     Ok(joined)
 }
 
-pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<Rod>> {
+pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> ScenarioResult<Vec<Rod>> {
     let quantity = |key| entries.item(key)?.quantity(rods);
-    let triple = |keys: [Key; 3], of: fn(usize) -> Property| -> Result<[Vec<Profile>; 3]> {
+    let triple = |keys: [Key; 3], of: fn(usize) -> Property| -> ScenarioResult<[Vec<Profile>; 3]> {
         let one = |axis: usize| match made.profiles(of(axis)) {
             Some(profiles) => Ok(profiles),
             None => quantity(keys[axis]),
@@ -133,7 +133,7 @@ pub(super) fn veins(entries: &Entries, rods: usize, made: &Made) -> Result<Vec<R
 }
 
 /// Base angles phi_n of the rods n = 1..N (paper, section 2.4 (c)).
-fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
+fn angles(item: Item, rods: usize) -> ScenarioResult<Vec<f64>> {
     let step = PI / (3.0 * rods as f64);
     // -pi/3 + 2 pi n / (3N) = step (2n - N); with n - 1/2 the fan is exactly antisymmetric.
     let fan = |odd: f64| {

@@ -1,7 +1,7 @@
 //! Wind: the table `[wind]`.
 
 use super::entries::Entries;
-use super::error::Result;
+use super::error::ScenarioResult;
 use super::key::Key;
 use super::{Profile, Schedule};
 
@@ -20,7 +20,7 @@ pub struct Wind {
 }
 
 /// Reads `[wind]`; `None` if there is no such table.
-pub(super) fn wind(entries: &Entries, rods: usize) -> Result<Option<Wind>> {
+pub(super) fn wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
     let mut table = Key::all().filter(|key| key.parts().0 == "wind");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);

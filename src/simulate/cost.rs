@@ -2,7 +2,7 @@
 //! measured times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, Method, Physics, SemiImplicit, Steps};
+use crate::motion::{Explicit, TimeIntegrator, Physics, SemiImplicit, Steps};
 use serde::Serialize;
 
 /// Measured seconds of an explicit step: in all, and per segment.

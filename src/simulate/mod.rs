@@ -47,7 +47,7 @@ use std::time::Duration;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::limit::Limit;
-use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
+use crate::motion::{Explicit, TimeIntegrator, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
 use crate::relax::{self, Equilibrium, Follower, RelaxError};
 use crate::scenario::{Scenario, slips};
 use crate::words;
@@ -97,7 +97,7 @@ pub struct Simulation {
     doubts: Vec<String>,
     stable: Option<StableStep>,
     step: Option<f64>,
-    method: Box<dyn Method + Send>,
+    method: Box<dyn TimeIntegrator + Send>,
     tolerance: f64,
     outputs: usize,
     made: usize,
@@ -189,7 +189,7 @@ impl Simulation {
         }
         let mut step = options.step;
         let mut stable = None;
-        let mut method: Box<dyn Method + Send> = match choice.scheme {
+        let mut method: Box<dyn TimeIntegrator + Send> = match choice.scheme {
             Scheme::Explicit => {
                 let (explicit, bound) = match begun {
                     Some(begun) => begun,

@@ -1,7 +1,7 @@
 //! Pulses of loads and rest curvatures, however much shorter than a step, have their impulse
 //! and their work by both methods.
 
-use leafdyn::internals::motion::{Method, Physics, Snapshot, Steps};
+use leafdyn::internals::motion::{TimeIntegrator, Physics, Snapshot, Steps};
 use leafdyn_testing::motion::*;
 use leafdyn_testing::{DVec3, Leaf, Schedule, table};
 
@@ -90,7 +90,7 @@ fn short_and_long_steps_agree() {
         };
         let leaf = Leaf::new(&scenario);
         let state = rest(&scenario, 4);
-        let after = |mut method: Box<dyn Method>| {
+        let after = |mut method: Box<dyn TimeIntegrator>| {
             let start = method.snapshot().energy.balance();
             method.advance(0.4).unwrap();
             let now = method.snapshot();

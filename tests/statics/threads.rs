@@ -1,7 +1,7 @@
 //! Results do not depend on the number of threads, to the last bit: neither of
 //! relaxation, nor of shooting, nor of motion; nor on whether a motion is looked at on its way.
 
-use leafdyn::internals::motion::{Method, Snapshot, Steps};
+use leafdyn::internals::motion::{TimeIntegrator, Snapshot, Steps};
 use leafdyn::internals::shooting::{self, Start};
 use leafdyn_testing::motion::{explicit, released, semi_implicit};
 use leafdyn_testing::*;
@@ -97,7 +97,7 @@ fn bits_of_snapshot(now: &Snapshot) -> Vec<u64> {
     bits_of(numbers.chain(rotations).chain(energies).chain([now.time]))
 }
 
-fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn Method>; 2] {
+fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn TimeIntegrator>; 2] {
     let state = released(leaf, segments);
     let implicit = semi_implicit(leaf, &state, Steps::Error(1e-4));
     [Box::new(explicit(leaf, &state, None)), Box::new(implicit)]

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::internals::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
+use leafdyn::internals::motion::{Explicit, TimeIntegrator, Physics, SemiImplicit, Snapshot, Steps};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Grip, Hold, PointLoad, Profile, Scenario, Schedule, Tissue};
@@ -241,7 +241,7 @@ pub const SLENDER_VEINS: &str = r#"
 pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 
 /// A method at time 0 with steps of `h`.
-pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn Method> {
+pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn TimeIntegrator> {
     match scheme {
         Scheme::Explicit => Box::new(explicit(leaf, state, Some(h))),
         Scheme::SemiImplicit => Box::new(semi_implicit(leaf, state, Steps::Fixed(h))),

@@ -32,7 +32,7 @@ pub fn notes(record: &Record) -> Vec<String> {
     notes
 }
 
-pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
+pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;

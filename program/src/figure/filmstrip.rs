@@ -22,7 +22,7 @@ const PALE: Color = Color(240, 190, 176);
 /// Most points of the tip's path that are drawn between two panels.
 const MOST_PATH_POINTS: usize = 400;
 
-pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
+pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let name = format!("{}: instants of the motion", record.scenario);
     let stills = record.stills.iter();
@@ -99,7 +99,7 @@ mod tests {
         let scenario = sample::scenario("swing", 5);
         let mut record = sample::record(5, 8);
         let paths = |record: &Record| {
-            let svg = text(&draw(record, &scenario));
+            let svg = text(&draw_filmstrip(record, &scenario));
             [DOT, PALE].map(|color| svg.matches(&format!("stroke=\"{}\"", hex(color))).count())
         };
         // In all pictures but the first, or the first two, and in the key.

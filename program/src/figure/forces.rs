@@ -14,7 +14,7 @@ const SMALL_HEAD: [f64; 2] = [6.0, 2.6];
 /// From an arrow to the middle of its label.
 const GAP: f64 = 9.0;
 /// An arrow that is shorter on the page is seen end-on.
-const END_ON: f64 = 6.0;
+const ARROW_END_ON: f64 = 6.0;
 
 /// The arrow of a force on a rod.
 pub struct Force {
@@ -61,7 +61,7 @@ impl Force {
         let [tail, tip] = self.ends.map(place);
         let [length, half] = self.head;
         let along = (tip - tail).normalize_or_zero();
-        if (tip - tail).length() > END_ON {
+        if (tip - tail).length() > ARROW_END_ON {
             let (neck, side) = (tip - length * along, half * along.perp());
             page.line(tail, neck, Stroke::new(INK, 1.5));
             page.shape(polygon(&[tip, neck + side, neck - side]), INK, None);

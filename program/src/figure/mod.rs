@@ -49,9 +49,9 @@ pub mod veins;
 pub use boundary::draw as boundary;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
-pub use energy::draw as energy;
+pub use energy::draw_energies as energy;
 pub use film::write as film;
-pub use filmstrip::draw as filmstrip;
+pub use filmstrip::draw_filmstrip as filmstrip;
 pub use fit::draw as fit;
 pub use leaf::{draw as leaf, draw_equilibria as equilibria};
 pub use map::draw as map;
@@ -94,7 +94,7 @@ mod tests {
         ] {
             svg::text(&drawing);
             let mut bytes = Vec::new();
-            png::write(&drawing, &mut bytes).unwrap();
+            png::write_png(&drawing, &mut bytes).unwrap();
             let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
             let reader = reader.unwrap();
             assert_eq!(reader.info().width, 1800, "{}", drawing.description);

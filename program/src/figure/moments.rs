@@ -11,7 +11,7 @@ const RADIUS: f64 = 0.06;
 const ANGLE: f64 = 1.5 * PI;
 const PIECES: usize = 24;
 /// Length and half the width of its head, in pixels.
-const HEAD: [f64; 2] = [8.0, 3.4];
+const ARC_HEAD: [f64; 2] = [8.0, 3.4];
 
 /// A dead moment on a rod.
 pub struct Moment {
@@ -47,7 +47,7 @@ impl Moment {
         page.stroke(polyline(&points), Stroke::new(INK, 1.3));
         let end = points[PIECES];
         if let Some(along) = (end - points[PIECES - 1]).try_normalize() {
-            let [length, half] = HEAD;
+            let [length, half] = ARC_HEAD;
             let (tip, side) = (end + 0.5 * length * along, half * along.perp());
             let back = tip - length * along;
             page.shape(polygon(&[tip, back + side, back - side]), INK, None);

@@ -22,7 +22,7 @@ const DOTS_PER_METRE: u32 = 7559;
 /// Rows of a band; bands are painted in parallel.
 const BAND: u32 = 320;
 
-pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let [width, height] = size(drawing);
     let shapes = shapes(drawing);
     let starts = (0..height).step_by(BAND as usize);
@@ -203,7 +203,7 @@ mod tests {
         let (from, to) = (DVec2::new(0.0, 10.0), DVec2::new(300.0, 690.0));
         page.line(from, to, Stroke::new(INK, 4.0));
         let mut bytes = Vec::new();
-        write(&page, &mut bytes).unwrap();
+        write_png(&page, &mut bytes).unwrap();
         let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
         let mut reader = reader.unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];

@@ -105,11 +105,11 @@ pub struct Quantity {
 impl Quantity {
     /// The number of these keys, which are joined by `+` where several have one value.
     pub fn of(keys: &str, units: &Units) -> Quantity {
-        let parts: Vec<Part> = keys.split('+').map(Part::parse).collect();
+        let parts: Vec<KeyPart> = keys.split('+').map(KeyPart::parse).collect();
         let words = match alike_veins(&parts) {
             Some(words) => words,
             None => {
-                let words: Vec<String> = parts.iter().map(Part::words).collect();
+                let words: Vec<String> = parts.iter().map(KeyPart::words).collect();
                 match words.as_slice() {
                     [first, .., last] if words.len() > NAMED => format!("{first} = … = {last}"),
                     few => few.join(" = "),
@@ -127,7 +127,7 @@ impl Quantity {
 }
 
 /// A key as it is written: `scale:load.point[0].force[2]`, `rest.bend_2.value[1]`.
-struct Part<'t> {
+struct KeyPart<'t> {
     text: &'t str,
     scale: bool,
     path: String,
@@ -137,7 +137,7 @@ struct Part<'t> {
     named: Option<(&'static str, Entries)>,
 }
 
-impl<'t> Part<'t> {
+impl<'t> KeyPart<'t> {
     fn parse(text: &'t str) -> Self {
         let text = text.trim();
         let (scale, rest) = match text.strip_prefix("scale:") {
@@ -171,7 +171,7 @@ impl<'t> Part<'t> {
         // The row of a repeated table is an index of its name, before that of the key.
         let row = pieces.iter().rev().skip(1);
         let row = row.flat_map(|piece| &piece.1).next().copied();
-        Part {
+        KeyPart {
             named: named(&path).filter(|_| list.is_none_or(|it| ["value", "at"].contains(&it))),
             text,
             scale,
@@ -223,10 +223,10 @@ impl<'t> Part<'t> {
 }
 
 /// One number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
-fn alike_veins(parts: &[Part]) -> Option<String> {
+fn alike_veins(parts: &[KeyPart]) -> Option<String> {
     let first = parts.first().filter(|_| parts.len() > 1)?;
     let (words, entries) = first.named?;
-    let alike = |part: &Part| {
+    let alike = |part: &KeyPart| {
         let plain = part.list.is_none() && part.indices.len() == 1;
         plain && part.path == first.path && part.scale == first.scale
     };

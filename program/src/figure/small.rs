@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 const COLUMNS: usize = 4;
 /// Margin to the left and right of the panels.
 pub const SIDE: f64 = 22.0;
-const GAP: f64 = 12.0;
+const PANEL_GAP: f64 = 12.0;
 const LOWEST: f64 = 110.0;
 const HIGHEST: f64 = 330.0;
 const BOTTOM: f64 = 10.0;
@@ -47,7 +47,7 @@ impl<'s> SmallPanels<'s> {
         top: f64,
     ) -> Self {
         let bounds = common_box(shapes);
-        let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
+        let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * PANEL_GAP) / COLUMNS as f64;
         let extent = Camera::facing(OBLIQUE).extent(bounds);
         let height = (width - MARGINS.left - MARGINS.right) * extent.y / extent.x + MARGINS.below;
         let size = DVec2::new(width, height.clamp(LOWEST, HIGHEST));
@@ -69,7 +69,7 @@ impl<'s> SmallPanels<'s> {
 
     fn cell(&self, index: usize) -> Cell {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
-        let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
+        let pitch = self.size + DVec2::new(PANEL_GAP, PANEL_TITLE + PANEL_GAP);
         Cell::new(
             DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
             self.size,
@@ -78,7 +78,7 @@ impl<'s> SmallPanels<'s> {
 
     pub fn end(&self) -> f64 {
         let rows = self.count.div_ceil(COLUMNS).max(1);
-        let row = PANEL_TITLE + self.size.y + GAP;
+        let row = PANEL_TITLE + self.size.y + PANEL_GAP;
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::drawing::{Anchor, Color, Drawing, Label, Mark, Step};
 
-pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_svg(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let Drawing { width, height, .. } = drawing;
     writeln!(
         out,
@@ -104,7 +104,7 @@ pub fn escaped(text: &str) -> String {
 #[cfg(test)]
 pub fn text(drawing: &Drawing) -> String {
     let mut bytes = Vec::new();
-    write(drawing, &mut bytes).unwrap();
+    write_svg(drawing, &mut bytes).unwrap();
     let svg = String::from_utf8(bytes).unwrap();
     assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");

@@ -48,8 +48,8 @@ impl<R> Format<R> {
             Format::Figure(_, draw) => match Kind::of(name) {
                 // A browser makes its own from the vector image.
                 #[cfg(not(target_family = "wasm"))]
-                Kind::Png => png::write(&draw(result, input), out),
-                _ => svg::write(&draw(result, input), out),
+                Kind::Png => png::write_png(&draw(result, input), out),
+                _ => svg::write_svg(&draw(result, input), out),
             },
             Format::Space(_, write) => write(result, input, out),
             Format::Shapes(_, shapes) => vtk::list(name, &shapes(result), out),

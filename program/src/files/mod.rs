@@ -182,7 +182,7 @@ pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
 pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     if R::JSON == Some(name) {
-        json::write(document, &mut bytes).ok()?;
+        json::write_json(document, &mut bytes).ok()?;
         return Some(bytes);
     }
     let mut files = document.result.files(&Kind::ALL).into_iter();
@@ -207,7 +207,7 @@ pub fn write_all<R: Written>(
     let (json, others) = rayon::join(
         || {
             let name = R::JSON.filter(|_| kinds.contains(&Kind::Json))?;
-            Some(write_named(folder, name, |out| json::write(document, out)))
+            Some(write_named(folder, name, |out| json::write_json(document, out)))
         },
         || -> Vec<_> {
             let files = files.par_iter();

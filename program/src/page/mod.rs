@@ -172,8 +172,8 @@ pub fn moving(stations: &[f64], curves: &[Vec<DVec3>], page: &View) -> Leaf {
 fn assemble(view: &View, still: &Drawing) -> String {
     let (mut data, mut figure) = (Vec::new(), Vec::new());
     // Writing to memory cannot fail.
-    let _ = json::write(view, &mut data);
-    let _ = svg::write(still, &mut figure);
+    let _ = json::write_json(view, &mut data);
+    let _ = svg::write_svg(still, &mut figure);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     let figure = String::from_utf8_lossy(&figure).into_owned();

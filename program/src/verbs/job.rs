@@ -154,7 +154,7 @@ impl Job {
             if let Some(error) = &error {
                 document.refused = Some(Refused::new(error, Status::Refused as i32));
             }
-            json::write(&document, &mut json)?;
+            json::write_json(&document, &mut json)?;
         }
         let report = match self.json {
             true => String::new(),

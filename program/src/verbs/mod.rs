@@ -162,7 +162,7 @@ fn refuse(error: &str, json: bool) -> Status {
 
 fn show_refused(error: &str, exit_status: i32) {
     let mut bytes = Vec::new();
-    if json::write(&Refused::new(error, exit_status), &mut bytes).is_ok() {
+    if json::write_json(&Refused::new(error, exit_status), &mut bytes).is_ok() {
         // A failure to report the error cannot be reported.
         let _ = show(&bytes);
     }

@@ -251,7 +251,7 @@ impl Request {
                 }
                 Err((error, this)) => {
                     let mut json = Vec::new();
-                    json::write(&Refused::new(&error, this.code()), &mut json)?;
+                    json::write_json(&Refused::new(&error, this.code()), &mut json)?;
                     unsolved += usize::from(this == Status::Interrupted);
                     let told = (this != Status::Interrupted).then_some(error);
                     (this, told, json)

@@ -85,7 +85,7 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
         return path;
     };
     loop {
-        let last = follow(&mut equations, &first, &mut path);
+        let last = follow_on_grid(&mut equations, &first, &mut path);
         let index = last
             .as_ref()
             .and_then(|it| index_at(&mut equations, it).ok());
@@ -124,7 +124,7 @@ pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
 }
 
 /// The point at the end of the path on this grid, if the branch reaches it.
-fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<Point> {
+fn follow_on_grid(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<Point> {
     let mut first = first.clone();
     first.tangent = first.tangent.growing();
     let turned = |points: &[Point]| points[points.len() - 1].tangent.params[0] < 0.0;

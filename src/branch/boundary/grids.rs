@@ -3,7 +3,7 @@
 use super::manifold::{Direction, Manifold, Plane, Solution};
 use super::singular_point::SingularPoint;
 use crate::branch::problem::equations::Stuck;
-use crate::branch::problem::field::{every_second, prolong as prolong_field};
+use crate::branch::problem::field::{every_second, prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::transfer::prolong::{prolong, restrict};
 
@@ -12,7 +12,7 @@ const COARSEST: usize = 8;
 
 /// Initial guess for a boundary point on the grid with all segments halved, with its
 /// directions.
-pub fn on_finer<'a>(
+pub fn manifold_on_finer<'a>(
     manifold: &mut Manifold<'a>,
     point: &SingularPoint,
 ) -> Result<(Manifold<'a>, SingularPoint), Stuck> {
@@ -33,7 +33,7 @@ pub fn on_finer<'a>(
 }
 
 /// Initial guess for the point on the grid with every second node.
-pub fn on_coarser(
+pub fn manifold_on_coarser(
     plane: &Plane,
     grid: &Grid,
     point: &SingularPoint,

@@ -16,7 +16,7 @@ use crate::relax::settle::settle_from::settle_from;
 const AWAY: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 
 /// The finest grid used for pictures, in segments.
-const FINEST: usize = 64;
+const FINEST_DRAWN: usize = 64;
 
 /// A leaf next to a boundary.
 pub struct Neighbour {
@@ -54,7 +54,7 @@ pub fn beside(plane: &Plane, point: &Verified, along: [f64; 2]) -> Option<[Neigh
 fn for_pictures(plane: &Plane, point: &Verified) -> (Grid, Verified) {
     let mut grid = Grid::through(&point.stations, plane.first().kinks());
     let mut point = point.clone();
-    while grid.segments() > FINEST
+    while grid.segments() > FINEST_DRAWN
         && let Some((coarse, state)) = state_on_coarser(plane, &grid, &point.state)
     {
         point.across.increments = every_second(

@@ -1,6 +1,6 @@
 //! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
-use super::grids::{on_coarser, on_finer};
+use super::grids::{manifold_on_coarser, manifold_on_finer};
 use super::manifold::{Manifold, Plane, Solution};
 use super::search::Search;
 use super::singular_point::SingularPoint;
@@ -97,7 +97,7 @@ pub fn refine(
         .at(step.point.solution.params)?
         .least_compliance();
     if rigid * NEARLY_RIGID < 1.0
-        && let Some((grid, point)) = on_coarser(plane, grid, &step.point)
+        && let Some((grid, point)) = manifold_on_coarser(plane, grid, &step.point)
     {
         let step = Step {
             point,
@@ -129,7 +129,7 @@ fn refine_from(
     let mut softening = None;
     for level in 0..GRIDS {
         if level > 0 {
-            (manifold, near) = on_finer(&mut manifold, &near)?;
+            (manifold, near) = manifold_on_finer(&mut manifold, &near)?;
         }
         let mut start = near.solution.clone();
         let believed = table.tips.best().map_or(0, |best| best.columns + 1);

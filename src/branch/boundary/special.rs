@@ -10,7 +10,7 @@ const EVALUATIONS: usize = 25;
 
 /// Accuracy along the boundary: at a cusp the parameters are accurate to its square; at a
 /// crossing it is that of the parameters.
-const ACCURACY: f64 = 1e-11;
+const SPECIAL_ACCURACY: f64 = 1e-11;
 
 /// Differences over less than this do not give a reliable slope.
 const LOCAL: f64 = 1e-7;
@@ -23,7 +23,7 @@ const REACH: f64 = 0.3;
 const TOGETHER: f64 = 1e-5;
 
 /// Accuracy of the boundary points during the search.
-const EXACT: f64 = 1e-13;
+const SPECIAL_EXACT: f64 = 1e-13;
 
 /// Accuracy of points at a given parameter.
 const GIVEN: f64 = 1e-12;
@@ -72,9 +72,9 @@ pub fn locate_near(
     near: &SingularPoint,
     special: Special,
 ) -> Result<(SingularPoint, f64), Stuck> {
-    let first = at_distance(manifold, near, 0.0, EXACT, REACH)?.0;
+    let first = at_distance(manifold, near, 0.0, SPECIAL_EXACT, REACH)?.0;
     let away = 1e-2;
-    let second = at_distance(manifold, &first, away, EXACT, REACH)?.0;
+    let second = at_distance(manifold, &first, away, SPECIAL_EXACT, REACH)?.0;
     let slope = (special.value(&second) - special.value(&first)) / away;
     zero(manifold, &first, special, slope, [-REACH, REACH])
 }
@@ -95,7 +95,7 @@ fn zero(
         if !step.is_finite() || !(least..=most).contains(&(at + step)) {
             return Err(Stuck::NotConverged);
         }
-        let (next, _) = at_distance(manifold, now, at + step, EXACT, REACH)?;
+        let (next, _) = at_distance(manifold, now, at + step, SPECIAL_EXACT, REACH)?;
         let after = special.value(&next);
         if step.abs() > LOCAL {
             slope = (after - value) / step;
@@ -105,7 +105,7 @@ fn zero(
             true => best = next,
             false => worse += 1,
         }
-        if step.abs() < ACCURACY || worse > 1 {
+        if step.abs() < SPECIAL_ACCURACY || worse > 1 {
             return Ok((best, slope));
         }
     }

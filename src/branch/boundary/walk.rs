@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::grids::on_finer;
+use super::grids::manifold_on_finer;
 use super::manifold::{Manifold, Plane};
 use super::refine::{Accuracy, Step, refine};
 use super::singular_point::SingularPoint;
@@ -210,7 +210,7 @@ impl<'a, 'h> Walk<'a, 'h> {
             return false;
         }
         let mut on_finer = |point: &SingularPoint, given| {
-            let (mut finer, near) = on_finer(manifold, point).ok()?;
+            let (mut finer, near) = manifold_on_finer(manifold, point).ok()?;
             let point = match given {
                 Some(which) => at_value(&mut finer, &near, 0.0, which, near.solution.params[which]),
                 None => at_distance(&mut finer, &near, 0.0, ACCURACY, 1.0).map(|(point, _)| point),

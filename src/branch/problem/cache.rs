@@ -44,12 +44,12 @@ impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
 }
 
 /// Number of cached patterns: five grids, bordered and unbordered.
-const CACHED: usize = 10;
+const CACHED_SYSTEMS: usize = 10;
 
 /// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
 /// equally many segments, and ordering it takes as long as factorising a matrix.
 #[derive(Default)]
-pub struct Patterns(Mutex<LruCache<Shape, Arc<DirectSolver>, CACHED>>);
+pub struct Patterns(Mutex<LruCache<Shape, Arc<DirectSolver>, CACHED_SYSTEMS>>);
 
 /// What determines the pattern of a system: its segments, whether its rods are coupled, and
 /// the number of border rows.

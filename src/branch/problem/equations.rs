@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::branch::problem::family::{Family, Leaves, OutOfRange, clamp};
-use crate::branch::problem::field::{dot, prolong, times};
+use crate::branch::problem::field::{dot, prolong_field, times};
 use crate::branch::problem::states::{advanced, forces_on, rate, stiffest_condensed};
 pub use crate::branch::problem::stuck::Stuck;
 use crate::branch::{Direction, Solution};
@@ -153,7 +153,7 @@ impl<'a, const N: usize> Equations<'a, N> {
     /// A direction on the grid of which this one halves all segments.
     pub(in crate::branch) fn prolonged(&self, coarse: &Direction<N>) -> Direction<N> {
         self.normalised(Direction {
-            increments: prolong(&coarse.increments, self.first_node()),
+            increments: prolong_field(&coarse.increments, self.first_node()),
             params: coarse.params,
         })
     }

@@ -228,11 +228,11 @@ pub struct Leaves<'a, const N: usize = 1> {
     pub family: &'a Family<'a, N>,
     pub grid: Grid,
     softening: Option<f64>,
-    cache: LruCache<[f64; N], DiscreteLeaf, CACHED>,
+    cache: LruCache<[f64; N], DiscreteLeaf, CACHED_LEAVES>,
 }
 
 /// Number of cached leaves: those of differences over two parameters, and one more.
-const CACHED: usize = 6;
+const CACHED_LEAVES: usize = 6;
 
 impl<'a, const N: usize> Leaves<'a, N> {
     pub fn new(family: &'a Family<'a, N>, grid: Grid) -> Self {

@@ -61,7 +61,7 @@ pub fn is_finite(a: &Field) -> bool {
 
 /// Increments on the grid with all segments halved: cubic interpolation, zero at clamped bases, where
 /// the `first` node of the field is the next.
-pub fn prolong(a: &Field, first: usize) -> Field {
+pub fn prolong_field(a: &Field, first: usize) -> Field {
     a.iter().map(|rod| prolong_rod(rod, first)).collect()
 }
 
@@ -119,7 +119,7 @@ mod tests {
                 ]
             };
             let (coarse, fine) = (on(n), on(2 * n));
-            let difference = plus(&prolong(&coarse, first), -1.0, &fine);
+            let difference = plus(&prolong_field(&coarse, first), -1.0, &fine);
             assert!(largest(&difference) < 1e-14, "{n}");
             assert_eq!(every_second(&fine, first), coarse);
             assert_eq!(every_second(&at_same_nodes(&coarse, first), first), coarse);

@@ -3,7 +3,7 @@
 use crate::branch::events::critical::{Critical, Kind};
 use crate::branch::problem::equations::{Equations, Stuck};
 use crate::branch::problem::family::{Family, STIFFEST};
-use crate::branch::problem::field::prolong as prolong_field;
+use crate::branch::problem::field::prolong_field;
 use crate::branch::problem::states::{eigenvalue_rounding, stiffest_condensed};
 use crate::branch::verify::refined::{Doubt, Refined, Table, Values};
 use crate::branch::verify::regular::{FINEST, GRIDS, STILL};

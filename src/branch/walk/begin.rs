@@ -13,7 +13,7 @@ use crate::relax::transfer::prolong::prolong;
 use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
 /// The finest grid on which the first point is sought.
-const FINEST: usize = 512;
+const FINEST_FIRST_POINT: usize = 512;
 
 /// Largest distance between the tips of one grid and the extrapolated ones, relative to
 /// the length.
@@ -110,7 +110,7 @@ fn search<'a>(
                 Err(stuck) if found.is_err() => found = Err(stuck),
                 Err(_) => {}
             }
-            if grid.segments() >= FINEST {
+            if grid.segments() >= FINEST_FIRST_POINT {
                 return found.and(Err(Stuck::BesideBifurcation));
             }
         }

@@ -212,6 +212,6 @@ impl DiscreteLeaf {
 }
 
 /// The largest component of a vector.
-fn component(vector: DVec3) -> f64 {
+pub(super) fn component(vector: DVec3) -> f64 {
     largest(vector.abs().to_array())
 }

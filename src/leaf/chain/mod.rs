@@ -31,7 +31,7 @@ pub fn set_lane(increments: &mut Increments, lane: usize, of_rod: &Increment) {
 }
 
 /// A block of a chain, rows first.
-pub type Block = [[f64; UNKNOWNS]; UNKNOWNS];
+pub type ChainBlock = [[f64; UNKNOWNS]; UNKNOWNS];
 
 /// Number of rotations among the unknowns of a node; they come first.
 pub const TURNS: usize = 3;
@@ -138,7 +138,7 @@ impl Chain {
 
     /// The block of node `i` (from 0) of the rod in a lane, its upper triangle, and
     /// the one between it and the next.
-    pub fn blocks(&self, i: usize, lane: usize) -> (Block, Block) {
+    pub fn blocks(&self, i: usize, lane: usize) -> (ChainBlock, ChainBlock) {
         let node = &self.matrix[i];
         let (mut own, mut next) = ([[0.0; UNKNOWNS]; UNKNOWNS], [[0.0; UNKNOWNS]; UNKNOWNS]);
         for r in 0..UNKNOWNS {

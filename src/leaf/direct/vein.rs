@@ -5,7 +5,7 @@ use super::sweep::{
     GROWTH, Matrix3, Workspace, are_small, matrix3, multiply_rows, padded, rows_of,
     subtract_product, sweep, sweep3,
 };
-use crate::leaf::chain::{Block, group_and_lane};
+use crate::leaf::chain::{ChainBlock, group_and_lane};
 use crate::leaf::system::System;
 use pulp::{Simd, WithSimd};
 
@@ -21,8 +21,8 @@ pub struct Vein {
 /// A node of a vein: the blocks of the assembled matrix, the inverse pivot of its rotation, and
 /// that times the block between it and the next rotation.
 pub struct Node {
-    pub own: Block,
-    pub next: Block,
+    pub own: ChainBlock,
+    pub next: ChainBlock,
     inverse: Matrix3,
     ahead: Matrix3,
 }
@@ -62,7 +62,7 @@ impl Vein {
                 }
             }
             if i + 1 == n {
-                next = Block::default();
+                next = ChainBlock::default();
             }
             for r in 0..3 {
                 let row = &mut self.swept[(3 * i + r) * stride..][..width];

@@ -53,42 +53,42 @@ pub(crate) struct Group {
     pub solution: Vec<Increments>,
     pub sums: Sums,
     /// Nodal masses per weight: rotary, translational.
-    masses: [Four; 2],
+    pub(super) masses: [Four; 2],
     /// E: coupling per weight with the previous rods, with the next.
-    coupling: [[Four; 3]; 2],
-    residual: Vec<Increments>,
-    z: Vec<Increments>,
-    b_p: Vec<Increments>,
+    pub(super) coupling: [[Four; 3]; 2],
+    pub(super) residual: Vec<Increments>,
+    pub(super) z: Vec<Increments>,
+    pub(super) b_p: Vec<Increments>,
     /// Whether the last factorisation succeeded.
-    definite: bool,
+    pub(super) definite: bool,
     /// Its part of a scalar product.
-    partial: f64,
+    pub(super) partial: f64,
 }
 
 /// The linear system of a leaf, with workspace for its solution.
 #[derive(Clone, Debug)]
 pub struct System {
     pub(crate) groups: Vec<Group>,
-    rods: usize,
-    p: Vec<Vec<Increments>>,
+    pub(super) rods: usize,
+    pub(super) p: Vec<Vec<Increments>>,
     pub(super) joined: bool,
-    coupled: bool,
+    pub(super) coupled: bool,
     pub(super) parallel: bool,
-    segments: usize,
+    pub(super) segments: usize,
     /// The first node of a rod with equations, from which its nodes are numbered here.
-    first: usize,
+    pub(super) first: usize,
     /// Weights of the nodes with equations in the masses.
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     /// Weights of the nodes in E: zero at a joint tip and at hinged bases, which stay.
-    coupling_weights: Vec<f64>,
+    pub(super) coupling_weights: Vec<f64>,
     pub(super) arch: Arch,
-    tip: Option<TipFactor>,
+    pub(super) tip: Option<TipFactor>,
     /// Coupling of every gap per weight; empty if the leaf has no coupling.
-    gaps: Vec<DVec3>,
+    pub(super) gaps: Vec<DVec3>,
     /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without tissue.
-    across: Vec<NodeBlock>,
+    pub(super) across: Vec<NodeBlock>,
     /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
-    held: Vec<(usize, usize, Range<usize>)>,
+    pub(super) held: Vec<(usize, usize, Range<usize>)>,
     /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
     /// rigid ones; empty without any.
     pub(super) law_forces: Vec<DVec3>,

@@ -7,7 +7,7 @@ use super::packs::vector;
 use crate::leaf::State;
 use crate::limit::Limit;
 use crate::motion::energy_balance::{Exchange, measure, resolved};
-use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
+use crate::motion::method::{TimeIntegrator, Snapshot, Stopped, Velocity};
 use glam::DVec3;
 
 /// Part of a step below which differences of time are rounding.
@@ -61,7 +61,7 @@ impl Explicit {
     }
 }
 
-impl Method for Explicit {
+impl TimeIntegrator for Explicit {
     fn time(&self) -> f64 {
         self.time
     }

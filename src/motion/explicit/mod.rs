@@ -33,7 +33,7 @@ pub use stable::StableStep;
 use self::applied::Applied;
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::friction::rates;
-use super::method::Method;
+use super::method::TimeIntegrator;
 use super::physics::Physics;
 use crate::lanes::widest_arch;
 use crate::largest::largest;

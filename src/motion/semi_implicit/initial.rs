@@ -13,7 +13,7 @@ use glam::{DMat3, DVec3};
 const INVERSE_STEP_SQUARED: f64 = 1e6;
 
 /// Iterations of that step, and the size of the last.
-const ITERATIONS: usize = 30;
+const INITIAL_ITERATIONS: usize = 30;
 const LAST: f64 = 1e-15;
 
 /// Strain of a rigid segment, as a length, that may be due to rounding.
@@ -68,7 +68,7 @@ impl SemiImplicit {
     /// A first step, into the trial; false if it failed.
     fn first_step(&mut self) -> bool {
         self.trial.clone_from(&self.state);
-        for _ in 0..ITERATIONS {
+        for _ in 0..INITIAL_ITERATIONS {
             self.leaf.assemble(&self.trial, &mut self.system);
             self.add_drag(0.0, 0.0);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();

@@ -22,7 +22,7 @@ mod initial;
 mod step;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};
-use super::method::{Method, Snapshot, Stopped, Velocity};
+use super::method::{TimeIntegrator, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use super::wind::Wind;
 use crate::leaf::{DiscreteLeaf, Loads, State, System};
@@ -258,7 +258,7 @@ impl SemiImplicit {
     }
 }
 
-impl Method for SemiImplicit {
+impl TimeIntegrator for SemiImplicit {
     fn time(&self) -> f64 {
         self.time
     }

@@ -17,7 +17,7 @@ const NEARER: f64 = 0.96;
 const BENDS: [f64; 9] = [0.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0, 10.0, -10.0];
 
 /// Iterations of a search, their longest step, and the gap that counts as closed.
-const ITERATIONS: usize = 30;
+const CURVE_ITERATIONS: usize = 30;
 const LONGEST: f64 = 0.7;
 const CLOSED: f64 = 1e-14;
 
@@ -125,7 +125,7 @@ impl Rod {
     fn reaching(&self, tip: DVec2, arc: f64) -> Option<[f64; 2]> {
         let searches = BENDS.iter().filter_map(|&bend| {
             let mut at = DVec2::new(arc - bend / 3.0, bend);
-            for _ in 0..ITERATIONS {
+            for _ in 0..CURVE_ITERATIONS {
                 let [end, of_a, of_b] = self.end(at.to_array());
                 let gap = tip - end;
                 if gap.length() < CLOSED * self.length {

@@ -6,6 +6,7 @@ use crate::relax::accuracy::richardson::distance;
 use crate::relax::grids::{follow, solve};
 use crate::relax::loading::partial::{resolves_loads, veins_cannot_buckle};
 use crate::relax::loading::walk::Walk;
+use crate::relax::grids::FINEST_RESOLVING;
 use crate::relax::nested::{Failure, Found, History, NestedEquilibrium, along};
 use crate::relax::path::{Event, Path, Stage};
 use crate::relax::request::options::Progress;
@@ -21,12 +22,9 @@ use crate::relax::transfer::prolong::{prolong, transfer};
 pub const COARSEST: usize = 8;
 const FINEST: usize = 64;
 
-/// The finest grid that is tried where coarser ones do not resolve the bending.
-const FINEST_RESOLVING: usize = 2048;
-
 /// States on two grids of which no common nodes are farther apart than this (lengths) are the
 /// same equilibrium.
-pub const SAME_PLACE: f64 = 0.05;
+pub const SAME_EQUILIBRIUM: f64 = 0.05;
 
 /// Energies of the same equilibrium on one grid agree to this part, or of A/L.
 const SAME_ENERGY: f64 = 1e-5;
@@ -167,7 +165,7 @@ pub fn arrive(
             }
             Ok(()) => {
                 let near = before.as_ref().is_some_and(|coarser| {
-                    distance(&positions(coarser, 1), &positions(&level, 2)) < SAME_PLACE
+                    distance(&positions(coarser, 1), &positions(&level, 2)) < SAME_EQUILIBRIUM
                 });
                 let confirmed = near
                     || before

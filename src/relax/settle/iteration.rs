@@ -152,9 +152,9 @@ fn settle_upright(
         ..Relaxation::new(state, accuracy, out, &problem.options.limit)
     };
     let rest = match (explicit, dead_moment) {
-        _ if windy => wind::settle(&mut leaf, &mut system, &mut relaxation),
+        _ if windy => wind::settle_in_wind(&mut leaf, &mut system, &mut relaxation),
         (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
-        (_, true) => moment::settle(&mut leaf, &mut system, &mut relaxation),
+        (_, true) => moment::settle_with_dead_moments(&mut leaf, &mut system, &mut relaxation),
         // To the next equilibrium, stable or not.
         _ => {
             let newton = Newton {

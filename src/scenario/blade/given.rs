@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// Places at which the widest one is looked for.
-const SAMPLES: usize = 500;
+const WIDTH_SAMPLES: usize = 500;
 
 /// A blade, from which the veins of a leaf and the tissue between them follow.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +55,7 @@ impl Blade {
 
     /// Where it is widest: a fraction of the length.
     pub fn widest(&self) -> f64 {
-        let places = (0..=SAMPLES).map(|k| k as f64 / SAMPLES as f64);
+        let places = (0..=WIDTH_SAMPLES).map(|k| k as f64 / WIDTH_SAMPLES as f64);
         let wider = |a: f64, b: f64| if self.width(b) > self.width(a) { b } else { a };
         places.fold(0.0, wider)
     }

@@ -6,7 +6,7 @@ use super::spline::Spline;
 use super::vein::Outline;
 use crate::scenario::Profile;
 use crate::scenario::entries::Entries;
-use crate::scenario::error::Result;
+use crate::scenario::error::ScenarioResult;
 use crate::scenario::item::Item;
 use crate::scenario::key::Key;
 use crate::scenario::material::poisson;
@@ -25,7 +25,7 @@ const WIDEST: f64 = 0.5;
 const NARROWEST: f64 = 1e-3;
 
 /// Reads `[blade]` of a leaf with so many veins; `None` if there is no such table.
-pub(in crate::scenario) fn blade(entries: &Entries, rods: usize) -> Result<Option<Blade>> {
+pub(in crate::scenario) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
     let mut table = Key::all().filter(|key| key.parts().0 == "blade");
     if !table.any(|key| entries.is_given(key)) {
         return Ok(None);
@@ -70,7 +70,7 @@ pub(in crate::scenario) fn blade(entries: &Entries, rods: usize) -> Result<Optio
     }))
 }
 
-fn outline(entries: &Entries) -> Result<Outline> {
+fn outline(entries: &Entries) -> ScenarioResult<Outline> {
     let item = entries.item(Key::BladeWidth)?;
     let width = width(item)?;
     let narrow = entries.item(Key::LeastWidth)?;
@@ -108,7 +108,7 @@ fn outline(entries: &Entries) -> Result<Outline> {
 }
 
 /// The curvature of the surface at rest, over fractions of the length.
-fn curvature(entries: &Entries) -> Result<Option<Spline>> {
+fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
     let Some(item) = entries.given(Key::RestBend2) else {
         return Ok(None);
     };
@@ -132,7 +132,7 @@ fn curvature(entries: &Entries) -> Result<Option<Spline>> {
 }
 
 /// The width over fractions of the length.
-fn width(item: Item) -> Result<Spline> {
+fn width(item: Item) -> ScenarioResult<Spline> {
     if !item.value.is_table() {
         let width = item.number()?;
         item.ensure(width > 0.0, "must be greater than 0")?;

@@ -18,7 +18,7 @@ const TEXT: &str = r#"
     shear_3 = 100
 "#;
 
-fn with(overrides: &[&str]) -> Result<Scenario> {
+fn with(overrides: &[&str]) -> ScenarioResult<Scenario> {
     let overrides: Vec<String> = overrides.iter().map(|given| given.to_string()).collect();
     Scenario::from_toml_with(TEXT, "three.toml", &overrides)
 }

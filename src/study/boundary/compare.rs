@@ -9,10 +9,10 @@ use crate::largest::largest;
 
 /// Points closer than this part of both ranges are merged: their errors would dominate the
 /// slopes of interpolating polynomials.
-const APART: f64 = 1e-4;
+const APART_IN_RANGES: f64 = 1e-4;
 
 /// Crossings closer than this may be in either order.
-const SAME: f64 = 1e-3;
+const SAME_CROSSING: f64 = 1e-3;
 
 /// A curve and a branch with tips farther apart than this (lengths) belong to different leaves.
 const NEAR: f64 = 0.02;
@@ -72,7 +72,7 @@ impl Edge {
         let (mut now, mut reached) = (self.index, 0.0);
         loop {
             let next = crossings.iter().position(|crossing| {
-                crossing.indices.contains(&now) && distance(crossing) > reached - SAME
+                crossing.indices.contains(&now) && distance(crossing) > reached - SAME_CROSSING
             });
             let Some(next) = next else { break };
             let crossing = crossings.remove(next);
@@ -93,7 +93,7 @@ impl Edge {
         let mut points: Vec<&Verified> = Vec::new();
         for point in &curve.points {
             let far =
-                |last: &&Verified| (0..2).any(|i| (point.params[i] - last.params[i]).abs() > APART);
+                |last: &&Verified| (0..2).any(|i| (point.params[i] - last.params[i]).abs() > APART_IN_RANGES);
             if points.last().is_none_or(far) {
                 points.push(point);
             }
@@ -139,18 +139,18 @@ impl Edge {
         // The mirror image in a plane of the axes has the same index.
         let images = IMAGES.map(|signs| image(&tips, signs));
         let own = self.tips.iter();
-        let off = own.flat_map(|own| images.iter().map(|tips| distance(own, tips)));
+        let off = own.flat_map(|own| images.iter().map(|tips| distance_of_tips(own, tips)));
         let off = off.fold(f64::INFINITY, f64::min);
         let steps = self
             .tips
             .windows(2)
-            .map(|pair| distance(&pair[0], &pair[1]));
+            .map(|pair| distance_of_tips(&pair[0], &pair[1]));
         off < NEAR + 0.5 * largest(steps)
     }
 }
 
 /// The largest distance between corresponding tips.
-fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+fn distance_of_tips(a: &[DVec3], b: &[DVec3]) -> f64 {
     let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
     largest(distances)
 }

@@ -9,14 +9,14 @@ use crate::shape::weights;
 
 /// Parameters (as fractions) and tips that agree within this plus both error bounds are
 /// the same.
-const SAME: f64 = 1e-6;
+const SAME_POINT: f64 = 1e-6;
 
 /// Iterations for the nearest point.
 const ITERATIONS: usize = 20;
 
 /// Points of a curve closer than this are merged for interpolation: their errors would dominate
 /// the slopes.
-const APART: f64 = 1e-3;
+const APART_ON_CURVE: f64 = 1e-3;
 
 /// A point may lie outside an interval of a curve by this part of it.
 const BEYOND: f64 = 0.05;
@@ -101,7 +101,7 @@ impl Singular<'_> {
         let (mut points, mut points_of_curve) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
             let coordinates = coordinates(point.params, &point.tips);
-            if (points_of_curve.last()).is_none_or(|last| distance(last, &coordinates) > APART) {
+            if (points_of_curve.last()).is_none_or(|last| distance_of_parameters(last, &coordinates) > APART_ON_CURVE) {
                 points.push(point);
                 points_of_curve.push(coordinates);
             }
@@ -109,14 +109,14 @@ impl Singular<'_> {
         IMAGES.iter().any(|signs| {
             let target = coordinates(self.params, &image(self.tips, *signs));
             if let [only] = &points[..] {
-                return distance(&points_of_curve[0], &target) < SAME + self.error + error(only);
+                return distance_of_parameters(&points_of_curve[0], &target) < SAME_POINT + self.error + error(only);
             }
             (1..points.len()).any(|k| {
                 let pair = &points[k - 1..=k];
                 let within = pair.iter().map(|it| error(it)).fold(0.0, f64::max);
                 let mut sides = pair.iter().map(|it| sorted(it.indices));
                 let same_sides = crossed || sides.any(|sides| sides == self.sides);
-                same_sides && is_between(&points_of_curve, k, &target, SAME + self.error + within)
+                same_sides && is_between(&points_of_curve, k, &target, SAME_POINT + self.error + within)
             })
         })
     }
@@ -143,7 +143,7 @@ fn coordinates(params: [f64; 2], tips: &[DVec3]) -> Vec<f64> {
     params.into_iter().chain(tips).collect()
 }
 
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+fn distance_of_parameters(a: &[f64], b: &[f64]) -> f64 {
     let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
     squares.sum::<f64>().sqrt()
 }
@@ -151,7 +151,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 /// Whether a point lies on the interpolated curve, between one of its points and the previous.
 fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool {
     let few = &points_of_curve[k.saturating_sub(2)..(k + 2).min(points_of_curve.len())];
-    let chords = few.windows(2).map(|pair| distance(&pair[0], &pair[1]));
+    let chords = few.windows(2).map(|pair| distance_of_parameters(&pair[0], &pair[1]));
     let mut at = vec![0.0];
     at.extend(chords.scan(0.0, |sum, chord| {
         *sum += chord;
@@ -184,7 +184,7 @@ fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64
         2 => found.clone(),
         _ => through(&few[from..to], &at[from..to], t),
     };
-    distance(&found, target) < error + distance(&found, &lower)
+    distance_of_parameters(&found, target) < error + distance_of_parameters(&found, &lower)
 }
 
 /// The polynomial through points at these values of a variable.

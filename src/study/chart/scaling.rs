@@ -48,7 +48,7 @@ pub fn scaling(
     leaves.sort_by_key(|leaf| leaf.rods.len());
     leaves.dedup_by_key(|leaf| leaf.rods.len());
     let (rows, unconfirmed) = on_one_thread(options.seconds, || {
-        measure(&leaves, tolerance, options, progress)
+        measure_scaling(&leaves, tolerance, options, progress)
     })?;
     let first = leaves.first();
     Ok(Scaling {
@@ -68,7 +68,7 @@ struct Leaf<'s> {
     grid: Option<usize>,
 }
 
-fn measure(
+fn measure_scaling(
     leaves: &[&Scenario],
     tolerance: f64,
     options: &ChartOptions,

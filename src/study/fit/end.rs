@@ -43,7 +43,7 @@ pub(super) enum Reach {
 }
 
 /// Residuals at a point near a minimum.
-type Known = (DVector<f64>, Point);
+type EvaluatedPoint = (DVector<f64>, Point);
 
 /// The ends of an interval below and above, from a few points around the minimum; as errors,
 /// approximate distances that are not confirmed. `None` if they are those of the quadratic
@@ -57,7 +57,7 @@ pub(super) fn ends(
     let stats = near.stats;
     let slopes = near.slopes();
     let along = stats.conditional(k);
-    let mut known: Option<Known> = None;
+    let mut known: Option<EvaluatedPoint> = None;
     if half <= OPEN {
         let expected = stats.quantile.powi(2);
         let off = |above: f64| (above / expected - 1.0).abs();
@@ -80,7 +80,7 @@ pub(super) fn ends(
     }
     let [low, high] = stats.model.coordinates[k].bounds;
     let theta = stats.point.theta[k];
-    let distance = |sign: f64, room: f64, known: Option<Known>| {
+    let distance = |sign: f64, room: f64, known: Option<EvaluatedPoint>| {
         let most = (OPEN + 0.1).min(room);
         let search = Search {
             near,
@@ -149,7 +149,7 @@ impl Search<'_, '_, '_, '_> {
     ///
     /// # Errors
     /// The approximate distance of the end, if the search does not converge.
-    fn run(mut self, mut known: Option<Known>) -> Result<Reach, f64> {
+    fn run(mut self, mut known: Option<EvaluatedPoint>) -> Result<Reach, f64> {
         if self.most <= 0.0 {
             return Ok(Reach::Open);
         }
@@ -173,7 +173,7 @@ impl Search<'_, '_, '_, '_> {
     }
 
     /// The leaves at the present estimate of the end.
-    fn point(&self) -> Option<Known> {
+    fn point(&self) -> Option<EvaluatedPoint> {
         let change =
             self.along * (self.sign * self.distance) + &self.curvature * self.distance.powi(2);
         let from = match &self.there {
@@ -204,7 +204,7 @@ impl Search<'_, '_, '_, '_> {
         least.above.max(0.0).sqrt() / self.near.stats.quantile
     }
 
-    fn evaluate(&mut self, first: bool, (residuals, point): Known) -> Next {
+    fn evaluate(&mut self, first: bool, (residuals, point): EvaluatedPoint) -> Next {
         let wanted = self.near.stats.quantile.powi(2);
         let mut least = self.least(&residuals)?;
         if least.straight < -BETTER {

@@ -36,7 +36,7 @@ pub(super) struct Profile<'s, 'm, 'a> {
 }
 
 /// A point of a profile.
-struct Known {
+struct ProfilePoint {
     distance: f64,
     /// The root of the sum, normalised to one at an end.
     root: f64,
@@ -66,12 +66,12 @@ impl Profile<'_, '_, '_> {
             return Ok(Reach::Open);
         }
         let mut reach = first.abs().min(most);
-        let mut inside = Known {
+        let mut inside = ProfilePoint {
             distance: 0.0,
             root: 0.0,
             point: None,
         };
-        let mut outside: Option<Known> = None;
+        let mut outside: Option<ProfilePoint> = None;
         // The nearest distance at which all fits failed.
         let mut lost = f64::INFINITY;
         let mut failures = 0;
@@ -99,7 +99,7 @@ impl Profile<'_, '_, '_> {
             if (root - 1.0).abs() < PROFILE_ACCURACY {
                 return Ok(Reach::End(reach));
             }
-            let known = Known {
+            let known = ProfilePoint {
                 distance: reach,
                 root,
                 point: Some(least),
@@ -149,8 +149,8 @@ impl Profile<'_, '_, '_> {
     fn least(
         &self,
         distance: f64,
-        inside: &Known,
-        outside: Option<&Known>,
+        inside: &ProfilePoint,
+        outside: Option<&ProfilePoint>,
         progress: &mut dyn FnMut(usize, f64),
     ) -> Option<Point> {
         let from = inside.point.as_ref().unwrap_or(self.stats.point);

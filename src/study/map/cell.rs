@@ -136,7 +136,7 @@ impl<'a> Cell<'a> {
             return late;
         }
         within(self.limit, self.all, |limit| match method {
-            MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, limit),
+            MapMethod::ExplicitMotion => motion::answer_of_motion(scenario, self.knobs, tolerance, limit),
             MapMethod::ToRest(method) => match method {
                 Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), limit),
                 Method::Shooting { intervals } => {

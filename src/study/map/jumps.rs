@@ -144,7 +144,7 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
     let axis = &request.axes[pair.axis];
     let ends = pair.cells.map(|cell| request.values(cell)[pair.axis].1);
     let value = |part: f64| value_between(ends, axis.log, part);
-    let at = |part: f64| answer(request, pair, value(part));
+    let at = |part: f64| answer_between(request, pair, value(part));
     let length = longest(&request.base.scenario().rods);
     let [mut low, mut high] = [(0.0, at(0.0)?), (1.0, at(1.0)?)];
     let mut distance = low.1.distance(&high.1)?;
@@ -173,7 +173,7 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
 }
 
 /// The relaxed leaf at another value along the axis of a pair.
-fn answer(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
+fn answer_between(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
     let mut values = request.values(pair.cells[0]);
     values[pair.axis].1 = value;
     let varied = request.base.at(&values).ok()?;

@@ -4,7 +4,7 @@
 use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::limit::Limit;
-use crate::motion::{Explicit, Method, Physics, Stopped};
+use crate::motion::{Explicit, TimeIntegrator, Physics, Stopped};
 use crate::relax::{self, Outcome, RelaxError, Work, index_near, shape_of, start};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, SAME_LEAF, fine_grid, grid_error};
@@ -15,7 +15,7 @@ use super::row::{Found, MapOutcome};
 use crate::study::vary::{Knobs, Varied};
 
 /// Default number of segments per rod: as in a simulation.
-const SEGMENTS: usize = 16;
+const MOTION_SEGMENTS: usize = 16;
 
 /// Largest number of stations at which answers are compared.
 const MOST_STATIONS: usize = 4096;
@@ -25,7 +25,7 @@ const LOOK: f64 = 1000.0;
 
 /// Moves the leaf, released from the initial state of a relaxation, for the scenario's
 /// duration under the loads of its dynamics, in steps of `method.step`.
-pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) -> Found {
+pub fn answer_of_motion(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) -> Found {
     let refused = |why: String| Err((MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
         return refused("explicit motion needs method.step".into());
@@ -110,7 +110,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
 
 /// The grid, of as many segments as are set or needed.
 fn grid(leaf: &Leaf, knobs: Knobs) -> Result<Grid, RelaxError> {
-    let segments = relax::check_segments(leaf, knobs.segments, SEGMENTS)?;
+    let segments = relax::check_segments(leaf, knobs.segments, MOTION_SEGMENTS)?;
     Ok(Grid::new(segments, leaf.kinks()))
 }
 
@@ -129,7 +129,7 @@ pub fn stable_step(varied: &Varied) -> Option<f64> {
 /// Additional stations that a reference should have.
 pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
     let leaf = Leaf::new(scenario);
-    match relax::check_segments(&leaf, knobs.segments, SEGMENTS) {
+    match relax::check_segments(&leaf, knobs.segments, MOTION_SEGMENTS) {
         Ok(segments) if knobs.segments.is_some() => {
             let grid = fine_grid(scenario, segments);
             let every = grid.segments().div_ceil(MOST_STATIONS);

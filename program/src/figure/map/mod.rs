@@ -238,10 +238,10 @@ const TALL: f64 = 260.0;
 const LOW: f64 = 150.0;
 
 /// A curve: its name, its colour, and its value in a row.
-type Quantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
+type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
 
 /// The titles of the panels, the names of their axes, and their curves.
-fn panels(map: &Map) -> Vec<(&str, String, Vec<Quantity<'_>>)> {
+fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
     let units = &map.request.base.scenario().units;
     let length = units.length.as_deref();
     match map.show {

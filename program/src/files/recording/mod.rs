@@ -93,8 +93,8 @@ impl Recording {
             let format = recording.format;
             let start = format.start(recording.size, outputs(simulation));
             let motion = GrowingFile::begin(folder.join(format.file_name()), &start)?;
-            let start = header(energy::COLUMNS);
-            let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
+            let start = header(energy::ENERGY_COLUMNS);
+            let energy = GrowingFile::begin(folder.join(energy::ENERGY_FILE_NAME), &start)?;
             recording.growing = Some([motion, energy]);
         }
         recording.add(simulation, first)?;
@@ -126,7 +126,7 @@ impl Recording {
     /// Approximate number of bytes that the growing files still need; zero without these.
     pub fn expected_bytes(&self, simulation: &Simulation) -> u64 {
         let (all, made) = simulation.frames();
-        let output = self.format.bytes(self.size) + energy::BYTES;
+        let output = self.format.bytes(self.size) + energy::ENERGY_BYTES;
         match &self.growing {
             Some(_) => (all.saturating_sub(made) as u64).saturating_mul(output),
             None => 0,
@@ -147,7 +147,7 @@ impl Recording {
         };
         motion.append(|out| format.write(frame, stations, out))?;
         if let Some(moment) = self.moments.last() {
-            energy.append(|out| energy::write(moment, out))?;
+            energy.append(|out| energy::write_energies(moment, out))?;
         }
         Ok(())
     }

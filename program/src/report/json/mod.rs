@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::ser::Formatter;
 
 /// Writes the whole file. Numbers that are not finite are null.
-pub fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_json(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
     let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
     object.serialize(&mut serializer)?;
     out.write_all(b"\n")
@@ -56,7 +56,7 @@ mod tests {
         leaf.energy = Some(0.1 + 0.2);
         leaf.accuracy.residual = Some(f64::INFINITY);
         let mut bytes = Vec::new();
-        write(&leaf, &mut bytes).unwrap();
+        write_json(&leaf, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
         for line in ["\"energy\": 0.30000000000000004", "\"residual\": null"] {
             assert!(text.contains(&format!("\n  {line},\n")), "{text}");

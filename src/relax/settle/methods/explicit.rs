@@ -13,7 +13,7 @@
 
 use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use crate::limit::Limit;
-use crate::motion::{Explicit, Method, Physics, Snapshot, Stopped};
+use crate::motion::{Explicit, TimeIntegrator, Physics, Snapshot, Stopped};
 use crate::newton::{Stop, Work};
 use crate::refusal::RefusedOption;
 use crate::relax::request::options::RelaxError;

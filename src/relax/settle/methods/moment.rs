@@ -68,7 +68,7 @@ const ORDERS: [Order; 3] = [
 const HELD: Order = |part| [part, 1.0];
 
 /// Loads the rod from its rest shape, or corrects a state near rest.
-pub fn settle(
+pub fn settle_with_dead_moments(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
     rod: &mut Relaxation,

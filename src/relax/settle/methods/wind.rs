@@ -5,7 +5,7 @@
 
 use crate::largest::largest;
 use crate::leaf::{DiscreteLeaf, Field, State, System, add, shift};
-use crate::motion::{Drag, Method, Physics, SemiImplicit, Steps, Wind};
+use crate::motion::{Drag, TimeIntegrator, Physics, SemiImplicit, Steps, Wind};
 use crate::newton::{Equations, Following, Newton, Stop};
 use crate::relax::settle::methods::Relaxation;
 use glam::DVec3;
@@ -38,7 +38,7 @@ const ACCURACY: f64 = 1e-13;
 
 /// Brings the leaf to rest. The drag then acts on its nodes as dead forces, in which all sums over
 /// the leaf are balanced.
-pub fn settle(
+pub fn settle_in_wind(
     leaf: &mut DiscreteLeaf,
     system: &mut System,
     rest: &mut Relaxation,
