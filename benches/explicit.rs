@@ -2,7 +2,7 @@
 //! with the semi-implicit one. `cargo bench --bench explicit`.
 
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
-use leafdyn::internals::motion::{Explicit, TimeIntegrator, Physics};
+use leafdyn::internals::motion::{Explicit, Physics, TimeIntegrator};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::{self, Options, relax};
 use leafdyn::scenario::Scenario;

@@ -95,33 +95,26 @@
 //! this crate.
 
 #![warn(missing_docs)]
-
 mod branch;
-pub mod clock;
 mod homotopy;
 mod krylov;
-mod lanes;
-pub mod largest;
 mod leaf;
-mod limit;
 pub mod memory;
 mod modes;
 mod motion;
 pub mod natural;
 mod newton;
 pub mod numbers;
-mod refusal;
 pub mod relax;
 mod rod;
 mod rotation;
+pub mod run;
 pub mod scenario;
 pub mod shape;
 mod shooting;
+mod simd;
 pub mod simulate;
 pub mod study;
-mod tableau;
-pub mod undulation;
-mod words;
 
 /// Internals for this project's own tests and benchmarks: they may change with any release.
 #[doc(hidden)]
@@ -137,7 +130,7 @@ pub mod internals {
         };
     }
     pub mod lanes {
-        pub use crate::lanes::{Lanes, Vectors};
+        pub use crate::simd::{Lanes, Vectors};
     }
     pub mod leaf {
         pub use crate::leaf::{
@@ -149,7 +142,8 @@ pub mod internals {
     }
     pub mod motion {
         pub use crate::motion::{
-            Energy, Explicit, Inertia, TimeIntegrator, Physics, SemiImplicit, Snapshot, Steps, Stopped,
+            Energy, Explicit, Inertia, Physics, SemiImplicit, Snapshot, Steps, Stopped,
+            TimeIntegrator,
         };
     }
     pub mod rod {
@@ -159,8 +153,8 @@ pub mod internals {
         pub use crate::rotation::{exp, log, outer};
     }
     pub mod relax {
-        pub use crate::relax::settle::settle_from::settle_from;
-        pub use crate::relax::settle::start::start;
-        pub use crate::relax::stability::index::{index_near, project};
+        pub use crate::relax::solve_on_grid::settle_from;
+        pub use crate::relax::solve_on_grid::start::start;
+        pub use crate::relax::stability::{index_near, project};
     }
 }

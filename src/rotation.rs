@@ -3,7 +3,7 @@
 //!
 //! Increments are spatial: a rotation q becomes exp(theta) q.
 
-use crate::lanes::{Lanes, Vectors};
+use crate::simd::{Lanes, Vectors};
 use glam::{DMat3, DQuat, DVec3};
 use pulp::{Scalar, Simd};
 
@@ -28,6 +28,7 @@ const COS: [f64; 9] = [
     -1.0 / 87_178_291_200.0,
     1.0 / 20_922_789_888_000.0,
 ];
+
 const SINC: [f64; 9] = [
     1.0,
     -1.0 / 6.0,

@@ -1,8 +1,40 @@
 //! The state of rods at stations along them, which every method returns.
+//!
+//! Measures of undulation: the waves of each vein out of the leaf's surface, the twist of
+//! its section, and the waves predicted by linear theory.
+//!
+//! **Waves.** A vein has waves where it bends out of the surface alternately to both
+//! sides. Its normal curvature is the component of its curvature along the normal of the
+//! leaf, which is perpendicular to its tangent and to the line between the margins at equal
+//! fractions of the length (for a single vein, to its own director d2 in place of that
+//! line). The plane curve with this curvature is cut at its inflections: a part between two
+//! of them is a half-wave, and its height above their chord is its amplitude. So nothing has
+//! to be fitted, a vein that only droops is one half-wave, and the numbers depend neither on
+//! the position of the leaf nor on the order of its veins. Half-waves lower than
+//! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: they are joined
+//! with their neighbours.
+//!
+//! **Chirality.** The twist is the integral of u1 from base to tip, in radians, including
+//! the rest twist. It is positive where d2 turns about d1 like a right-handed screw seen
+//! from the base.
+//!
+//! **Linear theory** (section 5.1 of the paper). Under a mean axial force T the
+//! lateral displacement obeys, with eqs (12) and (13),
+//!
+//! ```text
+//! A2 Z'''' = f3 + T Z''
+//! ```
+//!
+//! and oscillates with the wavenumber sqrt(-T/A2) if T is compressive, which
+//! makes sqrt(-T/A2) L/pi half-waves along the vein.
 
-use crate::largest::larger;
-use glam::{DQuat, DVec3};
+use crate::numbers::larger;
+use crate::rotation;
+use crate::scenario::Scenario;
+use glam::{DQuat, DVec2, DVec3};
+use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
+use std::f64::consts::PI;
 
 /// The state of one rod at one station. Strains and stress resultants are
 /// components along the directors (d1, d2, d3).
@@ -128,4 +160,356 @@ pub fn serialize_positions<S: Serializer>(
     let positions =
         |rod: &RodShape| -> Vec<DVec3> { rod.nodes.iter().map(|node| node.position).collect() };
     serializer.collect_seq(rods.iter().map(positions))
+}
+
+/// Smallest height of a half-wave that counts, in lengths of the longest rod.
+pub const LEAST_HEIGHT: f64 = 1e-3;
+
+/// Smallest height of a half-wave that counts, in error estimates: it is a difference of three
+/// positions.
+const ERRORS: f64 = 4.0;
+
+/// Sine of the angle between a vein and the line between the margins below which the
+/// margins coincide.
+const SAME_PLACE: f64 = 1e-6;
+
+/// Smaller turns at a node, in radians, are rounding: not even thousands of them make a
+/// half-wave that counts.
+const STRAIGHT: f64 = 1e-10;
+
+/// Smaller mean twists, in radians, have no handedness.
+const LEAST_TWIST: f64 = 1e-3;
+
+/// The handedness of the mean twist from base to tip; in lower case in `summary.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hand {
+    /// Right-handed: the mean twist is positive.
+    Right,
+    /// Left-handed: the mean twist is negative.
+    Left,
+    /// No twist, or as much right-handed as left-handed.
+    None,
+}
+
+/// The undulation of one vein.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vein {
+    /// Half-waves along it: alternating extrema.
+    pub half_waves: usize,
+    /// Largest half of a height from crest to trough, in units of length; 0
+    /// without waves.
+    pub amplitude: f64,
+    /// Mean distance along the vein between one crest and the next, in units
+    /// of length; `None` without waves.
+    pub wavelength: Option<f64>,
+    /// Twist of the section from base to tip, in radians.
+    pub twist: f64,
+    /// Mean axial force T; negative: compression.
+    pub tension: f64,
+    /// |T| L^2/A2, dimensionless, with the mean A2, times the mean growth of the rest
+    /// length.
+    pub load_number: f64,
+}
+
+impl Vein {
+    /// Number of waves, a multiple of 1/2; a single half-wave does not count.
+    pub fn waves(&self) -> f64 {
+        match self.half_waves {
+            0 | 1 => 0.0,
+            count => 0.5 * count as f64,
+        }
+    }
+
+    /// Waves by linear theory: half of sqrt(|T|/A2) L/pi if T is compressive,
+    /// none in tension.
+    pub fn predicted_waves(&self) -> f64 {
+        match self.tension < 0.0 {
+            true => 0.5 * self.load_number.sqrt() / PI,
+            false => 0.0,
+        }
+    }
+}
+
+impl Serialize for Vein {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map([
+            ("waves", Some(self.waves())),
+            ("amplitude", Some(self.amplitude)),
+            ("wavelength", self.wavelength),
+            ("twist", Some(self.twist)),
+            ("tension", Some(self.tension)),
+            ("load_number", Some(self.load_number)),
+            ("predicted_waves", Some(self.predicted_waves())),
+        ])
+    }
+}
+
+/// The undulation of all veins, from one edge of the leaf to the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Undulation {
+    /// One entry per vein.
+    pub veins: Vec<Vein>,
+}
+
+/// The margin with more waves, or higher ones, in JSON.
+struct Margin<'a>(&'a Vein);
+
+impl Serialize for Margin<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Margin(vein) = self;
+        serializer.collect_map([
+            ("waves", Some(vein.waves())),
+            ("amplitude", Some(vein.amplitude)),
+            ("wavelength", vein.wavelength),
+            ("predicted_waves", Some(vein.predicted_waves())),
+        ])
+    }
+}
+
+impl Serialize for Undulation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Undulation", 4)?;
+        object.serialize_field("handedness", &self.hand())?;
+        object.serialize_field("twist", &self.twist())?;
+        object.serialize_field("margins", &self.margin().map(Margin))?;
+        object.serialize_field("veins", &self.veins)?;
+        object.end()
+    }
+}
+
+/// A centerline with the directors along it, base to tip.
+pub type Centerline = Vec<(DVec3, DQuat)>;
+
+impl Undulation {
+    /// The undulation of a leaf at rest: waves and twist from its `lines`, one per rod with
+    /// nodes at the same fractions of the length; forces from its `rods` at the `stations`.
+    /// `error` bounds the error of positions, if known.
+    pub fn of(
+        scenario: &Scenario,
+        lines: &[Centerline],
+        stations: &[f64],
+        rods: &[RodShape],
+        error: Option<f64>,
+    ) -> Self {
+        let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
+        let least = (LEAST_HEIGHT * longest).max(ERRORS * error.unwrap_or(0.0));
+        let veins = (0..lines.len().min(rods.len()))
+            .map(|j| {
+                let half_waves = half_waves(lines, j, least);
+                let material = &scenario.rods[j];
+                // Forces act on the longer arms of a vein that has grown.
+                let grown = material.rest_stretch.integral(1.0);
+                let tension = mean(stations, rods[j].nodes.iter().map(|node| node.n.x));
+                let bending = material.couple_stiffness[1].integral(1.0);
+                Vein {
+                    amplitude: amplitude(&half_waves),
+                    wavelength: wavelength(&half_waves),
+                    half_waves: half_waves.len(),
+                    twist: twist(&lines[j]),
+                    tension,
+                    load_number: tension.abs() * grown * material.length.powi(2) / bending,
+                }
+            })
+            .collect();
+        Undulation { veins }
+    }
+
+    /// The undulation of a leaf at rest whose shape is known only at the stations.
+    pub fn at_stations(
+        scenario: &Scenario,
+        stations: &[f64],
+        rods: &[RodShape],
+        error: Option<f64>,
+    ) -> Self {
+        let line = |rod: &RodShape| -> Centerline {
+            let nodes = rod.nodes.iter();
+            nodes.map(|node| (node.position, node.rotation)).collect()
+        };
+        let lines: Vec<Centerline> = rods.iter().map(line).collect();
+        Undulation::of(scenario, &lines, stations, rods, error)
+    }
+
+    /// The first and the last vein, which are the same in a leaf of one vein.
+    pub fn margins(&self) -> Option<[&Vein; 2]> {
+        Some([self.veins.first()?, self.veins.last()?])
+    }
+
+    /// The margin that has more waves, or higher ones.
+    pub fn margin(&self) -> Option<&Vein> {
+        let [first, last] = self.margins()?;
+        let more = last.half_waves.cmp(&first.half_waves);
+        match more.then(last.amplitude.total_cmp(&first.amplitude)) {
+            std::cmp::Ordering::Greater => Some(last),
+            _ => Some(first),
+        }
+    }
+
+    /// Mean twist of all veins from base to tip, in radians.
+    pub fn twist(&self) -> f64 {
+        let sum: f64 = self.veins.iter().map(|vein| vein.twist).sum();
+        sum / self.veins.len().max(1) as f64
+    }
+
+    /// Its handedness.
+    pub fn hand(&self) -> Hand {
+        match self.twist() {
+            twist if twist > LEAST_TWIST => Hand::Right,
+            twist if twist < -LEAST_TWIST => Hand::Left,
+            _ => Hand::None,
+        }
+    }
+}
+
+/// Trapezoidal mean over the length.
+fn mean(stations: &[f64], values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    let mean = |(s, v): (&[f64], &[f64])| 0.5 * (s[1] - s[0]) * (v[0] + v[1]);
+    stations.windows(2).zip(values.windows(2)).map(mean).sum()
+}
+
+/// The integral of u1: the twists of all segments.
+fn twist(line: &Centerline) -> f64 {
+    let turn = |pair: &[(DVec3, DQuat)]| rotation::log(pair[0].1.conjugate() * pair[1].1).x;
+    line.windows(2).map(turn).sum()
+}
+
+/// A half-wave between two inflections.
+#[derive(Clone, Copy, Debug)]
+struct HalfWave {
+    /// Its ends: indices of nodes plus fractions of the segments after them.
+    ends: [f64; 2],
+    /// Height of its extremum over the chord.
+    height: f64,
+    /// Arc length up to the extremum.
+    place: f64,
+}
+
+/// A vein developed into a plane by its normal curvature alone: its bending within the
+/// surface is left out.
+struct Curve {
+    /// Turn out of the surface at each inner node, in radians.
+    turns: Vec<f64>,
+    points: Vec<DVec2>,
+    /// Arc length of the polyline up to each node.
+    along: Vec<f64>,
+}
+
+impl Curve {
+    /// The curve of vein `j`, which has at least three nodes.
+    fn of(lines: &[Centerline], j: usize) -> Self {
+        let line = &lines[j];
+        let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        let (mut turns, mut last) = (Vec::new(), None);
+        for (i, pair) in steps.windows(2).enumerate() {
+            let [from, to] = [pair[0], pair[1]].map(DVec3::normalize_or_zero);
+            let tangent = (from + to).normalize_or_zero();
+            let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
+            let mut normal = tangent.cross(across.normalize_or_zero());
+            // Where the margins meet, the section defines the surface.
+            if normal.length() < SAME_PLACE {
+                normal = tangent.cross(line[i + 1].1 * DVec3::Y);
+            }
+            normal = normal.normalize_or_zero();
+            // Where the margins cross they change sides, but the normal must not.
+            if last.is_some_and(|last: DVec3| last.dot(normal) < 0.0) {
+                normal = -normal;
+            }
+            last = Some(normal);
+            turns.push((to - from).dot(normal).clamp(-1.0, 1.0).asin());
+        }
+        let (mut points, mut along, mut angle) = (vec![DVec2::ZERO], vec![0.0], 0.0);
+        for (i, step) in steps.iter().enumerate() {
+            let (length, k) = (step.length(), points.len() - 1);
+            points.push(points[k] + length * DVec2::from_angle(angle));
+            along.push(along[k] + length);
+            angle += turns.get(i).copied().unwrap_or(0.0);
+        }
+        Curve {
+            turns,
+            points,
+            along,
+        }
+    }
+
+    /// The point a fraction of a segment beyond a node.
+    fn point(&self, at: f64) -> DVec2 {
+        let i = (at as usize).min(self.points.len() - 2);
+        self.points[i].lerp(self.points[i + 1], at - i as f64)
+    }
+
+    /// Where the normal curvature changes sign: between the last node with one sign and
+    /// the first with the other.
+    fn inflections(&self) -> Vec<f64> {
+        let mut found = Vec::new();
+        let mut last: Option<(usize, f64)> = None;
+        let turns = self.turns.iter().enumerate();
+        for (i, &turn) in turns.filter(|(_, turn)| turn.abs() > STRAIGHT) {
+            if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
+                let part = before / (before - turn);
+                found.push((k + 1) as f64 + part * (i - k) as f64);
+            }
+            last = Some((i, turn));
+        }
+        found
+    }
+
+    fn half_wave(&self, ends: [f64; 2]) -> HalfWave {
+        let [from, to] = ends.map(|end| self.point(end));
+        let chord = (to - from).normalize_or_zero();
+        let first = ends[0].ceil() as usize;
+        let (mut height, mut place) = (0.0, self.along[first]);
+        for i in first..=ends[1].floor() as usize {
+            let off = chord.perp_dot(self.points[i] - from).abs();
+            if off > height {
+                (height, place) = (off, self.along[i]);
+            }
+        }
+        HalfWave {
+            ends,
+            height,
+            place,
+        }
+    }
+}
+
+/// The half-waves of vein `j` with at least this height.
+fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
+    if lines[j].len() < 4 {
+        return Vec::new();
+    }
+    let curve = Curve::of(lines, j);
+    let mut ends = vec![0.0];
+    ends.extend(curve.inflections());
+    ends.push((curve.points.len() - 1) as f64);
+    let mut waves: Vec<HalfWave> = (ends.windows(2))
+        .map(|pair| curve.half_wave([pair[0], pair[1]]))
+        .collect();
+    // The lowest is removed first; its neighbours bend to the same side and are joined.
+    while let Some(low) = (0..waves.len())
+        .filter(|&i| waves[i].height < least)
+        .min_by(|&a, &b| waves[a].height.total_cmp(&waves[b].height))
+    {
+        if waves.len() == 1 {
+            return Vec::new();
+        }
+        let (first, last) = (low.saturating_sub(1), (low + 1).min(waves.len() - 1));
+        let joined = curve.half_wave([waves[first].ends[0], waves[last].ends[1]]);
+        waves.splice(first..=last, [joined]);
+    }
+    waves
+}
+
+fn amplitude(waves: &[HalfWave]) -> f64 {
+    let halves = waves
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0].height + pair[1].height));
+    halves.fold(0.0, f64::max)
+}
+
+fn wavelength(waves: &[HalfWave]) -> Option<f64> {
+    match waves {
+        [] | [_] => None,
+        [first, .., last] => Some(2.0 * (last.place - first.place) / (waves.len() - 1) as f64),
+    }
 }

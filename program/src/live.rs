@@ -1,11 +1,12 @@
 //! The live page with a scenario in it, where the program was built with one.
 
-use crate::report::json;
+use crate::report;
 use serde::Serialize;
 
 /// The page that `web/build.sh` makes.
 #[cfg(feature = "live")]
 const PAGE: Option<&str> = Some(include_str!("../../web/dist/live.html"));
+
 #[cfg(not(feature = "live"))]
 const PAGE: Option<&str> = None;
 
@@ -53,7 +54,7 @@ pub fn page(text: &str, name: &str, sliders: &[Slider]) -> Result<String, NotBui
     };
     let mut data = Vec::new();
     // Writing to memory cannot fail.
-    let _ = json::write_json(&given, &mut data);
+    let _ = report::write_json(&given, &mut data);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     Ok(page.replacen(GIVEN, &GIVEN.replace("null", &data), 1))

@@ -23,25 +23,37 @@
 //! the same branch, with the same orientation and index, its tips known to the
 //! accuracy asked for. Otherwise the branch is continued on a finer grid
 //! from the last verified point.
+//!
+//! Linear algebra on fields of nodal increments and forces.
+//!
+//! Why a branch ends, or does not begin.
+//!
+//! The equations of branches: leaves that differ in parameters, linearised and solved.
+//!
+//! Along a branch on one grid: where it begins, its steps, and Newton's method back to it.
+//!
+//! Points of a branch on finer and finer grids, which verify them.
+//!
+//! Folds, branch points, and the vertices of pitchforks on one grid.
 
-pub mod boundary;
-mod events;
-mod problem;
-mod verify;
-mod walk;
+pub(crate) mod boundary;
+mod continuation;
+mod correct;
+mod critical;
+mod equations;
+mod family;
+mod refine;
+mod saddle_search;
 
-pub use crate::branch::events::critical::{Critical, Kind};
-pub use crate::branch::problem::equations::{Equations, Stuck};
-pub use crate::branch::problem::family::{Family, Range, between as value_between};
-pub(crate) use crate::branch::problem::field::{between, prolong_field, times};
-pub(crate) use crate::branch::verify::critical::NEARLY_RIGID;
-pub use crate::branch::verify::refined::{Doubt, Refined};
-pub(crate) use crate::branch::verify::regular::{on_finer, refine_at};
-pub use crate::branch::walk::begin::{begin, switch};
-pub use crate::branch::walk::follow::{Followed, Grids};
-pub use crate::branch::walk::steps::{End, Walk, walk};
-
-use crate::leaf::{Field, State};
+pub use crate::branch::continuation::{End, Followed, Grids, Walk, begin, switch, walk};
+pub use crate::branch::critical::{Critical, Kind};
+pub use crate::branch::equations::Equations;
+use crate::branch::family::OutOfRange;
+pub use crate::branch::family::{Family, Range, between as value_between};
+pub use crate::branch::refine::{Doubt, Refined};
+pub(crate) use crate::branch::refine::{NEARLY_RIGID, on_finer, refine_at};
+use crate::leaf::{DirectError, Field, Increment, State};
+use crate::relax::Stencil;
 
 /// A point of a branch on one grid.
 #[derive(Clone, Debug)]
@@ -98,5 +110,172 @@ impl<const N: usize> Direction<N> {
     /// Parameters `step` further along it than these.
     fn further(&self, params: [f64; N], step: f64) -> [f64; N] {
         std::array::from_fn(|i| params[i] + step * self.params[i])
+    }
+}
+
+/// The work of forces on increments.
+pub fn dot(forces: &Field, increments: &Field) -> f64 {
+    let mut sum = 0.0;
+    for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
+        sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
+    }
+    sum
+}
+
+/// a + factor b.
+pub fn plus(a: &Field, factor: f64, b: &Field) -> Field {
+    let mut sum = a.clone();
+    add(&mut sum, factor, b);
+    sum
+}
+
+/// a <- a + factor b.
+pub fn add(a: &mut Field, factor: f64, b: &Field) {
+    for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
+        for c in 0..6 {
+            a[c] += factor * b[c];
+        }
+    }
+}
+
+/// a times a factor.
+pub fn times(a: &Field, factor: f64) -> Field {
+    let of = |a: &Increment| a.map(|a| factor * a);
+    a.iter().map(|rod| rod.iter().map(of).collect()).collect()
+}
+
+/// The linear combination of fields with these coefficients.
+pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
+    let mut sum = times(&fields[0], 0.0);
+    for (part, field) in parts.iter().zip(fields) {
+        add(&mut sum, *part, field);
+    }
+    sum
+}
+
+pub fn largest(a: &Field) -> f64 {
+    crate::numbers::largest(a.iter().flatten().flatten().map(|v| v.abs()))
+}
+
+/// The increments of the nodes from the `first` on that lead from one state to another on the same
+/// grid.
+pub fn between(a: &State, b: &State, first: usize) -> Field {
+    let mut field = Field::new();
+    a.increments_to(b, first, &mut field);
+    field
+}
+
+pub fn is_finite(a: &Field) -> bool {
+    a.iter().flatten().flatten().all(|v| v.is_finite())
+}
+
+/// Increments on the grid with all segments halved: cubic interpolation, zero at clamped bases, where
+/// the `first` node of the field is the next.
+pub fn prolong_field(a: &Field, first: usize) -> Field {
+    a.iter().map(|rod| prolong_rod(rod, first)).collect()
+}
+
+/// Nodal forces on the grid with all segments halved: the given ones at the nodes of this grid,
+/// zero at the new ones.
+pub fn at_same_nodes(a: &Field, first: usize) -> Field {
+    // A new node precedes every one but a base.
+    let all = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect::<Vec<_>>();
+    let rod = |rod: &Vec<Increment>| all(rod).split_off(1 - first);
+    a.iter().map(rod).collect()
+}
+
+/// Increments on the grid with every second node.
+pub fn every_second(a: &Field, first: usize) -> Field {
+    let rod = |rod: &Vec<Increment>| rod.iter().skip(first).step_by(2).copied().collect();
+    a.iter().map(rod).collect()
+}
+
+fn prolong_rod(rod: &[Increment], first: usize) -> Vec<Increment> {
+    let n = rod.len() + first - 1;
+    let at = |i: usize| match i < first {
+        true => [0.0; 6],
+        false => rod[i - first],
+    };
+    let node = |k: usize| {
+        if k.is_multiple_of(2) {
+            return at(k / 2);
+        }
+        // Four neighbouring nodes; at the ends, the nearest four.
+        let mut sum = [0.0; 6];
+        for (i, weight) in Stencil::<4>::new(0, n + 1, k as f64 / 2.0).terms() {
+            let value = at(i);
+            for c in 0..6 {
+                sum[c] += weight * value[c];
+            }
+        }
+        sum
+    };
+    (first..=2 * n).map(node).collect()
+}
+
+/// Why no point is found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Stuck {
+    /// The parameter has left its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A segment bends by more than the grid resolves.
+    #[error("a vein bends by more than a right angle within one segment")]
+    Unresolved,
+    /// Newton's method does not converge.
+    #[error("Newton's method does not lead back to the branch")]
+    NotConverged,
+    /// The matrix does not fit into memory.
+    #[error("the sparse factorisation of the leaf does not fit into memory")]
+    TooLarge,
+    /// No grid has the Morse index of the leaf.
+    #[error(
+        "no grid has as many negative eigenvalues as the leaf, which is too close to a bifurcation: start farther from it"
+    )]
+    BesideBifurcation,
+    /// Rounding may change the sign of the softest eigenvalues.
+    #[error("rounding on so many segments hides which eigenvalues are negative: fewer tell more")]
+    Rounding,
+    /// Modes that became neutral together no longer do.
+    #[error("modes that become neutral together part")]
+    Separated,
+    /// The second parameter breaks the symmetry to which the branch point is due.
+    #[error("the second number breaks the symmetry by which branches cross")]
+    Unfolded,
+    /// The limit of the run was reached.
+    #[error("the run was stopped")]
+    Stopped,
+}
+
+impl From<DirectError> for Stuck {
+    fn from(error: DirectError) -> Self {
+        match error {
+            DirectError::Memory => Stuck::TooLarge,
+            DirectError::NotFinite => Stuck::NotConverged,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubics_are_prolonged_exactly() {
+        let f = |s: f64| [s, s * s, s * s * s, 2.0 * s - s * s, 0.0, -s];
+        for (n, first) in [(3, 1), (4, 1), (7, 1), (3, 0), (4, 0)] {
+            let on = |n: usize| {
+                vec![
+                    (first..=n)
+                        .map(|i| f(i as f64 / n as f64))
+                        .collect::<Vec<_>>(),
+                ]
+            };
+            let (coarse, fine) = (on(n), on(2 * n));
+            let difference = plus(&prolong_field(&coarse, first), -1.0, &fine);
+            assert!(largest(&difference) < 1e-14, "{n}");
+            assert_eq!(every_second(&fine, first), coarse);
+            assert_eq!(every_second(&at_same_nodes(&coarse, first), first), coarse);
+        }
     }
 }

@@ -12,12 +12,12 @@
 //! leaves G e missing in addition, and e = e0 + G e is solved by [`minimal_residual`]. But for the
 //! rods whose strain is determined G is small, so that few solutions are enough at any stiffness.
 
-use super::derivative::Response;
-use super::discrete::DiscreteLeaf;
-use super::state::{Field, State};
-use super::system::System;
 use crate::krylov::{KrylovLimits, minimal_residual};
-use crate::largest::largest;
+use crate::leaf::derivative::Response;
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::{Field, State};
+use crate::leaf::system::System;
+use crate::numbers::largest;
 use crate::rod::{Section, Segment};
 use glam::DVec3;
 

@@ -1,8 +1,23 @@
 //! Loads on the nodes of several rods: dead loads, and the coupling with their neighbours.
+//!
+//! Dead moments on a single rod, fixed along the lab axes: on its tip, and on points along it. They
+//! have no potential in three dimensions.
+//!
+//! Dead moments in Newton's equations of a single rod.
+//!
+//! A dead moment M is not conservative in three dimensions: the derivative of its node's moment
+//! balance in spatial increments gains -\[M\]/2, which is skew. All of them together have a small
+//! rank, and are included by the Sherman-Morrison-Woodbury formula: with the rotations C of their
+//! nodes by unit moments on these and the skew S, the moments x that (1 + S C) x = S t of the
+//! rotations t without them are taken off.
 
-use crate::lanes::{Four, GROUP, Lanes, Vectors};
+use crate::leaf::block_tridiagonal::{Increments, group_and_lane};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::system::{Group, System};
+use crate::leaf::{Leaf, Loads, SAME_NODE};
+use crate::simd::{Four, GROUP, Lanes, Vectors};
 use glam::DVec3;
-use pulp::Simd;
+use pulp::{Arch, Simd};
 
 /// Loads on a rod per weight of its nodes, except the force on its tip.
 #[derive(Clone, Copy)]
@@ -109,4 +124,249 @@ impl<S: Simd> RodLoads<S> {
     pub fn stiffness(&self) -> Vectors<S> {
         self.previous + self.next + self.image
     }
+}
+
+impl Loads {
+    /// Whether dead moments act.
+    pub fn has_moments(&self) -> bool {
+        self.tip_moment != DVec3::ZERO || self.moments != 0.0
+    }
+}
+
+impl Leaf {
+    /// Sigma and size of every dead moment on a point.
+    pub(super) fn moments_on_points(&self) -> impl Iterator<Item = (f64, DVec3)> {
+        let (points, unit) = (self.scenario().points.iter(), self.scale.moment());
+        points.map(move |it| (it.at, DVec3::from_array(it.moment) / unit))
+    }
+
+    /// Sigma and size of every dead moment.
+    pub fn moments(&self) -> impl Iterator<Item = (f64, DVec3)> {
+        let (loads, points) = (&self.loads, self.moments_on_points());
+        let on_points = points.map(|(at, moment)| (at, loads.moments * moment));
+        let all = std::iter::once((1.0, loads.tip_moment)).chain(on_points);
+        all.filter(|(_, moment)| *moment != DVec3::ZERO)
+    }
+
+    /// The size of the largest dead moment on a point.
+    pub fn largest_on_points(&self) -> f64 {
+        let sizes = self.moments_on_points().map(|(_, moment)| moment.length());
+        self.loads.moments * sizes.fold(0.0, f64::max)
+    }
+
+    /// Upper bound on the integral of the moment that the rod carries by the dead moments alone, over
+    /// its length: a free rod carries each up to its place, one that is held elsewhere perhaps
+    /// beyond it.
+    pub fn integral_of_moments(&self) -> f64 {
+        let held = self.is_held();
+        let reach = |at: f64| if held { 1.0 } else { at };
+        self.moments()
+            .map(|(at, moment)| moment.length() * reach(at))
+            .sum()
+    }
+}
+
+impl DiscreteLeaf {
+    /// Nodes and sizes of the dead moments on points; empty if there are none. What acts within
+    /// rounding of a clamped base is left to its clamp.
+    pub(super) fn moments_on_nodes(&self) -> Vec<(usize, DVec3)> {
+        let points = self.leaf.moments_on_points();
+        let some = points.filter(|(_, moment)| *moment != DVec3::ZERO);
+        some.map(|(at, moment)| (self.grid.nearest(at), moment))
+            .filter(|(node, _)| *node >= self.first_node())
+            .collect()
+    }
+
+    /// Whether dead moments act.
+    pub fn has_moments(&self) -> bool {
+        self.moments().next().is_some()
+    }
+
+    /// The same leaf without dead moments.
+    pub fn without_moments(&self) -> Self {
+        let mut without = self.clone();
+        without.loads.tip_moment = DVec3::ZERO;
+        without.loads.moments = 0.0;
+        without
+    }
+
+    /// Node and size of every dead moment that acts.
+    pub fn moments(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        let part = self.load_factor;
+        self.moments_of(self.loads)
+            .map(move |(node, moment)| (node, part * moment))
+            .filter(|(_, moment)| *moment != DVec3::ZERO)
+    }
+
+    /// The same under other loads.
+    pub fn moments_of(&self, loads: Loads) -> impl Iterator<Item = (usize, DVec3)> {
+        let tip = (self.segments(), loads.tip_moment);
+        let on_points = self.point_moments.iter();
+        let on_points = on_points.map(move |&(node, moment)| (node, loads.moments * moment));
+        // Joined tips pass on no moment.
+        let single = self.rods() == 1;
+        let tip = Some(tip).filter(|(_, moment)| single && *moment != DVec3::ZERO);
+        tip.into_iter().chain(on_points)
+    }
+
+    /// The sum of the dead moments on node `i` of the rod.
+    pub(super) fn moment_on(&self, i: usize) -> DVec3 {
+        if !self.loads.has_moments() {
+            return DVec3::ZERO;
+        }
+        let here = self.moments().filter(|(node, _)| *node == i);
+        here.map(|(_, moment)| moment).sum()
+    }
+
+    /// The sum of the dead moments at `sigma`, by which the moment of the rod jumps there.
+    pub fn moment_at(&self, sigma: f64) -> DVec3 {
+        if !self.loads.has_moments() {
+            return DVec3::ZERO;
+        }
+        let here = |node: usize| (self.grid.sigma()[node] - sigma).abs() < SAME_NODE;
+        let moments = self.moments().filter(|(node, _)| here(*node));
+        moments.map(|(_, moment)| moment).sum()
+    }
+
+    /// The sum of the dead moments beyond segment `i`: what it carries of them if the tip is free.
+    pub fn moment_beyond(&self, i: usize) -> DVec3 {
+        let beyond = self.moments().filter(|(node, _)| *node > i);
+        beyond.map(|(_, moment)| moment).sum()
+    }
+
+    /// Adds the dead moments to the right-hand side of an assembled system, which keeps them for
+    /// its solution.
+    pub(super) fn add_moments(&self, system: &mut System) {
+        let first = self.first_node();
+        system
+            .moments
+            .set(self.moments().map(|(node, moment)| (node - first, moment)));
+        let (group, lane) = group_and_lane(0);
+        for (i, moment) in system.moments.on_nodes() {
+            let rhs = &mut system.groups[group].rhs[i];
+            for c in 0..3 {
+                rhs[c].0[lane] += moment[c];
+            }
+        }
+    }
+}
+
+/// The dead moments as of the last assembly, with the workspace of their equations.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeadMoments {
+    /// Nodes with equations (from 0) and moments.
+    on_nodes: Vec<(usize, DVec3)>,
+    /// Their equations, row after row, each with its right-hand side last.
+    rows: Vec<f64>,
+}
+
+impl DeadMoments {
+    /// Replaces them.
+    pub fn set(&mut self, moments: impl Iterator<Item = (usize, DVec3)>) {
+        self.on_nodes.clear();
+        self.on_nodes.extend(moments);
+    }
+
+    /// Nodes (from 1) and moments.
+    pub fn on_nodes(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        self.on_nodes.iter().copied()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.on_nodes.is_empty()
+    }
+
+    /// Writes S times the rotations of the nodes to a column of the equations.
+    fn set_column(&mut self, column: usize, rotations: &[Increments]) {
+        let width = 3 * self.on_nodes.len() + 1;
+        for (a, (node, moment)) in self.on_nodes.iter().enumerate() {
+            let turn = rotation(&rotations[*node]);
+            let by = turn.cross(0.5 * *moment);
+            for c in 0..3 {
+                self.rows[(3 * a + c) * width + column] = by[c];
+            }
+        }
+    }
+}
+
+fn rotation(increments: &Increments) -> DVec3 {
+    let [x, y, z] = [0, 1, 2].map(|c| increments[c].0[0]);
+    DVec3::new(x, y, z)
+}
+
+impl System {
+    /// Includes the dead moments in the solution; false if the matrix with them is singular.
+    pub(super) fn correct_for_moments(&mut self) -> bool {
+        let (arch, group, dead) = (self.arch, &mut self.groups[0], &mut self.moments);
+        let size = 3 * dead.on_nodes.len();
+        dead.rows.resize(size * (size + 1), 0.0);
+        for column in 0..size {
+            let (node, axis) = (dead.on_nodes[column / 3].0, DVec3::AXES[column % 3]);
+            group.respond(arch, [(node, axis)]);
+            dead.set_column(column, &group.z);
+            dead.rows[column * (size + 1) + column] += 1.0;
+        }
+        dead.set_column(size, &group.solution);
+        if !eliminate(&mut dead.rows, size) {
+            return false;
+        }
+        let part = |k: usize| dead.rows[k * (size + 1) + size];
+        let taken = |(a, (node, _)): (usize, &(usize, DVec3))| {
+            (
+                *node,
+                DVec3::new(part(3 * a), part(3 * a + 1), part(3 * a + 2)),
+            )
+        };
+        group.respond(arch, dead.on_nodes.iter().enumerate().map(taken));
+        for (solution, z) in group.solution.iter_mut().zip(&group.z) {
+            for c in 0..6 {
+                solution[c].0[0] -= z[c].0[0];
+            }
+        }
+        true
+    }
+}
+
+impl Group {
+    /// z = B^-1 times moments on nodes with equations (from 0) of the first rod.
+    fn respond(&mut self, arch: Arch, moments: impl IntoIterator<Item = (usize, DVec3)>) {
+        self.residual.fill(Increments::default());
+        for (node, moment) in moments {
+            for c in 0..3 {
+                self.residual[node][c].0[0] += moment[c];
+            }
+        }
+        self.matrix.forward(arch, &self.residual, &mut self.z);
+        (self.matrix).backward(arch, &self.residual, &mut self.z);
+    }
+}
+
+/// Solves `size` equations in place by Gaussian elimination with partial pivoting: the solution is
+/// left in the last column. False if they are singular, or not finite.
+fn eliminate(rows: &mut [f64], size: usize) -> bool {
+    let width = size + 1;
+    for k in 0..size {
+        let below = |i: &usize| rows[i * width + k].abs();
+        let Some(pivot) = (k..size).max_by(|a, b| below(a).total_cmp(&below(b))) else {
+            return false;
+        };
+        let largest = rows[pivot * width + k];
+        if largest == 0.0 || !largest.is_finite() {
+            return false;
+        }
+        for c in k..width {
+            rows.swap(pivot * width + c, k * width + c);
+        }
+        for i in (0..size).filter(|i| *i != k) {
+            let factor = rows[i * width + k] / largest;
+            for c in k..width {
+                rows[i * width + c] -= factor * rows[k * width + c];
+            }
+        }
+    }
+    for k in 0..size {
+        rows[k * width + size] /= rows[k * width + k];
+    }
+    (0..size).all(|k| rows[k * width + size].is_finite())
 }

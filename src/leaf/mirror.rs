@@ -6,9 +6,9 @@
 //! plane, too. Of the gap across the plane, if N is even, only the coupling along y is ever
 //! stretched.
 
-use super::dimensionless::Leaf;
-use super::flow::RodFields;
-use super::state::State;
+use crate::leaf::Leaf;
+use crate::leaf::rod_ode::RodFields;
+use crate::leaf::state::State;
 use crate::scenario::{Hold, Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};

@@ -1,39 +1,520 @@
 //! The whole leaf, dimensionless and discretised: numbering, loads, coupling,
 //! the joint tip, assembly, and the linear algebra that its structure allows.
+//!
+//! A scenario in dimensionless form.
+//!
+//! The rest shape of curved veins at the nodes of a grid.
+//!
+//! Veins that tissue ties, or that meet at a tip, must fit together at rest: what their rest shapes
+//! miss by their discretisation, stiff tissue would turn into forces. So the rest strain and the rest
+//! curvature of their segments are those of a segment between two nodes of the natural leaf,
+//!
+//! v0 = R^T (x1 - x0)/ds,   u0 = log(q0^* q1)/ds,
+//!
+//! which differ from those at its middle by a series in ds^2.
+//!
+//! Loads that veins have of their own, besides those that all share: their weights, loads along
+//! them, and loads on points. They are dead.
 
 mod assembly;
-mod chain;
+mod block_tridiagonal;
 mod derivative;
-mod dimensionless;
 mod direct;
 mod discrete;
-mod factorised;
-mod flow;
-mod grid;
-mod holds;
 mod law;
 mod loads;
 mod mirror;
-mod moments;
 #[cfg(test)]
 mod not_a_number;
-mod own_loads;
-mod rest_shape;
+pub(crate) mod rod_ode;
+mod solve;
 mod state;
+mod supports;
 mod system;
 mod tissue;
-mod turning;
 
+pub use crate::leaf::assembly::{Jump, Tangent};
 pub use crate::leaf::derivative::{Forces, LeafRate, Response, at_constant_force};
+pub use crate::leaf::direct::{Bordered, DirectError, DirectSolver, Factors};
+pub use crate::leaf::discrete::{DiscreteLeaf, Grid};
+pub use crate::leaf::mirror::{
+    are_mirrored, half_of, is_mirrored, whole_changes, whole_fields, whole_of,
+};
+pub use crate::leaf::rod_ode::{Flow, RodFields, Slice};
+pub use crate::leaf::solve::Factorised;
+pub use crate::leaf::state::{Field, Increment, State, add, shift, turn};
+pub use crate::leaf::system::{Solved, Sums, System};
+pub use crate::leaf::tissue::HalfTurn;
+use crate::natural::Natural;
+use crate::rod::Section;
+use crate::rotation;
 pub use crate::scenario::Scale;
-pub use assembly::{Jump, Tangent};
-pub use dimensionless::{Gripped, Leaf, Loads};
-pub use direct::{Bordered, DirectError, DirectSolver, Factors};
-pub use discrete::DiscreteLeaf;
-pub use factorised::Factorised;
-pub use flow::{Flow, RodFields, Slice};
-pub use grid::Grid;
-pub use mirror::{are_mirrored, half_of, is_mirrored, whole_changes, whole_fields, whole_of};
-pub use state::{Field, Increment, State, add, shift, turn};
-pub use system::{Solved, Sums, System};
-pub use tissue::HalfTurn;
+use crate::scenario::{Clamp, Dynamics, Hold, Profile, Rod, Scenario, Turning, ascending};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// Upper limit of the stiffness in stretch and shear with which segment forces are condensed
+/// out, in units of A/L^2 with the softest A of the leaf. Larger limits lose the soft modes to
+/// rounding, smaller ones cost iterations.
+const CONDENSING_STIFFNESS: f64 = 1e7;
+
+/// Lower bound of that limit, in units of the mean A/L^2.
+const LEAST_CONDENSING: f64 = 1e5;
+
+/// A leaf with all quantities dimensionless, before discretisation.
+#[derive(Clone, Debug)]
+pub struct Leaf {
+    scenario: Arc<Scenario>,
+    /// Whether this is half of a mirror-symmetric leaf.
+    pub(super) mirrored: bool,
+    /// The units.
+    pub scale: Scale,
+    /// The loads at rest.
+    pub loads: Loads,
+    /// The tip, if it is held.
+    pub held: Option<Held>,
+    /// Whether hinges hold the bases.
+    hinged: bool,
+    /// The veins that can turn without resistance.
+    pub(super) turnings: Vec<Turning>,
+    kinks: Vec<f64>,
+    /// The smallest couple stiffness, mid-rod.
+    softest: f64,
+}
+
+/// A tip that is held.
+#[derive(Clone, Debug)]
+pub struct Held {
+    /// The position.
+    pub position: DVec3,
+    /// If rotations are held too, the clamps, one per rod.
+    pub clamps: Option<Vec<Clamp>>,
+}
+
+impl Held {
+    /// The rotation in which the tip of rod `j` is held.
+    pub fn rotation(&self, j: usize) -> Option<DQuat> {
+        Some(self.clamps.as_ref()?[j].rotation())
+    }
+}
+
+/// A node that a grip holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gripped {
+    /// Number of the grip.
+    pub grip: usize,
+    /// Rod and node.
+    pub rod: usize,
+    pub node: usize,
+    /// Where it is held.
+    pub position: DVec3,
+    /// In which rotation, if that is held.
+    pub rotation: Option<DQuat>,
+}
+
+/// Dead loads.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Loads {
+    /// Gravity per unit length.
+    pub gravity: DVec3,
+    /// Force on the joint tip, or on every free one.
+    pub tip_force: DVec3,
+    /// Moment on the tip of a single rod.
+    pub tip_moment: DVec3,
+    /// Part of the loads that veins have of their own: zero without any.
+    pub own: f64,
+    /// Part of the dead moments on points of a single rod: zero without any.
+    pub moments: f64,
+}
+
+impl std::ops::Sub for Loads {
+    type Output = Loads;
+
+    fn sub(self, other: Loads) -> Loads {
+        Loads {
+            gravity: self.gravity - other.gravity,
+            tip_force: self.tip_force - other.tip_force,
+            tip_moment: self.tip_moment - other.tip_moment,
+            own: self.own - other.own,
+            moments: self.moments - other.moments,
+        }
+    }
+}
+
+impl std::ops::Mul<f64> for Loads {
+    type Output = Loads;
+
+    fn mul(self, factor: f64) -> Loads {
+        Loads {
+            gravity: self.gravity * factor,
+            tip_force: self.tip_force * factor,
+            tip_moment: self.tip_moment * factor,
+            own: self.own * factor,
+            moments: self.moments * factor,
+        }
+    }
+}
+
+impl Leaf {
+    /// Scales a checked scenario.
+    pub fn new(scenario: &Scenario) -> Self {
+        Leaf::in_units(Arc::new(scenario.clone()), scenario.scale())
+    }
+
+    /// A scenario in given units, so that leaves that differ in length or stiffness are
+    /// comparable.
+    pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
+        // The profiles of the masses matter for motions.
+        let Dynamics {
+            density,
+            rotary_inertia,
+            ..
+        } = &scenario.dynamics;
+        let masses = density.iter().chain(rotary_inertia);
+        let masses = masses.flat_map(Profile::kinks).copied();
+        let kinks = ascending(scenario.kinks().into_iter().chain(masses));
+        let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
+        let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
+        let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
+        let mut leaf = Leaf {
+            mirrored: false,
+            scale,
+            loads: Loads {
+                gravity: vector(scenario.gravity, scale.force() / scale.length),
+                tip_force: vector(scenario.tip_force, scale.force()),
+                tip_moment: vector(scenario.tip_moment, scale.moment()),
+                own: 0.0,
+                moments: 0.0,
+            },
+            held: scenario.held_tip.as_ref().map(|held| Held {
+                position: vector(held.position, scale.length),
+                clamps: held.clamps.clone(),
+            }),
+            hinged: scenario.base_held == Hold::Pinned,
+            turnings: scenario.turnings(),
+            kinks,
+            softest: softest / scale.stiffness,
+            scenario,
+        };
+        leaf.loads.own = if leaf.scenario.has_own_loads() {
+            1.0
+        } else {
+            0.0
+        };
+        if leaf.moments_on_points().any(|(_, it)| it != DVec3::ZERO) {
+            leaf.loads.moments = 1.0;
+        }
+        leaf
+    }
+
+    /// The scenario it was made from.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Whether all that acts on it has a potential: a dead moment has none, nor has wind. Otherwise
+    /// its rest is no minimum of an energy, and no eigenvalue tells whether it is stable.
+    pub fn has_potential(&self) -> bool {
+        !self.loads.has_moments() && !self.in_wind()
+    }
+
+    /// Whether wind acts on it.
+    pub fn in_wind(&self) -> bool {
+        self.scenario.wind.is_some()
+    }
+
+    /// The leaf with its tips apart and without the coupling of its veins; each tip bears an equal
+    /// part of the force on the joint one. Tissue, which has no force between veins in their rest
+    /// shapes, still ties them.
+    pub fn apart(&self) -> Leaf {
+        let mut apart = self.clone();
+        if self.joined() {
+            apart.loads.tip_force /= self.scenario.rods.len() as f64;
+        }
+        let scenario = Arc::make_mut(&mut apart.scenario);
+        scenario.joined = false;
+        scenario.coupling.fill([0.0; 3]);
+        apart
+    }
+
+    /// Number of rods: of the whole leaf, or of the half.
+    pub fn rods(&self) -> usize {
+        let rods = self.scenario.rods.len();
+        rods.div_ceil(if self.mirrored { 2 } else { 1 })
+    }
+
+    /// Whether the rods of another leaf are the same in the same units.
+    pub fn has_same_rods(&self, other: &Leaf) -> bool {
+        (self.mirrored, self.scale) == (other.mirrored, other.scale)
+            && self.scenario.rods == other.scenario.rods
+    }
+
+    /// Whether it is half of a leaf that is its own mirror image.
+    pub fn in_half(&self) -> bool {
+        self.mirrored
+    }
+
+    /// Fraction of rod `j` that belongs to this leaf: one half for the midrib of half a leaf.
+    pub fn share(&self, j: usize) -> f64 {
+        if self.in_plane(j) { 0.5 } else { 1.0 }
+    }
+
+    /// Whether rod `j` is the midrib of half a leaf.
+    pub fn in_plane(&self, j: usize) -> bool {
+        let count = self.scenario.rods.len();
+        self.mirrored && count % 2 == 1 && 2 * j + 1 == count
+    }
+
+    /// Whether rod `j` of half a leaf is next to its own mirror image.
+    pub fn beside_image(&self, j: usize) -> bool {
+        self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
+    }
+
+    /// Whether no load, rest curvature or holder acts out of the plane z = 0.
+    pub fn is_planar(&self) -> bool {
+        let s = self.scenario();
+        let curvatures = s.rods.iter().flat_map(|rod| &rod.rest_curvature[..2]);
+        s.is_loaded_in_plane()
+            && self.held.is_none()
+            && curvatures.into_iter().all(|of| of.max_abs() == 0.0)
+    }
+
+    /// Whether all tips share one point.
+    pub fn joined(&self) -> bool {
+        self.scenario.joined
+    }
+
+    /// Fractions of the length where some profile has a kink, ascending.
+    pub fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    /// Puts the tips where they are held, if they are.
+    pub fn hold_tips(&self, state: &mut State) {
+        let Some(held) = &self.held else {
+            return;
+        };
+        for j in 0..self.rods() {
+            let tip = state.base(j) + state.segments();
+            state.x[tip] = held.position;
+            if let Some(rotation) = held.rotation(j) {
+                state.q[tip] = rotation;
+            }
+        }
+    }
+
+    /// Length of rod `j`.
+    pub fn length(&self, j: usize) -> f64 {
+        self.rod(j).length / self.scale.length
+    }
+
+    /// Rest length of rod `j` from the base up to `sigma`, including growth.
+    pub fn grown(&self, j: usize, sigma: f64) -> f64 {
+        self.length(j) * self.rod(j).rest_stretch.integral(sigma)
+    }
+
+    /// Position and rotation of the base of rod `j` (paper, section 2.4 (a) and (c)).
+    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+        let (rod, length) = (self.rod(j), self.scale.length);
+        let rotation = match rod.elevation == 0.0 && rod.roll == 0.0 {
+            true => rotation::exp(rod.angle * DVec3::Z),
+            false => rod.base_rotation(),
+        };
+        (rod.base_position() / length, rotation)
+    }
+
+    /// Whether sections are the same all along each rod.
+    pub fn uniform(&self) -> bool {
+        let constant = |profile: &Profile| matches!(profile, Profile::Constant(_));
+        self.scenario
+            .rods
+            .iter()
+            .flat_map(Rod::profiles)
+            .all(constant)
+    }
+
+    /// Section of rod `j` at `sigma`, for a segment that is the fraction
+    /// `width` of the rod.
+    pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
+        let rod = self.rod(j);
+        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::all(p, sigma));
+        let share = self.share(j);
+        Section {
+            ds: self.length(j) * width,
+            couple_stiffness: share * at(&rod.couple_stiffness) / self.scale.stiffness,
+            rest_curvature: at(&rod.rest_curvature) * self.scale.length,
+            rest_strain: DVec3::X * rod.rest_stretch.at(sigma),
+            compliance: (share * at(&rod.force_stiffness) / self.scale.force()).recip(),
+            condensing: DVec3::ZERO,
+        }
+        .condense(share * (CONDENSING_STIFFNESS * self.softest).max(LEAST_CONDENSING))
+    }
+
+    /// Coupling of gap `g` between rods g and g + 1: force per unit
+    /// displacement and unit of sigma.
+    pub fn coupling(&self, g: usize) -> DVec3 {
+        let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
+        DVec3::from_array(self.scenario.coupling[g]) * gap_length * self.scale.length.powi(2)
+            / self.scale.force()
+    }
+
+    /// Whether the tip, or a part of a rod, is held by something that is moved to its place.
+    pub fn is_held(&self) -> bool {
+        self.held.is_some() || !self.scenario.grips.is_empty()
+    }
+
+    /// Whether hinges hold the bases: they stay in their places, and turn freely.
+    #[inline]
+    pub fn hinged(&self) -> bool {
+        self.hinged
+    }
+
+    /// Whether all rods begin in the origin, in the plane z = 0.
+    pub fn is_fan(&self) -> bool {
+        self.scenario.is_fan()
+    }
+
+    /// Whether tissue ties the rods.
+    pub fn has_tissue(&self) -> bool {
+        self.scenario.tissue.is_some()
+    }
+
+    /// Stiffness k of the tissue in gap `g` at `sigma` per displacement, and c_1 (in the first
+    /// component) per radian, both per unit of sigma.
+    pub fn tissue(&self, g: usize, sigma: f64) -> [DVec3; 2] {
+        let Some(tissue) = &self.scenario.tissue else {
+            return [DVec3::ZERO; 2];
+        };
+        let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
+        let [along, across, normal, fold] = tissue[g].profiles().map(|of| of.at(sigma));
+        let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
+        [k, fold * DVec3::X].map(|it| it * gap_length / self.scale.force())
+    }
+
+    fn rod(&self, j: usize) -> &Rod {
+        &self.scenario.rods[j]
+    }
+}
+
+impl Leaf {
+    /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
+    /// ties the rods.
+    pub(super) fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {
+        if !self.has_tissue() {
+            return;
+        }
+        let natural = Natural::new(self.scenario(), true);
+        for (j, sections) in sections.chunks_mut(grid.segments()).enumerate() {
+            if self.is_straight_at_rest(j) {
+                continue;
+            }
+            let mut before = natural.at(j, 0.0);
+            for (section, sigma) in sections.iter_mut().zip(&grid.sigma()[1..]) {
+                let next = natural.at(j, *sigma);
+                let ((x0, q0), (x1, q1)) = (before, next);
+                let chord = (x1 - x0) / (self.scale.length * section.ds);
+                section.rest_strain = rotation::midpoint(q0, q1).inverse() * chord;
+                section.rest_curvature = rotation::log(q0.conjugate() * q1) / section.ds;
+                before = next;
+            }
+        }
+    }
+
+    /// Whether a rod at rest is straight and stretched alike everywhere.
+    fn is_straight_at_rest(&self, j: usize) -> bool {
+        let rod = &self.scenario().rods[j];
+        let [_, bends @ ..] = &rod.rest_curvature;
+        let even = matches!(rod.rest_stretch, Profile::Constant(_));
+        even && bends.iter().all(|of| of.max_abs() == 0.0)
+    }
+}
+
+/// Fractions of the length closer to each other than this are those of one node.
+pub(super) const SAME_NODE: f64 = 1e-11;
+
+impl Leaf {
+    /// Own load on rod `j` at `sigma`, per unit of sigma, without those on points.
+    pub fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+        let s = self.scenario();
+        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+        let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+        });
+        (weight + along) * (self.share(j) * s.rods[j].length / self.scale.force())
+    }
+
+    /// Rod, sigma and force of every load on a point.
+    pub fn point_loads(&self) -> impl Iterator<Item = (usize, f64, DVec3)> {
+        let (s, unit) = (self.scenario(), self.scale.force());
+        let points = s.points.iter();
+        points.map(move |it| (it.vein, it.at, DVec3::from_array(s.force_on(it)) / unit))
+    }
+}
+
+impl DiscreteLeaf {
+    /// The veins' own loads on all nodes, rod after rod; empty if there are none.
+    pub(super) fn own_loads_of(&self, leaf: &Leaf) -> Vec<DVec3> {
+        if leaf.loads.own == 0.0 {
+            return Vec::new();
+        }
+        let (n, sigma) = (self.segments(), self.grid.sigma());
+        let node = |(j, i)| self.grid.weight(i) * leaf.own_load(j, sigma[i]);
+        let mut loads: Vec<DVec3> = self.each(0..n + 1).map(node).collect();
+        for (j, at, force) in leaf.point_loads() {
+            loads[j * (n + 1) + self.grid.nearest(at)] += force;
+        }
+        loads
+    }
+
+    /// Part of the veins' own loads that acts.
+    pub(super) fn own_part(&self) -> f64 {
+        self.load_factor * self.loads.own
+    }
+
+    /// Own load on node `i` of rod `j`.
+    pub fn own_load(&self, j: usize, i: usize) -> DVec3 {
+        let load = self.own_loads.get(j * (self.segments() + 1) + i);
+        load.map_or(DVec3::ZERO, |load| self.own_part() * *load)
+    }
+
+    /// The forces on points of rod `j` at `sigma`, by which its force jumps there.
+    pub fn force_on_points(&self, j: usize, sigma: f64) -> DVec3 {
+        if self.leaf.scenario().points.is_empty() {
+            return DVec3::ZERO;
+        }
+        let points = self.leaf.point_loads();
+        let here = points.filter(|(rod, at, _)| *rod == j && (at - sigma).abs() < SAME_NODE);
+        self.own_part() * here.map(|(_, _, force)| force).sum::<DVec3>()
+    }
+
+    /// Adds dead forces on all nodes to the veins' own loads.
+    pub fn load_nodes(&mut self, forces: &[DVec3]) {
+        self.own_loads.resize(forces.len(), DVec3::ZERO);
+        for (own, force) in self.own_loads.iter_mut().zip(forces) {
+            *own += *force;
+        }
+        self.loads.own = 1.0;
+    }
+
+    /// Adds the veins' own loads to the moments and forces on all nodes.
+    pub fn add_own_forces(&self, nodes: &mut [[DVec3; 2]]) {
+        for (node, own) in nodes.iter_mut().zip(&self.own_loads) {
+            node[1] += self.own_part() * *own;
+        }
+    }
+
+    /// Adds the veins' own loads to the right-hand side of an assembled system; returns their
+    /// potential energy, without the bases'.
+    pub(super) fn add_own_loads(&self, state: &State, system: &mut System) -> f64 {
+        if self.own_loads.is_empty() {
+            return 0.0;
+        }
+        let mut energy = 0.0;
+        for (j, i) in self.each(1..self.segments() + 1) {
+            let force = self.own_load(j, i);
+            energy -= force.dot(state.x[state.base(j) + i]);
+            system.add_load(j, i, [DVec3::ZERO, force]);
+        }
+        energy
+    }
+}

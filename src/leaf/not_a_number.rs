@@ -1,6 +1,6 @@
 //! What is not a number is no small number and has no sign.
 
-use super::*;
+use crate::leaf::*;
 use crate::scenario::Scenario;
 use glam::{DMat3, DVec3};
 

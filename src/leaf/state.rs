@@ -1,9 +1,23 @@
 //! Positions, rotations and segment forces of all nodes of a leaf.
+//!
+//! The turns of veins without resistance
+//! ([`Scenario::turnings`](crate::scenario::Scenario::turnings)): their phase conditions, their
+//! modes, and the equilibrium that stands for a circle of equilibria.
+//!
+//! Veins that can turn have an eigenvalue that is exactly zero, on every grid, unless they are straight
+//! and clamped. A spring that holds one node in the direction in which it would move is a phase condition: as the forces do
+//! no work in a turn, the equations with it have the same solutions, it has no force there, and the
+//! matrix has one negative eigenvalue for each of those of the leaf, and none for the turn.
 
-use crate::largest::{larger, largest};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::system::System;
+use crate::numbers::{larger, largest};
 use crate::rod::Ends;
 use crate::rotation;
+use crate::rotation::outer;
+use crate::scenario::{Begin, Turning};
 use glam::{DQuat, DVec3};
+use std::borrow::Cow;
 
 /// The state of a discretised leaf with N rods of n segments, rod after rod,
 /// base to tip. Of a joined leaf all last positions are equal.
@@ -29,7 +43,7 @@ const MEETING: f64 = 1e-9;
 pub type Increment = [f64; 6];
 
 /// Increments, or the forces that are dual to them, of all nodes of a leaf with equations: rods,
-/// then nodes from [`first_node`](super::DiscreteLeaf::first_node) on. With a joint tip the last displacement is the same in every rod,
+/// then nodes from [`first_node`](crate::leaf::DiscreteLeaf::first_node) on. With a joint tip the last displacement is the same in every rod,
 /// and the last force is each rod's share.
 pub type Field = Vec<Vec<Increment>>;
 
@@ -166,4 +180,149 @@ impl State {
         self.q[k] = (rotation::exp(step * turn(increment)) * self.q[k]).normalize();
         self.x[k] += step * shift(increment);
     }
+}
+
+/// Stiffness of the spring, A/L^3, or A/L against a rotation.
+const SPRING: f64 = 100.0;
+
+/// A node that turns slower than this (lengths per radian) is on the axis: straight veins do not move
+/// when they turn.
+const ON_AXIS: f64 = 1e-6;
+
+/// The node at which a turn is held.
+struct HeldNode {
+    rod: usize,
+    node: usize,
+    /// The direction in which it rotates, or else that in which it is displaced.
+    direction: [DVec3; 2],
+}
+
+impl DiscreteLeaf {
+    /// The veins that can turn, whatever their state: in half of a mirror-symmetric leaf those
+    /// whose images turn the other way.
+    fn turnings(&self) -> impl Iterator<Item = &Turning> {
+        let moves = |j: usize| j < self.rods() && !self.leaf.in_plane(j);
+        let half = self.leaf.in_half();
+        (self.leaf.turnings.iter()).filter(move |it| !half || it.rods.clone().all(moves))
+    }
+
+    /// The rotation and the displacement of a node by a turn at unit rate.
+    fn turn_of(&self, turning: &Turning, state: &State, k: usize) -> [DVec3; 2] {
+        turning.rates(state.x[k], state.q[k], self.leaf.scale.length)
+    }
+
+    /// The node to hold: the one that is displaced most or, where sections spin, the base. A joint tip,
+    /// which all rods share, is none.
+    fn node_to_hold(&self, turning: &Turning, state: &State) -> Option<HeldNode> {
+        if turning.axis == DVec3::ZERO {
+            let rod = turning.rods.start;
+            let points = &state.x[state.base(rod)..][..=self.segments()];
+            let [spin, _] = self.turn_of(turning, state, state.base(rod));
+            let moves = turning.moves(points, DVec3::ZERO, ON_AXIS);
+            return moves.then_some(HeldNode {
+                rod,
+                node: 0,
+                direction: [spin, DVec3::ZERO],
+            });
+        }
+        let last = self.segments() - usize::from(self.tips_move_together());
+        let mut farthest = None;
+        let mut most = ON_AXIS;
+        for (rod, node) in nodes(turning, last) {
+            let [_, speed] = self.turn_of(turning, state, state.base(rod) + node);
+            if speed.length() > most {
+                most = speed.length();
+                farthest = Some(HeldNode {
+                    rod,
+                    node,
+                    direction: [DVec3::ZERO, speed / most],
+                });
+            }
+        }
+        farthest
+    }
+
+    /// Adds the phase conditions of veins that can turn to an assembled matrix.
+    pub fn hold_turn(&self, state: &State, system: &mut System) {
+        for turning in self.turnings() {
+            if let Some(at) = self.node_to_hold(turning, state) {
+                let [turn, shift] = at.direction.map(|d| SPRING * outer(d, d));
+                system.hold(at.rod, at.node, shift);
+                system.hold_rotation(at.rod, at.node, turn);
+            }
+        }
+    }
+
+    /// Turns veins that can turn without resistance, so that of a circle of equilibria it is always
+    /// the same one, on all grids: clamped ones until their moment at the base bends them down
+    /// (towards -e3); on hinges as near as possible to where they begin in the natural leaf, or down;
+    /// and a vein that spins without a twist from there.
+    pub fn lean_down(&self, state: &mut State) {
+        for turning in self.turnings() {
+            if turning.axis == DVec3::ZERO && self.node_to_hold(turning, state).is_none() {
+                continue;
+            }
+            let rods = &turning.rods;
+            let moment = |j: usize| {
+                let n = state.n[j * self.segments()];
+                let segment = self.segment(state, j, 0, n);
+                -segment.gradient(self.section(j, 0)).1
+            };
+            let begin = |j: usize| Begin {
+                natural: self.leaf.base(j).1,
+                now: state.q[state.base(j)],
+            };
+            let begins: Vec<Begin> = rods.clone().map(begin).collect();
+            let moments = (!self.leaf.hinged()).then(|| rods.clone().map(moment).sum());
+            let angle = turning.angle_to_lean(&begins, moments);
+            let [turn, back] = turning.rotations(angle);
+            let point = turning.point / self.leaf.scale.length;
+            let n = self.segments();
+            for j in rods.clone() {
+                for node in self.moving_nodes() {
+                    let k = state.base(j) + node;
+                    let [turns, shifts] = self.moves(j, node);
+                    if shifts || node < n {
+                        state.x[k] = point + turn * (state.x[k] - point);
+                    }
+                    if turns || node < n {
+                        state.q[k] = (turn * state.q[k] * back).normalize();
+                    }
+                }
+                let forces = &mut state.n[j * n..(j + 1) * n];
+                forces.iter_mut().for_each(|force| *force = turn * *force);
+            }
+        }
+    }
+
+    /// The equilibrium that stands for the circle of a state: see [`DiscreteLeaf::lean_down`].
+    pub fn leaning<'s>(&self, state: &'s State) -> Cow<'s, State> {
+        let mut state = Cow::Borrowed(state);
+        if self.turnings().next().is_some() {
+            self.lean_down(state.to_mut());
+        }
+        state
+    }
+
+    /// The turns at unit rate of veins that can: increments of the nodes of all rods.
+    pub fn turns(&self, state: &State) -> Vec<Field> {
+        let moves = |turning: &&Turning| self.node_to_hold(turning, state).is_some();
+        let turn = |turning: &Turning| {
+            let mut field = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
+            for j in turning.rods.clone() {
+                for (node, increments) in field[j].iter_mut().enumerate() {
+                    let k = state.base(j) + node + self.first_node();
+                    let [spin, velocity] = self.turn_of(turning, state, k);
+                    *increments = [spin.x, spin.y, spin.z, velocity.x, velocity.y, velocity.z];
+                }
+            }
+            field
+        };
+        self.turnings().filter(moves).map(turn).collect()
+    }
+}
+
+/// Rods and nodes of veins, to the node `last`.
+fn nodes(turning: &Turning, last: usize) -> impl Iterator<Item = (usize, usize)> {
+    (turning.rods.clone()).flat_map(move |rod| (1..=last).map(move |node| (rod, node)))
 }

@@ -1,9 +1,11 @@
 //! The Lanczos method for (K - sigma M)^-1 M, in the inner product of M, with full
 //! reorthogonalisation (C. Lanczos, J. Res. Nat. Bur. Standards 45, 1950;
 //! T. Ericsson and A. Ruhe, Math. Comp. 35, 1980, for the inverse).
+//!
+//! Loads with which searches for modes begin.
 
-use super::masses::Masses;
-use crate::limit::Limit;
+use crate::modes::{Masses, Vibration};
+use crate::run::Limit;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Best possible accuracy of an eigenvector relative to the largest eigenvalue: rounding.
@@ -11,6 +13,7 @@ const LEAST_ACCURACY: f64 = 1e-13;
 
 /// Largest dimension of the Krylov space, and its increase for every pair wanted.
 const MOST: usize = 40;
+
 const MOST_A_PAIR: usize = 4;
 
 /// If some pairs have converged and the next one would take more checks than this, a
@@ -180,4 +183,31 @@ fn ritz(diagonal: &[f64], off: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let values = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
     (values, eigen.eigenvectors.select_columns(&order))
+}
+
+impl Vibration<'_> {
+    /// A load that excites all approximate modes not found yet.
+    pub(super) fn near_start(&self, found: usize) -> Vec<f64> {
+        let mut load = vec![0.0; self.pattern.size()];
+        for near in &self.near[found..] {
+            (load.iter_mut().zip(near)).for_each(|(load, near)| *load += near);
+        }
+        self.masses.times(&load)
+    }
+
+    /// A load without any symmetry, different in every search.
+    pub(super) fn start(&self, search: usize) -> Vec<f64> {
+        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let mut load = vec![0.0; self.pattern.size()];
+        for (j, i) in self.leaf.each(self.leaf.moving_nodes()) {
+            let sigma = self.leaf.grid.sigma()[i];
+            let wave = (7.0 * search as f64 * sigma).sin();
+            for (c, at) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                let k = 18 * (j + 97 * search) + c;
+                load[at] += golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
+            }
+        }
+        self.masses.times(&load)
+    }
 }

@@ -13,22 +13,24 @@
 //! such as the second one of a double eigenvalue, are
 //! searched for until the numbers agree. A list whose completeness cannot
 //! be proved is not returned.
+//!
+//! The mass matrix: for every node an inertia tensor and a mass.
+//!
+//! Rayleigh quotients of shapes.
+//!
+//! Modes for the derivatives of eigenvalues.
 
 mod lanczos;
-mod loaded;
-mod masses;
-mod quotient;
-mod starts;
 
-use crate::leaf::{DirectSolver, DiscreteLeaf, Factors, Field, Increment, State, System};
-use crate::limit::Limit;
+use crate::leaf::{
+    DirectSolver, DiscreteLeaf, Factors, Field, Increment, State, System, at_constant_force, shift,
+    turn,
+};
+use crate::modes::lanczos::{Bound, Lanczos, Mode};
 use crate::motion::Physics;
-use glam::DVec3;
-use lanczos::{Bound, Lanczos, Mode};
-pub use loaded::{eigenvalue, loaded};
-use masses::Masses;
-pub use quotient::rounding;
-use quotient::{forces, quotient};
+use crate::rod::{Section, Segment};
+use crate::run::Limit;
+use glam::{DMat3, DVec3};
 
 /// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, since a
 /// larger one loses digits. The eigenvalues do not change to first order.
@@ -40,6 +42,7 @@ const STIFFER: f64 = 1e4;
 /// The first negative shift tried for an unstable leaf, in
 /// A/(rho L^4), and the factor to the next.
 const FIRST_SHIFT: f64 = 1e-3;
+
 const NEXT_SHIFT: f64 = 8.0;
 
 /// Eigenvalues are counted below the last one minus this part of its distance from
@@ -47,6 +50,7 @@ const NEXT_SHIFT: f64 = 8.0;
 /// which the matrix is not singular, and the next where one that is missing is not found: in a
 /// stiff matrix rounding moves eigenvalues by as much.
 const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
+
 const ERRORS_BELOW: f64 = 40.0;
 
 /// Factor to the next shift below those eigenvalues that are wanted, if they are not the lowest.
@@ -56,7 +60,9 @@ const NEXT_BELOW: f64 = 4.0;
 /// the last shift, at least so many times the error of the bound on them, and its factor for the
 /// next attempt.
 const FIRST_PART: f64 = 2e-3;
+
 const OF_ERROR: f64 = 0.5;
+
 const NEXT_PART: f64 = 6.0;
 
 /// Eigenvectors of this accuracy or less are found with solutions that are not refined.
@@ -392,4 +398,210 @@ impl Vibration<'_> {
         }
         vector
     }
+}
+
+/// Inertia of a node.
+struct Node {
+    /// Rod, and number of the node.
+    index: (usize, usize),
+    unknowns: [usize; 6],
+    tensor: DMat3,
+    mass: f64,
+}
+
+/// The mass matrix of a leaf, its unknowns numbered as in the pattern of its
+/// stiffness. A shared tip has the masses of all rods' ends.
+pub struct Masses {
+    nodes: Vec<Node>,
+}
+
+impl Masses {
+    /// The masses of the moving leaf, its nodes rotated as in `state`.
+    pub fn new(
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        state: &State,
+        pattern: &DirectSolver,
+    ) -> Self {
+        let node = |(j, i)| {
+            let inertia = physics.inertia(leaf, j, i);
+            let tensor = inertia.tensor(state.q[state.base(j) + i]);
+            // Fixed components have no mass.
+            let [turns, shifts] = leaf.moves(j, i);
+            Node {
+                index: (j, i),
+                unknowns: pattern.unknowns(j, i),
+                tensor: if turns { tensor } else { DMat3::ZERO },
+                mass: if shifts { inertia.mass } else { 0.0 },
+            }
+        };
+        let nodes = leaf.each(leaf.moving_nodes()).map(node).collect();
+        Masses { nodes }
+    }
+
+    /// M v.
+    pub fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; v.len()];
+        for node in &self.nodes {
+            let [a, b, c, shifts @ ..] = node.unknowns;
+            let turned = node.tensor * DVec3::new(v[a], v[b], v[c]);
+            for (at, turned) in [a, b, c].into_iter().zip(turned.to_array()) {
+                product[at] += turned;
+            }
+            for at in shifts {
+                product[at] += node.mass * v[at];
+            }
+        }
+        product
+    }
+
+    /// Adds `factor` M to the matrix of a system.
+    pub fn add(&self, system: &mut System, factor: f64) {
+        for node in &self.nodes {
+            let ((j, i), none) = (node.index, (DVec3::ZERO, DVec3::ZERO));
+            system.add(j, i, (node.tensor * factor, node.mass * factor), none);
+        }
+    }
+}
+
+/// The mass of a shape: twice its kinetic energy.
+pub fn mass(leaf: &DiscreteLeaf, physics: &Physics, state: &State, shape: &[Increment]) -> f64 {
+    let node = |(j, i)| {
+        let inertia = physics.inertia(leaf, j, i);
+        let k = state.base(j) + i;
+        let (turn, shift) = (turn(&shape[k]), shift(&shape[k]));
+        turn.dot(inertia.tensor(state.q[k]) * turn) + inertia.mass * shift.length_squared()
+    };
+    leaf.each(leaf.moving_nodes()).map(node).sum()
+}
+
+/// Rounding error of the quotient of a mode of unit mass.
+pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
+    let sections = leaf.sections.iter();
+    let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.couple_stiffness.max_element()));
+    4.0 * f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
+}
+
+/// The spatial forces that a shape causes in the segments.
+pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
+    let n = leaf.segments();
+    let force = |(j, i): (usize, usize)| {
+        let mut segment = leaf.segment(state, j, i, state.n[j * n + i]);
+        segment.gap = DVec3::ZERO;
+        let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+        segment.force_increment(leaf.section(j, i), shift(b) - shift(a), turn(a), turn(b))
+    };
+    leaf.each(0..n).map(force).collect()
+}
+
+/// Rayleigh quotient of a shape of unit mass, in mixed form: with the [`forces`] that the shape
+/// causes in the segments as independent variables. Errors of the shape or of these forces,
+/// from rounding or from the stiffness with which the forces were condensed out, have only a
+/// second-order effect; and no large stiffness enters. The leaf and the state may be near those
+/// to which both belong.
+pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces: &[DVec3]) -> f64 {
+    let n = leaf.segments();
+    let mut sum = 0.0;
+    for (j, i) in leaf.each(0..n) {
+        let section = leaf.section(j, i);
+        let segment = leaf.segment(state, j, i, state.n[j * n + i]);
+        let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+        let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
+        let force = segment.frame.transpose() * forces[j * n + i];
+        let gap = segment.gap_increment(section, dx, a, b);
+        sum += 2.0 * force.dot(gap) - section.ds * (section.compliance * force).dot(force);
+        sum += turns(&segment, section, a, b);
+    }
+    for (j, i) in leaf
+        .each(leaf.moving_nodes())
+        .filter(|(j, _)| j + 1 < leaf.rods())
+    {
+        let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
+        sum += (b - a).dot(leaf.spring(j, i) * (b - a));
+    }
+    sum + leaf.tissue_curvature(state, shape)
+}
+
+/// The contribution of second derivatives with respect to rotations, at constant force.
+fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
+    let k = at_constant_force(segment, section);
+    a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b)
+}
+
+/// Accuracy of eigenvectors for the derivatives of eigenvalues.
+const DERIVED: f64 = 1e-9;
+
+/// Ratio of the softenings from which the first-order effect of softening is computed.
+const SOFTER: f64 = 4.0;
+
+/// Cosine of the angle between two shapes above which they are the same mode.
+const ALIKE: f64 = 0.99;
+
+/// As [`lowest`](crate::modes::lowest), with the shapes and forces of the leaf without softening:
+/// derivatives of an eigenvalue, unlike the eigenvalue itself, depend on errors of these
+/// in first order. The effect of softening is removed by means of the modes of a softer leaf.
+pub fn loaded(leaf: &DiscreteLeaf, state: &State, count: usize) -> Option<Vec<Eigenpair>> {
+    let (physics, time) = (Physics::new(&leaf.leaf), Limit::default());
+    let of = |soft: &DiscreteLeaf, near: &[Vec<Increment>]| {
+        let wanted = Wanted {
+            count,
+            above: None,
+            accuracy: DERIVED,
+            near,
+            time: &time,
+        };
+        of_softened(soft, &physics, state, wanted)
+    };
+    let soft = softened(leaf, state, 1.0);
+    let mut modes = of(&soft, &[])?;
+    let changed = |(soft, stiff): (&Section, &Section)| soft.condensing != stiff.condensing;
+    if soft.sections.iter().zip(&leaf.sections).any(changed) {
+        let near: Vec<_> = modes.iter().map(|mode| mode.shape.clone()).collect();
+        let softer = of(&softened(leaf, state, SOFTER), &near)?;
+        for (mode, softer) in modes.iter_mut().zip(&softer) {
+            mode.remove_softening(softer);
+        }
+    }
+    Some(modes)
+}
+
+impl Eigenpair {
+    /// The sum of two modes.
+    pub fn plus(&self, other: &Eigenpair) -> Eigenpair {
+        let mut sum = self.clone();
+        let both = sum.shape.iter_mut().flatten();
+        (both.zip(other.shape.iter().flatten())).for_each(|(value, other)| *value += other);
+        (sum.forces.iter_mut().zip(&other.forces)).for_each(|(force, other)| *force += *other);
+        sum
+    }
+
+    /// Removes the first-order effect of softening by means of the same mode of a softer
+    /// leaf. If modes are so close together that they mix, it is not removed.
+    fn remove_softening(&mut self, softer: &Eigenpair) {
+        let dot = |a: &[Increment], b: &[Increment]| -> f64 {
+            let both = a.iter().flatten().zip(b.iter().flatten());
+            both.map(|(a, b)| a * b).sum()
+        };
+        let (a, b) = (&self.shape, &softer.shape);
+        let product = dot(a, b);
+        if product.abs() < ALIKE * (dot(a, a) * dot(b, b)).sqrt() {
+            return;
+        }
+        let sign = product.signum();
+        let part = 1.0 / (SOFTER - 1.0);
+        let both = (self.shape.iter_mut().flatten()).zip(softer.shape.iter().flatten());
+        both.for_each(|(value, softer)| *value += part * (*value - sign * softer));
+        for (force, softer) in self.forces.iter_mut().zip(&softer.forces) {
+            *force += part * (*force - sign * *softer);
+        }
+    }
+}
+
+/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighbouring
+/// leaf and state: their errors have only a second-order effect. In the
+/// scenario's unit of time.
+pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &Eigenpair) -> f64 {
+    let physics = Physics::new(&leaf.leaf);
+    let quotient = quotient(leaf, state, &mode.shape, &mode.forces);
+    quotient / mass(leaf, &physics, state, &mode.shape) * physics.time.powi(-2)
 }

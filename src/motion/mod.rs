@@ -1,17 +1,389 @@
 //! Motion in time.
+//!
+//! The interface of all methods of time integration.
+//!
+//! The energy of a moving leaf, and whether the motion is reliable.
+//!
+//! The rate at which strains change, for internal friction.
 
-mod energy_balance;
+mod constraint_projection;
 mod explicit;
-mod friction;
-mod method;
 mod physics;
 mod semi_implicit;
-mod unstrained;
-mod wind;
 
-pub use explicit::{Explicit, Rigid, StableStep};
-pub use method::{Energy, TimeIntegrator, Snapshot, Stopped, Velocity};
-pub use physics::{Inertia, Physics};
-pub use semi_implicit::{SemiImplicit, Steps};
-pub use unstrained::unstrained;
-pub use wind::{Drag, Wind};
+use crate::leaf::{DiscreteLeaf, HalfTurn, State};
+pub use crate::motion::constraint_projection::unstrained;
+pub use crate::motion::explicit::{Explicit, Rigid, StableStep};
+pub use crate::motion::physics::{Drag, Inertia, Physics, Wind};
+pub use crate::motion::semi_implicit::{SemiImplicit, Steps};
+use crate::numbers::largest;
+use crate::rod::RESOLVED_TURN;
+use crate::run::Limit;
+use glam::DVec3;
+
+/// Angular and linear velocity of a node, along the lab axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Velocity {
+    /// Angular velocity.
+    pub angular: DVec3,
+    /// Velocity.
+    pub linear: DVec3,
+}
+
+/// The energies of a moving leaf. Dimensionless: in A/L.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Energy {
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Elastic energy of the strains.
+    pub elastic: f64,
+    /// Energy of the coupling between rods.
+    pub coupling: f64,
+    /// Potential of the loads at their present values.
+    pub potential: f64,
+    /// Energy dissipated by damping since the start.
+    pub dissipated: f64,
+    /// Work done since the start by varying loads and rest shapes, and by what has no potential:
+    /// the moment on a tip, and wind.
+    pub work: f64,
+}
+
+impl Energy {
+    /// The conserved quantity: all energies minus the work.
+    pub fn balance(&self) -> f64 {
+        self.kinetic + self.elastic + self.coupling + self.potential + self.dissipated - self.work
+    }
+
+    /// The energy that has moved, present, dissipated or put in by loads, in a motion that began
+    /// with this `potential`.
+    pub(crate) fn moved(&self, potential: f64) -> f64 {
+        let there = self.kinetic + self.elastic + self.coupling + self.dissipated;
+        there.max((self.potential - potential - self.work).abs())
+    }
+
+    /// Applies a function to all of them.
+    pub fn map(self, change: impl Fn(f64) -> f64) -> Self {
+        Energy {
+            kinetic: change(self.kinetic),
+            elastic: change(self.elastic),
+            coupling: change(self.coupling),
+            potential: change(self.potential),
+            dissipated: change(self.dissipated),
+            work: change(self.work),
+        }
+    }
+}
+
+/// A leaf at an instant.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Time.
+    pub time: f64,
+    /// Positions, rotations and segment forces.
+    pub state: State,
+    /// Velocities of all nodes, as in the state.
+    pub velocity: Vec<Velocity>,
+    /// Energies.
+    pub energy: Energy,
+}
+
+/// Why a motion ended early. Times are dimensionless as a [`TimeIntegrator`]
+/// returns them, and in the scenario's unit in a simulation.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Stopped {
+    /// Energy appeared without cause, or a value is not a number.
+    #[error(
+        "diverged at t = {time:.6e}: the energy grew {}, which is numerical instability; use a shorter step, or {otherwise}",
+        match .percent.is_finite() {
+            true => format!("by {percent:.0} % of all that moved"),
+            false => "without bound".into(),
+        }
+    )]
+    Diverged {
+        /// Time.
+        time: f64,
+        /// Energy gained, in percent of the largest energy that moved.
+        percent: f64,
+        /// Further advice.
+        otherwise: &'static str,
+    },
+    /// The grid is too coarse.
+    #[error(
+        "at t = {time:.6e} a segment is bent by {turn:.2} rad, more than it can resolve; use more segments than {segments}"
+    )]
+    Unresolved {
+        /// Time.
+        time: f64,
+        /// Bending of the segment, radians.
+        turn: f64,
+        /// Segments per rod.
+        segments: usize,
+    },
+    /// Sections of neighbouring veins passed half a turn against each other.
+    #[error("at t = {time:.6e} {}; the motion cannot be followed beyond: end it before", half_turn.sentence())]
+    HalfTurn {
+        /// Time.
+        time: f64,
+        /// Where.
+        half_turn: HalfTurn,
+    },
+    /// No time step is short enough.
+    #[error("at t = {time:.6e} no time step is short enough to go on; {advice}")]
+    StepTooShort {
+        /// Time.
+        time: f64,
+        /// Advice.
+        advice: &'static str,
+    },
+    /// The limit of the run was reached, e.g. by Ctrl-C.
+    #[error("interrupted at t = {time:.6e}")]
+    Interrupted {
+        /// Time.
+        time: f64,
+    },
+}
+
+impl Stopped {
+    /// The word used in `motion.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Stopped::Diverged { .. } => "diverged",
+            Stopped::Unresolved { .. } => "unresolved",
+            Stopped::HalfTurn { .. } => "half-turn",
+            Stopped::StepTooShort { .. } => "step-too-short",
+            Stopped::Interrupted { .. } => "interrupted",
+        }
+    }
+
+    /// This reason with its time in another unit, of which the present unit is `unit`.
+    pub fn in_unit(mut self, unit: f64) -> Self {
+        match &mut self {
+            Stopped::Diverged { time, .. }
+            | Stopped::Unresolved { time, .. }
+            | Stopped::HalfTurn { time, .. }
+            | Stopped::StepTooShort { time, .. }
+            | Stopped::Interrupted { time } => *time *= unit,
+        }
+        self
+    }
+}
+
+/// A method that integrates the motion of a leaf. Dimensionless throughout.
+pub trait TimeIntegrator {
+    /// Present time.
+    fn time(&self) -> f64;
+
+    /// Number of time steps.
+    fn steps(&self) -> usize;
+
+    /// Bounds the steps from now on, of a method whose error determines them: the steps of a
+    /// finer run that is compared with a coarser one are shorter everywhere, also where the times
+    /// asked for limit both.
+    fn limit_steps(&mut self, _longest: f64) {}
+
+    /// The longest step since this was asked last, of such a method.
+    fn take_longest_step(&mut self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Ends the motion at the first step behind a limit.
+    fn set_limit(&mut self, limit: Limit);
+
+    /// Advances to exactly `until`; returns the state there, in which the motion is reliable.
+    fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped>;
+
+    /// The present state, with positions and velocities at the same instant.
+    fn snapshot(&mut self) -> Snapshot;
+}
+
+/// Largest energy that may appear without cause, as a part of the largest energy that moved.
+/// Unbounded growth soon exceeds any such limit.
+const LARGEST_IMBALANCE: f64 = 0.5;
+
+/// Energy, in units of A/L, that may be due to rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Energies at an instant, without what was dissipated and put in before. Sets the loads and
+/// the rest shape of `leaf` to those of that time.
+pub fn measure(
+    leaf: &mut DiscreteLeaf,
+    physics: &Physics,
+    time: f64,
+    state: &State,
+    velocity: &[Velocity],
+) -> Energy {
+    leaf.loads = physics.loads(time);
+    if physics.rest_differs() {
+        leaf.set_rest(physics.rest(time));
+    }
+    let n = leaf.segments();
+    let mut energy = Energy::default();
+    for (j, i) in leaf.each(0..=n) {
+        let (k, inertia) = (state.base(j) + i, physics.inertia(leaf, j, i));
+        let Velocity { angular, linear } = velocity[k];
+        let spin = angular.dot(state.q[k] * DVec3::X);
+        let turning = angular.length_squared() + inertia.excess * spin * spin;
+        energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
+        energy.kinetic += 0.5 * inertia.transverse * turning;
+        let potential = leaf.load(state, j, i).energy;
+        let stretch = leaf.coupling_energy(state, j, i);
+        energy.coupling += stretch;
+        energy.potential += potential - stretch;
+        if i < n {
+            // From the strains: the force may include friction.
+            let strained = leaf.strained_segment(state, j, i);
+            energy.elastic += leaf.section(j, i).elastic_energy(&strained);
+        }
+    }
+    energy
+}
+
+/// The energy that the loads, if they were applied at once, would give a leaf at
+/// rest in a step of `h`: for loads that change faster than steps resolve, the energy is not
+/// known more accurately than this.
+fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
+    let loads = physics.loads(time);
+    let n = leaf.segments();
+    let mut energy = 0.0;
+    for (j, i) in leaf.each(0..=n) {
+        let inertia = physics.inertia(leaf, j, i);
+        let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
+        energy += (weight * loads.gravity).length_squared() / inertia.mass;
+        if i == n {
+            energy += loads.tip_force.length_squared() / inertia.mass;
+        }
+    }
+    for (node, moment) in leaf.moments_of(loads) {
+        energy += moment.length_squared() / physics.inertia(leaf, 0, node).transverse;
+    }
+    0.5 * h * h * energy
+}
+
+/// Fails if the grid cannot resolve a segment bent by `turn`.
+pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
+    match turn <= RESOLVED_TURN {
+        true => Ok(()),
+        false => Err(Stopped::Unresolved {
+            time,
+            turn,
+            segments: leaf.segments(),
+        }),
+    }
+}
+
+/// Energy dissipated and put in.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Exchange {
+    pub dissipated: f64,
+    pub work: f64,
+}
+
+impl std::ops::AddAssign for Exchange {
+    fn add_assign(&mut self, other: Exchange) {
+        self.dissipated += other.dissipated;
+        self.work += other.work;
+    }
+}
+
+/// The energy exchanged, and the initial balance.
+#[derive(Clone, Debug, Default)]
+pub struct EnergyBalance {
+    exchanged: Exchange,
+    balance: f64,
+    potential: f64,
+    /// The largest energy that moved so far.
+    largest: f64,
+}
+
+impl EnergyBalance {
+    pub fn begin(&mut self, start: &Snapshot) {
+        self.balance = start.energy.balance();
+        self.potential = start.energy.potential;
+        self.largest = start.energy.moved(self.potential);
+    }
+
+    pub fn add(&mut self, exchange: Exchange) {
+        self.exchanged += exchange;
+    }
+
+    /// The present energy, with what was exchanged so far and `since`.
+    pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
+        Energy {
+            dissipated: self.exchanged.dissipated + since.dissipated,
+            work: self.exchanged.work + since.work,
+            ..energy
+        }
+    }
+
+    /// Checks that the motion of the leaf, in steps of `h`, is reliable; if it is not,
+    /// `otherwise` is advice besides a shorter step.
+    pub fn judge(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        now: &Snapshot,
+        h: f64,
+        otherwise: &'static str,
+    ) -> Result<(), Stopped> {
+        let time = now.time;
+        self.largest = self.largest.max(now.energy.moved(self.potential));
+        // The method's own damping may reduce energy, but nothing may increase it.
+        let gain = now.energy.balance() - self.balance;
+        let unresolved = unresolved_energy(leaf, physics, time, h);
+        let imbalance = gain / (self.largest + unresolved + ROUNDING);
+        if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
+            return Err(Stopped::Diverged {
+                time,
+                percent: 100.0 * imbalance,
+                otherwise,
+            });
+        }
+        let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn();
+        let turns = leaf.each(0..leaf.segments()).map(turn);
+        resolved(leaf, time, largest(turns))
+    }
+}
+
+/// A step shorter than this part of the next one makes the rate inaccurate.
+const SHORTEST_PART: f64 = 0.25;
+
+/// Weights of a value and the two before it for its present rate of change, the
+/// last step being `last` long and the one before `before`: the backward
+/// difference of second order; of first order if that step was too short
+/// or missing (zero); all zero if there was no step.
+pub fn rates(last: f64, before: f64) -> [f64; 3] {
+    if last == 0.0 {
+        return [0.0; 3];
+    }
+    if before < SHORTEST_PART * last {
+        return [1.0 / last, -1.0 / last, 0.0];
+    }
+    let r = last / before;
+    [(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r * r / (1.0 + r)].map(|weight| weight / last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parabolas_are_differentiated_exactly() {
+        let value = |t: f64| 0.3 - 1.7 * t + 2.9 * t * t;
+        let rate = |t: f64| -1.7 + 5.8 * t;
+        for (last, before) in [(0.1, 0.1), (0.1, 0.3), (0.3, 0.1), (1e-3, 1.0)] {
+            let t = 0.7;
+            let values = [value(t), value(t - last), value(t - last - before)];
+            let weights = rates(last, before);
+            let found: f64 = values.iter().zip(weights).map(|(v, w)| v * w).sum();
+            assert!((found - rate(t)).abs() < 1e-11, "{last}, {before}: {found}");
+        }
+    }
+
+    #[test]
+    fn straight_lines_where_less_is_known() {
+        for before in [0.0, 1e-9, 0.024] {
+            assert_eq!(rates(0.1, before), [10.0, -10.0, 0.0]);
+        }
+        assert_eq!(rates(0.0, 0.0), [0.0; 3]);
+    }
+}

@@ -5,13 +5,14 @@
 //! force, however small it is as a position: then forces have a convergence test of their own, and
 //! the constitutive law of nearly rigid segments is completed in every step.
 
-use super::convergence::converged;
-use crate::largest::{larger, largest};
 use crate::leaf::{DiscreteLeaf, State};
+use crate::newton::converged;
+use crate::numbers::{larger, largest};
 
 /// The law lags behind where a step misses more than this part of the strain that the step before
 /// missed; below the second number the strain is rounding.
 const LAGGING: f64 = 0.03;
+
 const ROUNDED_STRAIN: f64 = 1e-14;
 
 /// Rounding error of a strain, per segment of a rod.

@@ -1,23 +1,32 @@
 //! Continuation of an equilibrium under a small change of its scenario, on the same grids,
 //! without jumps to another equilibrium.
+//!
+//! A leaf at rest that follows its scenario, as numbers of it change by little or much: along its
+//! branch of equilibria, as long as they are stable, and elsewhere only where it is told so.
 
-use crate::leaf::{Leaf, Response, State};
+use crate::homotopy::Homotopy;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, LeafRate, Response, State};
 use crate::newton::Stop;
 use crate::relax::Outcome;
-use crate::relax::grids::{follow, follow_on_these};
-use crate::relax::nested::NestedEquilibrium;
-use crate::relax::request::options::{Options, Progress, RelaxError};
-use crate::relax::request::problem::Problem;
-use crate::relax::rest::relax_on_grids;
-use crate::relax::settle::effort::Effort;
-use crate::relax::transfer::level::Level;
+use crate::relax::accuracy::transfer::transfer;
+use crate::relax::accuracy::{Level, NestedEquilibrium};
+use crate::relax::loading::arrival;
+use crate::relax::loading::arrival::{follow, follow_on_these};
+use crate::relax::request::{Options, Progress, RelaxError, rests_in_wind};
+use crate::relax::rest::{Effort, Problem, decided, relax_on_grids};
+use crate::relax::result::Equilibrium;
+use crate::relax::sensitivity::Linearized;
+use crate::relax::stability::project;
+use crate::run::Instant;
 use crate::scenario::Scenario;
+use crate::shape::RodShape;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
 /// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
 const DRIFT: f64 = 0.5;
+
 const DRIFT_LENGTH: f64 = 0.02;
 
 /// The grids on which an equilibrium is continued.
@@ -144,4 +153,383 @@ fn moved(level: &Level, leaf: &Leaf, response: &Response) -> State {
     let mut state = level.state.clone();
     response.advance(&mut state, 1.0);
     rescaled(level, state, leaf)
+}
+
+/// The shortest step of the way, as a part of it.
+const SHORTEST: f64 = 1.0 / 4096.0;
+
+/// How much shorter a step is made that fails.
+const SHORTENED: f64 = 0.25;
+
+/// Grids on which the next equilibrium is predicted.
+const PREDICTING: usize = 2;
+
+/// The finest of the grids that are tried where coarser ones have no equilibrium any more: folds lie
+/// elsewhere on each of them.
+const FINEST: usize = 128;
+
+/// Equilibria on two grids that are no farther apart, in lengths, are one: beside a fold, which lies
+/// elsewhere on each, that is far.
+const SAME: f64 = 0.1;
+
+/// A leaf at rest, which can follow.
+///
+/// ```
+/// use leafdyn::relax::{Followed, Follower, Options, RelaxError};
+/// use leafdyn::scenario::Scenario;
+///
+/// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+/// let weight = scenario.gravity[2];
+/// let (_, follower) = Follower::begin(&scenario, &Options::default())?;
+/// let mut follower = follower.expect("the leaf is at rest");
+/// let heavier = |part: f64| {
+///     let mut scenario = scenario.clone();
+///     scenario.gravity[2] = weight * (1.0 + part);
+///     Ok::<_, RelaxError>(scenario)
+/// };
+/// let Followed::There(heavy) = follower.follow(&heavier)? else {
+///     panic!("it bends further");
+/// };
+/// assert_eq!(heavy.stable(), Some(true));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Follower {
+    scenario: Arc<Scenario>,
+    options: Options,
+    at: NestedEquilibrium,
+    /// Segments of the coarsest grid away from folds.
+    usual: usize,
+    /// Those that are tried instead, once, where it takes more than [`ENOUGH`] grids.
+    other: Option<usize>,
+}
+
+/// Grids that a leaf needs on the right coarsest one: the next would cost more than all of these.
+const ENOUGH: usize = 3;
+
+/// Where a leaf is that was to follow.
+pub enum Followed {
+    /// In the equilibrium into which the one before has changed.
+    There(Box<Equilibrium>),
+    /// Its stable equilibria end at this part of the way, where it stays: from there it has to move
+    /// on, to another one.
+    Left {
+        /// From 0, where it began, to 1.
+        part: f64,
+    },
+}
+
+impl Follower {
+    /// Brings a leaf to rest as [`relax`](crate::relax::relax) does; none can follow if it is not, or at
+    /// a saddle.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn begin(
+        scenario: &Scenario,
+        options: &Options,
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        let (leaf, at) = relax_on_grids(scenario, options, false, &mut |_| {})?;
+        let rests = leaf.outcome.is_at_rest() && leaf.stable() == Some(true);
+        let follower = Follower::new(Arc::new(scenario.clone()), options, at);
+        Ok((leaf, rests.then_some(follower)))
+    }
+
+    fn new(scenario: Arc<Scenario>, options: &Options, at: NestedEquilibrium) -> Follower {
+        let usual = (at.levels.first()).map_or(0, |level| level.leaf.segments());
+        Follower {
+            scenario,
+            options: options.clone(),
+            at,
+            usual,
+            other: Some(usual + usual / 4),
+        }
+    }
+
+    /// Begins with the stable equilibrium that lies near this shape of the leaf, which `begin` need not
+    /// find, as a leaf may have several; where there is none, as that does.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn begin_near(
+        scenario: &Scenario,
+        options: &Options,
+        (stations, rods): (&[f64], &[RodShape]),
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+        let alike = rods.len() == leaf.rods()
+            && (stations.first(), stations.last()) == (Some(&0.0), Some(&1.0))
+            && stations.is_sorted_by(|a, b| a < b)
+            && rods.iter().all(|rod| rod.nodes.len() == stations.len());
+        if !alike {
+            return Follower::begin(scenario, options);
+        }
+        let grid = Grid::through(stations, leaf.kinks());
+        let mut state = project(&leaf, &DiscreteLeaf::new(&leaf, grid.clone()), rods);
+        for j in 0..leaf.rods() {
+            let base = state.base(j);
+            (state.x[base], state.q[base]) = leaf.base(j);
+        }
+        leaf.hold_tips(&mut state);
+        Follower::begin_from(scenario, options, (grid, state))
+    }
+
+    /// The same from this state on a grid.
+    fn begin_from(
+        scenario: &Scenario,
+        options: &Options,
+        (grid, state): (Grid, State),
+    ) -> Result<(Equilibrium, Option<Follower>), RelaxError> {
+        rests_in_wind(scenario, options)?;
+        let clock = Instant::now();
+        let scenario = Arc::new(scenario.clone());
+        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let problem = Problem::new(&leaf, options, tolerance);
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        let begun = NestedEquilibrium::begun(&problem);
+        match arrival::follow(&problem, begun, vec![(grid, state)], &mut effort) {
+            Ok(found) if found.is_stable() => {
+                let (at, result) = decide(&problem, found, clock, &mut effort);
+                let follower = Follower::new(Arc::clone(&scenario), options, at);
+                Ok((result, Some(follower)))
+            }
+            _ => Follower::begin(&scenario, options),
+        }
+    }
+
+    /// How it is to come to rest from now on, and which of its modes are wanted.
+    pub fn options(&mut self, options: &Options) {
+        self.options = options.clone();
+    }
+
+    /// The leaf on its grids.
+    pub(crate) fn levels(&self) -> &[Level] {
+        &self.at.levels
+    }
+
+    /// Follows the scenarios that `along` has from 0, the present one, to 1.
+    ///
+    /// # Errors
+    /// The first of `along`, and requests that cannot be met.
+    pub fn follow<E: From<RelaxError>>(
+        &mut self,
+        along: &dyn Fn(f64) -> Result<Scenario, E>,
+    ) -> Result<Followed, E> {
+        let clock = Instant::now();
+        let mut way = Homotopy::new(1.0, [SHORTEST, 1.0]);
+        loop {
+            let scenario = Arc::new(along(way.next())?);
+            rests_in_wind(&scenario, &self.options)?;
+            let last = way.next() == 1.0;
+            match self.step(Arc::clone(&scenario), last) {
+                Ok(found) => {
+                    (self.at, self.scenario) = (found, scenario);
+                    if last {
+                        self.coarsen();
+                        self.economise();
+                        return Ok(Followed::There(Box::new(self.equilibrium(clock))));
+                    }
+                    way.advance(2.0 * way.length());
+                }
+                Err(_) if way.shorten(SHORTENED) => {}
+                Err(_) if self.refine() => {}
+                Err(_) => return Ok(Followed::Left { part: way.part }),
+            }
+        }
+    }
+
+    /// Goes on without the coarsest grid, and on a finer one if that is the last; false if it is fine
+    /// enough.
+    fn refine(&mut self) -> bool {
+        if let [_, finer, ..] = &self.at.levels[..] {
+            let fine = finer.leaf.segments() <= FINEST;
+            if fine {
+                let levels = self.at.levels[1..].to_vec();
+                self.at = self.at.grids().on(levels);
+            }
+            return fine;
+        }
+        let only = &self.at.levels[0].leaf;
+        only.segments() < FINEST && self.goes_on(only.leaf.clone(), only.grid.refined())
+    }
+
+    /// Whether it is in the same equilibrium on another grid, on which it then goes on.
+    fn goes_on(&mut self, leaf: Leaf, grid: Grid) -> bool {
+        let Ok(found) = self.near(&leaf, grid) else {
+            return false;
+        };
+        let (Some(own), Some(other)) = (self.at.levels.last(), found.levels.last()) else {
+            return false;
+        };
+        let there = transfer(&own.leaf, &own.state, &other.leaf.grid);
+        let same = there.shift_to(&other.state) < SAME && found.is_stable();
+        if same {
+            self.at = found;
+        }
+        same
+    }
+
+    /// Goes back to the usual grids, if the equilibrium exists on these.
+    fn coarsen(&mut self) {
+        let coarsest = &self.at.levels[0].leaf;
+        if coarsest.segments() > self.usual {
+            let grid = Grid::new(self.usual, coarsest.leaf.kinks());
+            self.goes_on(coarsest.leaf.clone(), grid);
+        }
+    }
+
+    /// Goes on from a coarsest grid that is a little finer, if that saves the finest of too many.
+    fn economise(&mut self) {
+        let first = &self.at.levels[0].leaf;
+        let too_many = self.at.levels.len() > ENOUGH && first.segments() == self.usual;
+        if let Some(segments) = self.other.take_if(|_| too_many) {
+            let (leaf, before) = (first.leaf.clone(), self.at.grids());
+            let grid = Grid::new(segments, leaf.kinks());
+            match self.goes_on(leaf, grid) && self.at.levels.len() <= ENOUGH {
+                true => self.usual = segments,
+                false => self.at = before,
+            }
+        }
+    }
+
+    /// Comes to rest under another scenario from where it is, and leaves its branch where it must.
+    ///
+    /// # Errors
+    /// Requests that cannot be met.
+    pub fn settle(&mut self, scenario: &Scenario) -> Result<Equilibrium, RelaxError> {
+        let leaf = Leaf::in_units(Arc::new(scenario.clone()), scenario.scale());
+        let grid = self.grid(&leaf);
+        let state = self.state_on(&leaf, &grid);
+        self.settle_from(scenario, (grid, state))
+    }
+
+    /// The same from this state on a grid; where that leads nowhere, as a relaxation begins.
+    pub(crate) fn settle_from(
+        &mut self,
+        scenario: &Scenario,
+        guess: (Grid, State),
+    ) -> Result<Equilibrium, RelaxError> {
+        let (result, follower) = Follower::begin_from(scenario, &self.options, guess)?;
+        if let Some(follower) = follower {
+            // What it is brought to on a finer grid need not stay there.
+            let (usual, other) = (self.usual.min(follower.usual), self.other);
+            *self = follower;
+            (self.usual, self.other) = (usual, other);
+        }
+        Ok(result)
+    }
+
+    /// The present equilibrium as a result.
+    fn equilibrium(&mut self, clock: Instant) -> Equilibrium {
+        let leaf = Leaf::in_units(Arc::clone(&self.scenario), self.scenario.scale());
+        let problem = Problem::new(&leaf, &self.options, self.tolerance(&self.scenario));
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        effort.work = self.at.work;
+        let found = std::mem::replace(&mut self.at, NestedEquilibrium::begun(&problem));
+        let (at, result) = decide(&problem, found, clock, &mut effort);
+        self.at = at;
+        result
+    }
+
+    fn tolerance(&self, scenario: &Scenario) -> f64 {
+        self.options.tolerance.unwrap_or(scenario.tolerance)
+    }
+
+    /// The equilibrium of a scenario nearby, if it is the continuation of the present one and stable.
+    fn step(&self, scenario: Arc<Scenario>, last: bool) -> Result<NestedEquilibrium, Lost> {
+        let leaf = Leaf::in_units(Arc::clone(&scenario), scenario.scale());
+        let near = self.at.coarsest(PREDICTING.min(self.at.levels.len()));
+        let near = near.unwrap_or_else(|| self.at.grids());
+        let found = match self.is_like(&leaf) {
+            true => {
+                let terms = [(-1.0, (*self.scenario).clone()), (1.0, (*scenario).clone())];
+                let rate = LeafRate::new(&near.levels[0].leaf.leaf, &terms);
+                let mut responses = Vec::new();
+                for level in &near.levels {
+                    let mut linear = Linearized::new(level, self.tolerance(&scenario));
+                    let forces = linear.forces(level, std::slice::from_ref(&rate));
+                    let response = linear.responses(level, &forces);
+                    let response = response.and_then(|all| all.into_iter().next());
+                    responses.push(response.ok_or(Lost::Elsewhere)?);
+                }
+                let grids = match last {
+                    true => Grids::AsNeeded,
+                    false => Grids::These,
+                };
+                near.follow(scenario, &responses, (&self.options, grids))?
+            }
+            false => self.near(&leaf, self.grid(&leaf))?,
+        };
+        match last && !found.is_stable() {
+            true => Err(Lost::Elsewhere),
+            false => Ok(found),
+        }
+    }
+
+    /// The equilibrium of a leaf whose nodes lie elsewhere: from where this one is, on a grid, without
+    /// leaving its valley.
+    fn near(&self, leaf: &Leaf, grid: Grid) -> Result<NestedEquilibrium, Lost> {
+        let problem = Problem {
+            whole: Some(leaf),
+            ..Problem::new(leaf, &self.options, self.tolerance(leaf.scenario()))
+        };
+        let guess = self.state_on(leaf, &grid);
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut effort = Effort::new(ignored);
+        let begun = NestedEquilibrium::begun(&problem);
+        let found = arrival::follow(&problem, begun, vec![(grid, guess)], &mut effort);
+        Ok(found.map_err(|_| Lost::Elsewhere)?.after(effort.work))
+    }
+
+    /// Whether the scenario of a leaf differs from the present one in numbers alone that leave the
+    /// nodes, and what is held and tied, where they are.
+    fn is_like(&self, leaf: &Leaf) -> bool {
+        let (own, other) = (&*self.scenario, leaf.scenario());
+        let held = |of: &Scenario| of.held_tip.as_ref().map(|tip| tip.clamps.is_some());
+        let grips = own.grips.iter().zip(&other.grips);
+        let points = own.points.iter().zip(&other.points);
+        own.rods.len() == other.rods.len()
+            && own.joined == other.joined
+            && own.base_held == other.base_held
+            && own.tissue.is_some() == other.tissue.is_some()
+            && own.wind.is_none()
+            && other.wind.is_none()
+            && held(own) == held(other)
+            && own.points.len() == other.points.len()
+            && own.grips.len() == other.grips.len()
+            && { points }.all(|(a, b)| (a.vein, a.at) == (b.vein, b.at))
+            && { grips }.all(|(a, b)| (a.vein, a.at, a.held) == (b.vein, b.at, b.held))
+            && self.at.levels[0].leaf.leaf.kinks() == leaf.kinks()
+    }
+
+    /// A grid like the coarsest of its own, with nodes where this leaf needs them.
+    fn grid(&self, leaf: &Leaf) -> Grid {
+        let own = &self.at.levels[0].leaf;
+        match own.leaf.kinks() == leaf.kinks() {
+            true => own.grid.clone(),
+            false => Grid::new(own.segments(), leaf.kinks()),
+        }
+    }
+
+    /// Its state on a grid of a leaf with as many rods, in the units of that leaf.
+    pub(crate) fn state_on(&self, leaf: &Leaf, grid: &Grid) -> State {
+        let level = &self.at.levels[0];
+        let mut state = rescaled(level, level.state.clone(), leaf);
+        state = transfer(&level.leaf, &state, grid);
+        leaf.hold_tips(&mut state);
+        state
+    }
+}
+
+/// The result of an equilibrium, and the grids on which its stability is known.
+fn decide(
+    problem: &Problem,
+    found: NestedEquilibrium,
+    clock: Instant,
+    effort: &mut Effort,
+) -> (NestedEquilibrium, Equilibrium) {
+    let (result, at) = decided(problem, Ok(found), clock, effort);
+    (at, result)
 }

@@ -1,26 +1,21 @@
 //! Shooting: a boundary-value solution as a result of the same type as a relaxation's.
 
-use crate::clock::Instant;
 use crate::leaf::{Grid, Leaf};
-use crate::memory;
 use crate::newton::Work;
-use crate::refusal::{RefusedOption, Unmodelled};
-use crate::relax::request::method::Method;
-use crate::relax::request::options::{MAX_INTERVALS, Options, Progress, RelaxError};
+use crate::relax::request::{MAX_INTERVALS, Method, Options, Progress, RelaxError};
 use crate::relax::rest::relax_on_grids;
-use crate::relax::result::blade::BladeReport;
-use crate::relax::result::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::relax::result::plausible;
-use crate::relax::result::reaction::Reaction;
+use crate::relax::result::forces::{Reaction, Stresses};
 use crate::relax::result::report::neutral_directions;
-use crate::relax::result::stress::Stresses;
-use crate::relax::settle::segments::coarsest;
-use crate::relax::stability::index::index_near;
+use crate::relax::result::{
+    Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability, report,
+};
+use crate::relax::solve_on_grid::coarsest;
+use crate::relax::stability::index_near;
+use crate::run::{Instant, RefusedOption, Unmodelled};
 use crate::scenario::{Scenario, longest};
-use crate::shape::{RodShape, SAME_STATION, equally_spaced};
-use crate::shooting;
+use crate::shape::{RodShape, SAME_STATION, Undulation, equally_spaced};
 use crate::shooting::{Reason, Solution, Start};
-use crate::undulation::Undulation;
+use crate::{memory, shooting};
 use glam::DVec3;
 
 /// Smallest number of segments between stations.
@@ -110,7 +105,7 @@ pub fn relax(
         true => relax_from_rest(scenario, options, how, progress)?,
         false => shoot(scenario, options, how, Start::Arcs, progress),
     };
-    found.doubts = plausible::doubts(scenario, &found);
+    found.doubts = report::doubts(scenario, &found);
     Ok(found)
 }
 

@@ -1,11 +1,13 @@
 //! A single segment, in scalar arithmetic.
+//!
+//! Sections: the material data of segments.
 
-use super::element::{Element, Nodes};
-use super::section::Section;
-use crate::lanes::Vectors;
-use crate::rotation::{self, Relative};
+use crate::rod::{Element, Nodes};
+use crate::rotation;
+use crate::rotation::Relative;
+use crate::simd::{Four, GROUP, Lanes, Vectors};
 use glam::{DMat3, DQuat, DVec3};
-use pulp::Scalar;
+use pulp::{Scalar, Simd};
 
 /// The two nodes of a segment.
 #[derive(Clone, Copy, Debug)]
@@ -262,6 +264,74 @@ impl Segment {
     fn on_nodes(&self, g_mu: DVec3, moment: DVec3) -> [DVec3; 2] {
         let g_delta = 0.5 * DVec3::from(self.relative.tau).cross(g_mu) + moment;
         [0.5 * g_mu - g_delta, 0.5 * g_mu + g_delta].map(|g| self.frame * g)
+    }
+}
+
+/// The material data of a segment, at its midpoint.
+#[derive(Clone, Copy, Debug)]
+pub struct Section {
+    /// Reference length of the segment.
+    pub ds: f64,
+    /// Couple stiffness A: torsion, bending about d2, about d3.
+    pub couple_stiffness: DVec3,
+    /// Rest curvature u0.
+    pub rest_curvature: DVec3,
+    /// Rest strain v0; (1, 0, 0) without growth or shear.
+    pub rest_strain: DVec3,
+    /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
+    pub compliance: DVec3,
+    /// Stiffness with which the force is condensed out: H, or an upper limit if H is larger
+    /// (see [`Section::condense`]).
+    pub condensing: DVec3,
+}
+
+impl Section {
+    /// Limits the stiffness with which the force is condensed out to `largest`. Beyond it the
+    /// matrix is that of a softer rod while the residual stays exact: a proximal step in the
+    /// force, which leaves solutions unchanged, adds linear convergence with a factor of the
+    /// order of 1/`largest`, and keeps the pivots within double precision.
+    pub fn condense(mut self, largest: f64) -> Self {
+        self.condensing = self.compliance.recip().min(DVec3::splat(largest));
+        self
+    }
+}
+
+/// Sections of several segments.
+#[derive(Clone, Copy)]
+pub struct Sections<S: Simd> {
+    pub(crate) ds: Lanes<S>,
+    pub(crate) per_ds: Lanes<S>,
+    pub(crate) couple_stiffness: Vectors<S>,
+    pub(crate) rest_curvature: Vectors<S>,
+    pub(crate) rest_strain: Vectors<S>,
+    pub(crate) compliance: Vectors<S>,
+    pub(crate) condensing: Vectors<S>,
+}
+
+impl<S: Simd> Sections<S> {
+    /// The sections of the lanes from `part` on.
+    #[inline(always)]
+    pub fn gather(simd: S, [a, b, c, d]: [&Section; GROUP], part: usize) -> Self {
+        let ds = Four([a.ds, b.ds, c.ds, d.ds]);
+        let ds = Lanes::of(simd, &ds, part);
+        let vectors =
+            |of: fn(&Section) -> DVec3| Vectors::gather(simd, [of(a), of(b), of(c), of(d)], part);
+        Sections {
+            ds,
+            per_ds: ds.recip(),
+            couple_stiffness: vectors(|s| s.couple_stiffness),
+            rest_curvature: vectors(|s| s.rest_curvature),
+            rest_strain: vectors(|s| s.rest_strain),
+            compliance: vectors(|s| s.compliance),
+            condensing: vectors(|s| s.condensing),
+        }
+    }
+}
+
+impl From<&Section> for Sections<Scalar> {
+    #[inline]
+    fn from(section: &Section) -> Self {
+        Sections::gather(Scalar, [section; GROUP], 0)
     }
 }
 

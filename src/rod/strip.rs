@@ -13,12 +13,10 @@
 //! converges as fast however stiff it is. Other than a segment it may have no stiffness in some
 //! direction, in which it then carries no force.
 
-use super::derivatives::{First, UNKNOWNS, on_nodes};
-use super::element::{Element, Nodes};
-use super::section::{Section, Sections};
-use super::segment::Ends;
-use crate::lanes::Vectors;
+use crate::rod::segment::{Ends, Section, Sections};
+use crate::rod::{Element, First, Nodes, UNKNOWNS, on_nodes};
 use crate::rotation;
+use crate::simd::Vectors;
 use glam::DVec3;
 use pulp::Scalar;
 
@@ -197,6 +195,7 @@ fn on_ends(first: First<Scalar>) -> [[DVec3; 2]; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rotation;
     use glam::DQuat;
 
     /// A strip far from its natural state, and its ends.

@@ -1,29 +1,30 @@
 //! Limits on dimensionless combinations of values: beyond them the numbers of a scenario
 //! are a mistake, or no grid could resolve its shape. Only given values are checked;
 //! defaults are always within the limits.
+//!
+//! Limits on bases, tissue, weights, loads along veins and wind.
+//!
+//! Bounds on dimensionless numbers, and what the checks of combinations of values share.
 
-use super::bounds::{
-    GRAVITY, Limit, TIME, TIP_FORCE, TIP_MOMENT, UNIT, extremes, most, near_one, norm,
-    smallest_unit, softest,
-};
-use super::entries::Entries;
-use super::error::ScenarioResult;
-use super::form::Form;
-use super::item::{Item, MAGNITUDES};
-use super::key::Key;
-use super::load_limits;
-use super::material;
-use super::{Dynamics, Profile, Rod, Scale, Scenario, Tissue, longest};
+use crate::scenario::format::entries::Entries;
+use crate::scenario::format::item::{Item, MAGNITUDES};
+use crate::scenario::format::source::ScenarioResult;
+use crate::scenario::format::{Form, Key};
+use crate::scenario::{Dynamics, Profile, Rod, Scale, Scenario, Tissue, longest, section};
 
 /// Longest to shortest rod.
 const LENGTHS: Limit = most("L_max/L", 1e3, SHORT);
+
 /// Largest to smallest torsion or bending stiffness: leaves four of the 16 digits of
 /// double precision.
 const STIFFNESSES: Limit = most("A_max/A", 1e12, UNEVEN_STIFFNESS);
+
 /// An angle in radians: 160 coils.
 const REST_ANGLE: Limit = most("|u0| L", 1e3, CURLED);
+
 /// Growth of the rest length, and its inverse: as with lengths.
 const STRETCH: Limit = near_one("v0", 1e3, GROWN);
+
 /// Below, a rod is softer against stretch or shear than against bending into
 /// a curl a thousandth of its length.
 const FORCE_STIFFNESS: Limit = Limit {
@@ -32,8 +33,10 @@ const FORCE_STIFFNESS: Limit = Limit {
     most: f64::INFINITY,
     because: SOFT,
 };
+
 /// Two coupled rods join within (A/kappa)^(1/4), at the limit 1e-3 of the length.
 const KAPPA: Limit = most("kappa L^4/A", 1e12, COUPLED);
+
 /// Masses, damping and times in their natural units: values that differ by twelve orders
 /// of magnitude hardly affect each other in double precision, which has 16 digits. A
 /// radius is limited by itself, as it enters by its square and, with a small density,
@@ -49,31 +52,44 @@ const DYNAMICS: [(Key, Limit); 6] = [
     (Key::InternalDamping, most("t/T", 1e12, UNIT)),
     (Key::Duration, near_one("t/T", 1e12, UNIT)),
 ];
+
 /// Outputs after the first.
 const OUTPUTS: Limit = most("duration/output_interval", 1e6, TOO_MANY);
+
 /// Factor of the rest curvatures, and the same with the largest of them.
 const FACTOR: Limit = most("|factor|", 1e6, MULTIPLIED);
+
 const FACTOR_ANGLE: Limit = most("|factor u0| L", 1e3, CURLED);
 
 const SHORT: &str = "the ratio of the longest rod to this shortest one: \
      one grid of equal fractions of the length does not serve both";
+
 const UNEVEN_STIFFNESS: &str = "the ratio of the largest to this smallest torsion or bending stiffness; \
      double precision does not resolve more: raise this one or lower the largest";
+
 const CURLED: &str = "an angle in radians: the rod at rest would be wound up more than 150 times";
+
 const GROWN: &str = "the factor of the rest length; beyond it or its inverse one grid \
      of equal fractions of the length does not serve the leaf";
+
 const SOFT: &str = "A is the smallest bending stiffness of the rod and L its length; \
      below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
+
 const COUPLED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
      beyond the limit neighbours act as glued together: lower the coupling";
+
 const UNEVEN_DENSITY: &str = "rho_mean is the mean of the densities mid-rod; \
      beyond the limit one part weighs nothing beside another: choose densities closer to each other";
+
 const STOUT: &str = "rho_mean is the mean of the densities mid-rod and L the longest rod; \
      it is r^2/(4 L^2) for a round section of radius r: choose one closer to that of a rod";
+
 const WIDE: &str =
     "r is the radius of the section and L the longest rod: choose one closer to that of a rod";
+
 const TOO_MANY: &str =
     "the number of outputs: choose a longer output_interval or a shorter duration";
+
 const MULTIPLIED: &str =
     "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
@@ -92,12 +108,12 @@ pub(super) fn check(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()
     dynamics(entries, scenario)?;
     masses(entries, scenario)?;
     in_time(entries, scenario)?;
-    load_limits::check_loads(entries, scenario)
+    check_loads(entries, scenario)
 }
 
 /// Refuses stiffnesses and masses that are too large or too small, where they follow from a size.
 fn magnitudes(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
-    let Some(size) = material::size(entries) else {
+    let Some(size) = section::size(entries) else {
         return Ok(());
     };
     let Dynamics {
@@ -155,7 +171,7 @@ fn rods(entries: &Entries, rods: &[Rod]) -> ScenarioResult<()> {
             check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
         }
         // Stiffnesses that are not given follow from the size of a section.
-        if let Some(item) = material::size(entries) {
+        if let Some(item) = section::size(entries) {
             let couple = rod.couple_stiffness.iter().map(Profile::min);
             let least = couple.fold(f64::INFINITY, f64::min);
             STIFFNESSES.check(item.entry(index), stiffest / least)?;
@@ -210,7 +226,7 @@ fn dynamics(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
 fn masses(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let mass = [Key::MassDensity, Key::BladeMassDensity];
     let mass = mass.into_iter().find_map(|key| entries.given(key));
-    let (Some(size), Some(density)) = (material::size(entries), mass) else {
+    let (Some(size), Some(density)) = (section::size(entries), mass) else {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.time());
@@ -271,4 +287,273 @@ fn in_time(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
         }
     }
     Ok(())
+}
+
+/// A thousandth of the digits of positions is lost.
+const BASE: Limit = most("|base|/L", 1e3, FAR);
+
+/// Wider than for couplings, as blades need: a strip of width h, thickness t and length L gives
+/// k L^4/A = 12 L^4/(h^2 t^2) and c L^2/A = L^2/h^2.
+const TISSUE: Limit = most("k L^4/A", 1e16, TIED);
+
+const FOLD: Limit = most("c L^2/A", 1e12, TIED);
+
+const PULLED: Limit = most("|g| rho L^3/A", 1e8, HEAVY);
+
+const PULLED_POINT: Limit = most("|g| m L^2/A", 1e8, HEAVY);
+
+const MASS: Limit = most("m/(rho_mean L)", 1e12, UNIT);
+
+const DRAG: Limit = most("rho C_D w |U|^2 L^3/(2 A)", 1e8, STORM);
+
+const VELOCITY: Limit = most("|U| T/L", 1e12, UNIT);
+
+const WIDTH: Limit = near_one("w/L", 1e6, WIDE_LOAD);
+
+const FAR: &str = "L is the longest rod; \
+     beyond the limit positions lose digits: choose an origin closer to the leaf";
+
+const TIED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
+     beyond the limit double precision does not resolve both: lower this one or stiffen the rods";
+
+const HEAVY: &str = "A is the smallest bending stiffness of a rod, L its length and rho its mass per \
+     length; beyond the limit bending is confined to less than 1e-4 of the length: check both units";
+
+const STORM: &str = "A is the smallest bending stiffness of a rod and L its length; \
+     beyond the limit bending is confined to less than 1e-4 of the length: lower the velocity";
+
+const WIDE_LOAD: &str = "L is the longest rod: choose one closer to the width of a rod";
+
+pub(super) fn check_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    bases(entries, scenario)?;
+    tissue(entries, scenario)?;
+    weights(entries, scenario)?;
+    distributed(entries, scenario)?;
+    points(entries, scenario)?;
+    wind(entries, scenario)
+}
+
+fn bases(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let Some(item) = entries.given(Key::Base) else {
+        return Ok(());
+    };
+    let longest = longest(&scenario.rods);
+    let mut rods = scenario.rods.iter();
+    rods.try_for_each(|rod| BASE.check(item, norm(rod.base) / longest))
+}
+
+fn tissue(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let gaps = scenario
+        .tissue
+        .iter()
+        .flatten()
+        .zip(scenario.rods.windows(2));
+    for (gap, (tissue, rods)) in gaps.enumerate() {
+        // The ends of a blade may be far narrower than the rest.
+        let middle = scenario.blade.is_some();
+        let softest = |rod: &Rod| match middle {
+            true => Scale {
+                length: rod.length,
+                stiffness: (rod.couple_stiffness[1].at(0.5)).min(rod.couple_stiffness[2].at(0.5)),
+            },
+            false => softest(rod),
+        };
+        let [one, other] = [softest(&rods[0]), softest(&rods[1])];
+        let both = Scale {
+            length: one.length.max(other.length),
+            stiffness: one.stiffness.min(other.stiffness),
+        };
+        for (key, profile) in Key::TISSUE.into_iter().zip(tissue.profiles()) {
+            let blade = || entries.given(Key::BladeThickness);
+            let stiffness = match middle {
+                true => profile.at(0.5),
+                false => profile.max_abs(),
+            };
+            if let Some(item) = entries.given(key).or_else(blade) {
+                let limit = if key == Key::TissueFold {
+                    &FOLD
+                } else {
+                    &TISSUE
+                };
+                limit.check(item.entry(gap), stiffness / both.unit(key, 1.0))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let unit = smallest_unit(Key::Gravity, &scenario.rods);
+    if let Some(item) = entries.given(Key::Gravity) {
+        GRAVITY.check(item, norm(scenario.gravity) / unit)?;
+        for (vein, own) in scenario.own_gravity.iter().enumerate() {
+            GRAVITY.check(item.entry(vein), norm(*own) / unit)?;
+        }
+    }
+    let Some(item) = entries.given(Key::G) else {
+        return Ok(());
+    };
+    for (rod, density) in scenario.rods.iter().zip(&scenario.dynamics.density) {
+        let unit = softest(rod).unit(Key::Gravity, 1.0);
+        PULLED.check(item, norm(scenario.g) / unit * density.max_abs())?;
+    }
+    Ok(())
+}
+
+fn distributed(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let Some(item) = entries.given(Key::Distributed) else {
+        return Ok(());
+    };
+    let unit = smallest_unit(Key::Distributed, &scenario.rods);
+    let loads = scenario.distributed.iter().flatten();
+    for load in loads {
+        let most = load.each_ref().map(Profile::max_abs);
+        GRAVITY.check(item, norm(most) / unit)?;
+    }
+    Ok(())
+}
+
+fn points(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let unit = |key| smallest_unit(key, &scenario.rods);
+    let (force, moment) = (unit(Key::PointForce), unit(Key::PointMoment));
+    let mass = scenario.unit(Key::PointMass);
+    for (row, point) in scenario.points.iter().enumerate() {
+        let item = |key| entries.item_of(key, row);
+        TIP_FORCE.check(item(Key::PointForce)?, norm(point.force) / force)?;
+        TIP_MOMENT.check(item(Key::PointMoment)?, norm(point.moment) / moment)?;
+        let weighed = item(Key::PointMass)?;
+        MASS.check(weighed, point.mass / mass)?;
+        PULLED_POINT.check(weighed, norm(scenario.g) / force * point.mass)?;
+    }
+    Ok(())
+}
+
+fn wind(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    let Some(wind) = &scenario.wind else {
+        return Ok(());
+    };
+    let (item, time) = (entries.item(Key::WindVelocity)?, scenario.time());
+    for at in &wind.velocity.at {
+        TIME.check(item, at.abs() / time)?;
+    }
+    let velocity = scenario.unit(Key::WindVelocity);
+    for speed in wind.velocity.value.iter().map(|&value| norm(value)) {
+        VELOCITY.check(item, speed / velocity)?;
+        for (rod, width) in scenario.rods.iter().zip(&wind.width) {
+            let pressure = 0.5 * wind.density * wind.drag * speed * speed;
+            let unit = softest(rod).unit(Key::Gravity, 1.0);
+            DRAG.check(item, pressure * width.max_abs() / unit)?;
+        }
+    }
+    let longest = longest(&scenario.rods);
+    WIDTH.check_profiles(entries.item(Key::WindWidth)?, &wind.width, longest)
+}
+
+/// The range of a dimensionless number.
+pub(super) struct Limit {
+    /// The number.
+    pub formula: &'static str,
+    pub least: f64,
+    pub most: f64,
+    /// What the symbols mean, why there is a limit, and what to change.
+    pub because: &'static str,
+}
+
+impl Limit {
+    pub fn check(&self, item: Item, value: f64) -> ScenarioResult<()> {
+        let limit = match value {
+            _ if value > self.most => self.most,
+            _ if value < self.least => self.least,
+            _ => return Ok(()),
+        };
+        let (formula, because) = (self.formula, self.because);
+        Err(item.refuse(format_args!(
+            "gives {formula} = {value:.3e}, the limit is {limit:e}: {because}"
+        )))
+    }
+
+    /// Checks the extremes of a profile of each rod, in this unit.
+    pub fn check_profiles(
+        &self,
+        item: Item,
+        profiles: &[Profile],
+        unit: f64,
+    ) -> ScenarioResult<()> {
+        for (index, profile) in profiles.iter().enumerate() {
+            for value in extremes(profile) {
+                self.check(item.entry(index), value / unit)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The least and the largest value of a quantity that is positive. The mass of a blade may vanish at
+/// its ends: then the largest twice.
+pub(super) fn extremes(profile: &Profile) -> [f64; 2] {
+    let (least, most) = (profile.min(), profile.max_abs());
+    match profile {
+        Profile::Blade { .. } if least == 0.0 => [most; 2],
+        _ => [least, most],
+    }
+}
+
+pub(super) const fn most(formula: &'static str, most: f64, because: &'static str) -> Limit {
+    Limit {
+        formula,
+        least: 0.0,
+        most,
+        because,
+    }
+}
+
+/// Within a factor of `most` of 1.
+pub(super) const fn near_one(formula: &'static str, most: f64, because: &'static str) -> Limit {
+    Limit {
+        formula,
+        least: 1.0 / most,
+        most,
+        because,
+    }
+}
+
+/// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
+/// its ends: at the limit, within 1e-4 of its length.
+pub(super) const GRAVITY: Limit = most("|g| L^3/A", 1e8, CONFINED);
+
+pub(super) const TIP_FORCE: Limit = most("|F| L^2/A", 1e8, CONFINED);
+
+pub(super) const TIP_MOMENT: Limit = most("|M| L/A", 1e8, WOUND);
+
+/// Times of loads and factors.
+pub(super) const TIME: Limit = most("|t|/T", 1e12, UNIT);
+
+const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
+     beyond the limit bending is confined to less than 1e-4 of the length: lower the load or stiffen the rods";
+
+const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
+     the rod would roll up by this many radians: lower the moment or stiffen the rod";
+
+pub(super) const UNIT: &str = "T = sqrt(rho_mean L^4/A) is the natural unit of time, with the longest rod L and \
+     the means rho_mean and A of the densities and bending stiffnesses mid-rod: \
+     choose a value, or a density, that brings this closer to 1";
+
+/// The length of a rod and its smallest bending stiffness anywhere along it.
+pub(super) fn softest(rod: &Rod) -> Scale {
+    let [_, second, third] = &rod.couple_stiffness;
+    Scale {
+        length: rod.length,
+        stiffness: second.min().min(third.min()),
+    }
+}
+
+/// The smallest unit of a quantity of this key, which has no times, of all rods.
+pub(super) fn smallest_unit(key: Key, rods: &[Rod]) -> f64 {
+    let units = rods.iter().map(|rod| softest(rod).unit(key, 1.0));
+    units.fold(f64::INFINITY, f64::min)
+}
+
+pub(super) fn norm([x, y, z]: [f64; 3]) -> f64 {
+    // hypot avoids overflow of the squares of large components.
+    x.hypot(y).hypot(z)
 }

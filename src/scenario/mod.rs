@@ -2,78 +2,53 @@
 //!
 //! All other modules rely on a [`Scenario`] being valid: lengths of lists agree,
 //! stiffnesses are positive, angles finite.
+//!
+//! Where and how veins begin, and where along them nodes must be.
+//!
+//! Reads a scenario from a file or from text.
 
-mod base;
 mod blade;
-mod bounds;
 mod check;
-mod dynamics;
-mod entries;
-mod error;
-mod excerpt;
-mod form;
-mod gauss;
-mod grip;
-mod hold;
-mod item;
-mod json;
-mod key;
+pub(crate) mod format;
 mod limits;
-mod load_limits;
 mod loads;
-mod material;
-mod mistakes;
-mod moduli;
 mod outline;
-mod part;
 mod photo;
+mod plausibility;
 mod profile;
-mod read;
-mod schedule;
-mod schema;
 mod section;
-mod slips;
-mod source;
-mod spelling;
-mod tip;
-mod tissue;
-mod turning;
-pub mod units;
-mod values;
-mod vectors;
+mod supports;
+#[cfg(test)]
+mod tests;
 mod veins;
-mod wind;
 
-pub use blade::{Blade, BladePart, BladeProperty};
-pub use dynamics::{Dynamics, Start};
-pub use entries::Entries;
-pub use error::{Place, ScenarioError};
-pub use excerpt::printable;
-pub(crate) use form::Form;
-pub use grip::Grip;
-pub use hold::Hold;
-pub use key::Key;
-pub use loads::{PointLoad, Weight};
-pub use moduli::{Moduli, Stress};
-pub use part::Part;
-pub use photo::{Photo, PhotoRate};
-pub use profile::Profile;
-pub(crate) use profile::ascending;
-pub use read::{MOST_BYTES, bytes, text, utf8};
-pub use schedule::Schedule;
-pub use schema::schema;
-pub use section::{Property, Radii, Section};
-pub(crate) use slips::{STRETCHED, obstacle, out_of_reach, slips};
-pub use tip::{Clamp, HeldTip};
-pub use tissue::Tissue;
+use crate::memory;
+pub use crate::scenario::blade::{Blade, BladePart, BladeProperty};
+pub(crate) use crate::scenario::format::Form;
+pub use crate::scenario::format::Key;
+pub use crate::scenario::format::entries::{Entries, Part};
+pub use crate::scenario::format::schema::schema;
+use crate::scenario::format::source::line_of;
+pub(crate) use crate::scenario::format::source::number_meant;
+pub use crate::scenario::format::source::{Place, ScenarioError, printable};
+pub use crate::scenario::format::units;
+pub use crate::scenario::format::units::Units;
+pub use crate::scenario::loads::{Dynamics, PointLoad, Start, Weight, Wind};
+pub use crate::scenario::outline::{Moduli, Stress};
+pub use crate::scenario::photo::{Photo, PhotoRate};
+pub(crate) use crate::scenario::plausibility::{STRETCHED, obstacle, out_of_reach, slips};
+pub(crate) use crate::scenario::profile::ascending;
+pub use crate::scenario::profile::{Profile, Schedule};
+pub use crate::scenario::section::{Property, Radii, Section};
+pub use crate::scenario::supports::{Begin, Clamp, Grip, HeldTip, Hold, Turning, UnbalancedMoment};
+pub use crate::scenario::veins::Tissue;
+use glam::{DQuat, DVec3};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::sync::Arc;
 /// Values as they can be written.
 pub use toml::{Table, Value};
-pub use turning::{Begin, Turning, UnbalancedMoment};
-pub use units::Units;
-pub(crate) use values::number_meant;
-pub use wind::Wind;
-
-use std::sync::Arc;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
@@ -147,7 +122,7 @@ impl Scenario {
 
     /// T: the natural unit of time, sqrt(rho L^4/A).
     fn time(&self) -> f64 {
-        dynamics::time(self.scale(), &self.dynamics.density)
+        loads::time(self.scale(), &self.dynamics.density)
     }
 }
 
@@ -241,5 +216,193 @@ pub fn longest(rods: &[Rod]) -> f64 {
         .fold(0.0, |longest, rod| longest.max(rod.length))
 }
 
+/// Places that differ by less are the same: no segment may be so short.
+const ROUNDING: f64 = 1e-12;
+
+impl Rod {
+    /// The rotation of the directors at the base: by the fan's angle about e3, after the elevation
+    /// about -e2, so that d1 = (cos e cos phi, cos e sin phi, sin e), after the roll about e1.
+    pub fn base_rotation(&self) -> DQuat {
+        let mut rotation = DQuat::from_rotation_z(self.angle);
+        if self.elevation != 0.0 {
+            rotation *= DQuat::from_rotation_y(-self.elevation);
+        }
+        if self.roll != 0.0 {
+            rotation *= DQuat::from_rotation_x(self.roll);
+        }
+        rotation
+    }
+
+    /// Where it begins.
+    pub fn base_position(&self) -> DVec3 {
+        DVec3::from_array(self.base)
+    }
+}
+
+impl Scenario {
+    /// Where vein `j` begins, and the rotation of its directors there.
+    pub fn base(&self, j: usize) -> (DVec3, DQuat) {
+        let rod = &self.rods[j];
+        (rod.base_position(), rod.base_rotation())
+    }
+
+    /// Fractions inside (0, 1) where a grid must have a node: kinks of stiffnesses, rest shapes,
+    /// loads and the wind's width, points that are loaded, and the ends of what is gripped;
+    /// ascending, each once, and none within rounding of another or of an end: what is there is at
+    /// the nearest node.
+    pub fn kinks(&self) -> Vec<f64> {
+        let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
+        let profiles = self.rods.iter().flat_map(Rod::profiles);
+        let profiles = profiles
+            .chain(masses.map(|(_, mass)| mass))
+            .chain(self.tissue.iter().flatten().flat_map(Tissue::profiles))
+            .chain(self.distributed.iter().flatten().flatten())
+            .chain(self.wind.iter().flat_map(|wind| &wind.width));
+        let points = self.points.iter().map(|point| point.at);
+        let ends = self.grips.iter().flat_map(|grip| grip.at);
+        let inside = points.chain(ends);
+        let all = profiles.flat_map(Profile::kinks).copied().chain(inside);
+        let mut kinks = ascending(all.filter(|&at| at > ROUNDING && at < 1.0 - ROUNDING));
+        kinks.dedup_by(|next, kept| *next - *kept <= ROUNDING);
+        kinks
+    }
+}
+
+/// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
+pub const MOST_BYTES: u64 = 64 << 20;
+
+impl Scenario {
+    /// Reads and checks the TOML in `text`, or the JSON of a [`Scenario`] or of a
+    /// result with its `input`.
+    ///
+    /// ```
+    /// let scenario = leafdyn::scenario::Scenario::from_toml(
+    ///     r#"
+    ///     name = "cantilever"
+    ///     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    ///     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    ///     load = { tip_force = [0.0, 0.0, -1.0] }
+    ///     "#,
+    /// )?;
+    /// assert_eq!(scenario.rods.len(), 1);
+    /// # Ok::<(), leafdyn::scenario::ScenarioError>(())
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Scenario, ScenarioError> {
+        Scenario::from_toml_with(text, "scenario", &[])
+    }
+
+    /// As [`Scenario::from_toml`], with the entries `overrides` replaced
+    /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, anything
+    /// else is taken as text), or parts of them: one entry of a list
+    /// (`load.gravity[2]=-1`, `stiffness.bending_2.value[0]=2`), or every number of
+    /// a key multiplied (`scale:load.gravity=2`). Messages call the text `file`.
+    pub fn from_toml_with(
+        text: &str,
+        file: &str,
+        overrides: &[String],
+    ) -> Result<Scenario, ScenarioError> {
+        let entries = Entries::of_text(text, file)?;
+        entries.replaced(overrides)?.check()
+    }
+
+    /// Reads and checks the file at `path`.
+    pub fn read(path: impl AsRef<Path>) -> Result<Scenario, ScenarioError> {
+        Scenario::read_with(path.as_ref(), &[])
+    }
+
+    /// As [`Scenario::read`], with the entries `overrides` replaced.
+    pub fn read_with(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
+        Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
+    }
+}
+
+/// Reads the text of a scenario's file.
+///
+/// # Errors
+/// If it cannot be read, or is not text.
+pub fn text(path: &Path) -> Result<String, ScenarioError> {
+    utf8(bytes(path)?, &path.display().to_string())
+}
+
+/// Reads a file, of at most one byte more than [`MOST_BYTES`].
+///
+/// # Errors
+/// If it cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    // Opening a folder succeeds on some systems, and reading it fails.
+    File::open(path)
+        .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|reason| match reason.kind() {
+            ErrorKind::IsADirectory => {
+                ScenarioError::in_file(&file, None, "is a folder: give the file itself".into())
+            }
+            _ => {
+                let problem = format!("cannot be read: {reason}: check its path and permissions");
+                ScenarioError::in_file(&file, None, problem)
+            }
+        })?;
+    Ok(bytes)
+}
+
+/// Decodes the text of a scenario's `file` from its first bytes.
+pub fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
+    if bytes.len() as u64 > MOST_BYTES {
+        let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
+        return Err(ScenarioError::in_file(file, None, problem));
+    }
+    memory::text(&bytes).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let byte = bytes[offset];
+        let problem =
+            format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
+        ScenarioError::in_file(file, Some(line_of(bytes, offset)), problem)
+    })
+}
+
 #[cfg(test)]
-mod tests;
+mod base_tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn rod(angle: f64, elevation: f64) -> Rod {
+        Rod {
+            length: 1.0,
+            base: [0.1, -0.2, 0.3],
+            angle,
+            elevation,
+            roll: 0.0,
+            couple_stiffness: [1.0; 3].map(Profile::Constant),
+            force_stiffness: [1.0; 3].map(Profile::Constant),
+            rest_curvature: [0.0; 3].map(Profile::Constant),
+            rest_stretch: Profile::Constant(1.0),
+        }
+    }
+
+    /// d2 stays in the plane of the fan, d3 leans back.
+    #[test]
+    fn a_vein_rises_from_the_plane_of_the_fan() {
+        for (angle, elevation) in [(0.0, 0.0), (0.7, 0.4), (-2.0, -1.1), (0.3, FRAC_PI_2)] {
+            let rod = rod(angle, elevation);
+            let turn = rod.base_rotation();
+            let ((sin, cos), (up, flat)) = (angle.sin_cos(), elevation.sin_cos());
+            let directors = [
+                DVec3::new(flat * cos, flat * sin, up),
+                DVec3::new(-sin, cos, 0.0),
+                DVec3::new(-up * cos, -up * sin, flat),
+            ];
+            for (axis, director) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().zip(directors) {
+                assert!(
+                    (turn * axis).distance(director) < 1e-15,
+                    "{angle} {elevation}"
+                );
+            }
+        }
+        // Leaves that lie flat are what they always were, to the last bit.
+        assert_eq!(rod(0.7, 0.0).base_rotation(), DQuat::from_rotation_z(0.7));
+        assert_eq!(rod(0.7, 0.0).base_position(), DVec3::new(0.1, -0.2, 0.3));
+    }
+}

@@ -13,11 +13,37 @@
 //! thickness, by up to 7 % where it is nearly half of it. A rectangle is between both by the part
 //! y + (b/a)^2 y (1 - y), with its sides a > b and the wall y b/2: it is exact for thin walls and for
 //! full sections, and else within 1 % of finite differences.
+//!
+//! The largest stresses in a section: its moduli, and what a force and a moment make of them.
+//!
+//! With the area S, the second moments I2 and I3 about d2 and d3, and the width w and thickness t:
+//!
+//! | | |
+//! | --- | --- |
+//! | normal stress | \|n1\|/S + \|m2\| t/(2 I2) + \|m3\| w/(2 I3) in the corner of a rectangle; on an ellipse the root of the sum of the squares of both bending stresses in place of their sum |
+//! | shear stress | of torsion \|m1\| D/J, plus the root of the sum of the squares of those of n2 and n3, n Q/(I b) each |
+//! | equivalent stress | the root of normal^2 + 3 shear^2 (R. von Mises, 1913) |
+//!
+//! D is the largest slope of the stress function per twist (S. P. Timoshenko and J. N. Goodier,
+//! Theory of Elasticity, 3rd ed., arts. 107 to 109): the radius of a circle, on an ellipse with the
+//! semi-axes a > b at the ends of the short one 2 a^2 b/(a^2 + b^2), of a rectangle in the middle of
+//! the long sides. That of a thin wall is 2 A/s (art. 115, R. Bredt), with the area A within it and its
+//! length s; a thick one lies between both as its torsion constant does: exact for circles, and of
+//! rectangles within 4 % of finite differences. Q/(I b) is D. I. Zhuravskii's (art. 120, note): the first moment of half of the section over
+//! its second moment and the material across, 3/2 of the mean in a rectangle, 4/3 in a round section
+//! and 2 in a thin round tube.
+//!
+//! The largest normal and shear stresses, and those of torsion and shear forces, lie at different
+//! places of the outline: the largest shear and equivalent stresses are at most these sums, and equal
+//! to them for the equivalent one of a circle that is bent, pulled and twisted. Corners within a hollow
+//! rectangle concentrate stress, which is left out.
 
-use std::f64::consts::PI;
-
-use super::gauss::GAUSS;
+use crate::scenario::Scenario;
+use crate::scenario::profile::GAUSS;
 use crate::words;
+use glam::DVec3;
+use serde::Serialize;
+use std::f64::consts::PI;
 
 words! {
     /// The outline of a section.
@@ -209,6 +235,173 @@ impl Outline {
     }
 }
 
+/// What the largest stresses in a section follow from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moduli {
+    /// S.
+    area: f64,
+    /// t/(2 I2) and w/(2 I3).
+    bending: [f64; 2],
+    /// Largest shear stress per twisting moment.
+    torsion: f64,
+    /// Largest shear stress per force along d2 and along d3.
+    shear: [f64; 2],
+    /// Whether both bending stresses are largest in the same point.
+    corners: bool,
+}
+
+/// The largest stresses in a section, force per area.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Stress {
+    /// Along the rod, by tension and bending: its size, in tension or compression.
+    pub normal: f64,
+    /// By torsion and shear forces.
+    pub shear: f64,
+    /// As if both were largest in the same point.
+    pub equivalent: f64,
+}
+
+impl Stress {
+    /// The names of its components.
+    pub const NAMES: [&str; 3] = ["normal_stress", "shear_stress", "equivalent_stress"];
+
+    /// All three.
+    pub fn to_array(self) -> [f64; 3] {
+        [self.normal, self.shear, self.equivalent]
+    }
+}
+
+impl Moduli {
+    /// Stresses by a force n and a moment m along the directors.
+    pub fn stress(&self, n: DVec3, m: DVec3) -> Stress {
+        let (n, m) = (n.abs(), m.abs());
+        let [about_2, about_3] = [m.y * self.bending[0], m.z * self.bending[1]];
+        let bending = match self.corners {
+            true => about_2 + about_3,
+            false => about_2.hypot(about_3),
+        };
+        let normal = n.x / self.area + bending;
+        let shear = m.x * self.torsion + (n.y * self.shear[0]).hypot(n.z * self.shear[1]);
+        Stress {
+            normal,
+            shear,
+            equivalent: normal.hypot(3_f64.sqrt() * shear),
+        }
+    }
+
+    /// Those of a strip of a plate, which twists with it: J = w t^3/3.
+    fn of_strip(width: f64, thickness: f64) -> Moduli {
+        let sides = Sides {
+            outline: Outline::Rectangle,
+            width,
+            thickness,
+            wall: None,
+        };
+        Moduli {
+            torsion: 3.0 / (width * thickness * thickness),
+            ..sides.moduli()
+        }
+    }
+}
+
+impl Sides {
+    /// Its moduli.
+    pub fn moduli(self) -> Moduli {
+        let (w, t) = (self.width, self.thickness);
+        let [second, third] = self.second_moments();
+        let turned = Sides {
+            width: t,
+            thickness: w,
+            ..self
+        };
+        Moduli {
+            area: self.area(),
+            bending: [0.5 * t / second, 0.5 * w / third],
+            torsion: self.slope() / self.torsion(),
+            shear: [
+                turned.first_moment() / (third * turned.across()),
+                self.first_moment() / (second * self.across()),
+            ],
+            corners: self.outline == Outline::Rectangle,
+        }
+    }
+
+    /// The hole, if it has an area.
+    fn open(self) -> Option<Sides> {
+        self.hole().filter(|hole| hole.enclosed() > 0.0)
+    }
+
+    /// The first moment of its upper half about d2.
+    fn first_moment(self) -> f64 {
+        let factor = match self.outline {
+            Outline::Circle | Outline::Ellipse => 1.0 / 12.0,
+            Outline::Rectangle => 1.0 / 8.0,
+        };
+        let full = factor * self.width * self.thickness * self.thickness;
+        full - self.open().map_or(0.0, Sides::first_moment)
+    }
+
+    /// The material along d2 through its centre.
+    fn across(self) -> f64 {
+        self.width - self.open().map_or(0.0, |hole| hole.width)
+    }
+
+    /// The largest slope of the stress function per twist, D.
+    fn slope(self) -> f64 {
+        let (w, t) = (self.width, self.thickness);
+        let full = self.outline.slope(w, t);
+        let Some(wall) = self.wall.filter(|_| self.open().is_some()) else {
+            return full;
+        };
+        let thin = match self.outline {
+            // The length of an ellipse as for the torsion constant.
+            Outline::Circle | Outline::Ellipse => w * t / (w + t - (w * t).sqrt()) / 2.0,
+            Outline::Rectangle => w * t / (w + t),
+        };
+        thin + self.between(wall) * (full - thin)
+    }
+}
+
+/// Terms of the series of a rectangle, which falls off as exp(-n pi/2).
+const TERMS: i32 = 12;
+
+impl Outline {
+    /// The largest slope of the stress function of the full outline per twist. Of a rectangle with
+    /// the long side a and the short side b: b (1 - 8/pi^2 sum over odd n of 1/(n^2 cosh(n pi a/(2 b)))).
+    fn slope(self, width: f64, thickness: f64) -> f64 {
+        let (long, short) = (width.max(thickness), width.min(thickness));
+        match self {
+            Outline::Circle | Outline::Ellipse => {
+                let ratio = short / long;
+                short / (1.0 + ratio * ratio)
+            }
+            Outline::Rectangle => {
+                let odd = (0..TERMS).map(|k| f64::from(2 * k + 1));
+                let terms = odd.map(|n| 1.0 / (n * n * (n * PI * long / (2.0 * short)).cosh()));
+                short * (1.0 - 8.0 / (PI * PI) * terms.sum::<f64>())
+            }
+        }
+    }
+}
+
+impl Scenario {
+    /// The moduli of a rod's section at a fraction of its length; of a blade those of the strip of a
+    /// vein, as wide as its stiffnesses are computed from. `None` if stiffnesses are given in place of
+    /// sections.
+    pub fn moduli(&self, rod: usize, sigma: f64) -> Option<Moduli> {
+        if self.blade.is_none() {
+            return self.radii.moduli(rod, sigma);
+        }
+        // A2/H1 = t^2/12 and A3/H1 = h^2/12.
+        let rod = self.rods.get(rod)?;
+        let side = |axis: usize| {
+            let bending = rod.couple_stiffness[axis].at(sigma);
+            (12.0 * bending / rod.force_stiffness[0].at(sigma)).sqrt()
+        };
+        Some(Moduli::of_strip(side(2), side(1)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,5 +509,117 @@ mod tests {
         // A wall of half the thickness leaves no hole.
         let full = hollow(Rectangle, 1.7, 1.0, 0.5);
         close(full.torsion(), Rectangle.torsion(1.7, 1.0), 1e-14);
+    }
+}
+
+#[cfg(test)]
+mod moduli_tests {
+    use super::*;
+
+    #[track_caller]
+    fn close(found: f64, wanted: f64, relative: f64) {
+        assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
+    }
+
+    fn moduli(outline: Outline, width: f64, thickness: f64, wall: Option<f64>) -> Moduli {
+        let sides = Sides {
+            outline,
+            width,
+            thickness,
+            wall,
+        };
+        sides.moduli()
+    }
+
+    /// Largest shear stress M/(k a b^2) of rectangles (Timoshenko and Goodier, art. 109, table 12),
+    /// and 2 M/(pi a b^2) of an ellipse with these semi-axes; whichever way it lies.
+    #[test]
+    fn torsion_of_full_sections() {
+        for (long, k) in [
+            (1.0, 0.208),
+            (1.5, 0.231),
+            (2.0, 0.246),
+            (3.0, 0.267),
+            (4.0, 0.282),
+            (10.0, 0.312),
+        ] {
+            for (width, thickness) in [(long, 1.0), (1.0, long)] {
+                let found = moduli(Outline::Rectangle, width, thickness, None).torsion;
+                close(found, 1.0 / (k * long), 3e-3);
+                let found = moduli(Outline::Ellipse, width, thickness, None).torsion;
+                close(found, 16.0 / (PI * long), 1e-14);
+            }
+        }
+    }
+
+    /// Tubes: M (D/2)/J; M/(2 A t) of thin ones; the slope in the middle of the long sides from finite
+    /// differences for the stress function on two grids, over J.
+    #[test]
+    fn torsion_of_hollow_sections() {
+        use crate::scenario::outline::Outline::{Circle, Ellipse, Rectangle};
+        for wall in [0.01, 0.2, 0.5] {
+            let polar = PI / 32.0 * (1.0 - f64::powi(1.0 - 2.0 * wall, 4));
+            close(
+                moduli(Circle, 1.0, 1.0, Some(wall)).torsion,
+                0.5 / polar,
+                1e-13,
+            );
+        }
+        let thin = 1e-6;
+        for (outline, area) in [(Rectangle, 2.0), (Ellipse, PI / 2.0)] {
+            let found = moduli(outline, 2.0, 1.0, Some(thin)).torsion;
+            close(found, 1.0 / (2.0 * area * thin), 1e-5);
+        }
+        for (width, wall, slope, torsion) in [
+            (1.0, 0.1, 0.5697, 0.07703),
+            (1.0, 0.2, 0.6343, 0.11807),
+            (1.0, 0.4, 0.6750, 0.14024),
+            (2.0, 0.1, 0.7281, 0.21637),
+            (2.0, 0.3, 0.8390, 0.41853),
+            (4.0, 0.1, 0.8434, 0.52474),
+            (4.0, 0.3, 0.9169, 1.02655),
+        ] {
+            let found = moduli(Rectangle, width, 1.0, Some(wall)).torsion;
+            close(found, slope / torsion, 0.04);
+        }
+    }
+
+    /// Of the mean: 3/2 in a rectangle, 4/3 in an ellipse, 2 in a thin tube; in one whose inner
+    /// diameter is half of the outer one 4/3 (R^2 + R r + r^2)/(R^2 + r^2).
+    #[test]
+    fn shear_by_forces() {
+        use crate::scenario::outline::Outline::{Circle, Ellipse, Rectangle};
+        for (outline, width, thickness, wall, factor) in [
+            (Rectangle, 3.0, 0.7, None, 1.5),
+            (Rectangle, 3.0, 0.7, Some(0.35), 1.5),
+            (Ellipse, 3.0, 0.7, None, 4.0 / 3.0),
+            (Circle, 1.0, 1.0, Some(1e-7), 2.0),
+            (Circle, 1.0, 1.0, Some(0.25), 4.0 / 3.0 * 1.75 / 1.25),
+        ] {
+            let found = moduli(outline, width, thickness, wall);
+            for shear in found.shear {
+                close(shear * found.area, factor, 1e-6);
+            }
+        }
+    }
+
+    /// Bent about both axes, the largest stress is that of the extreme among many points of the outline.
+    #[test]
+    fn bending_about_both_axes() {
+        let (w, t, about) = (2.0, 0.5, [0.7, 1.9]);
+        let around = (0..100_000).map(|k| f64::from(k) / 1e5 * 2.0 * PI);
+        let ellipse = moduli(Outline::Ellipse, w, t, None);
+        let [second, third] = [w * t * t * t, t * w * w * w].map(|it| PI / 64.0 * it);
+        let stress = around.map(|angle: f64| {
+            let (y, z) = (0.5 * w * angle.cos(), 0.5 * t * angle.sin());
+            2.0 * 4.0 / (PI * w * t) + (about[0] * z / second - about[1] * y / third).abs()
+        });
+        let most = stress.fold(0.0, f64::max);
+        let n = DVec3::new(-2.0, 0.0, 0.0);
+        let m = DVec3::new(0.0, -about[0], about[1]);
+        close(ellipse.stress(n, m).normal, most, 1e-8);
+        let rectangle = moduli(Outline::Rectangle, w, t, None);
+        let most = 2.0 / (w * t) + 6.0 * (about[0] / (w * t * t) + about[1] / (t * w * w));
+        close(rectangle.stress(n, m).normal, most, 1e-14);
     }
 }

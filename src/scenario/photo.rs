@@ -1,12 +1,10 @@
 //! A photograph of the leaf: the table `[photo]`.
 
+use crate::scenario::format::entries::Entries;
+use crate::scenario::format::item::Item;
+use crate::scenario::format::source::ScenarioResult;
+use crate::scenario::format::{Key, Range};
 use glam::DVec3;
-
-use super::entries::Entries;
-use super::error::ScenarioResult;
-use super::form::Range;
-use super::item::Item;
-use super::key::Key;
 
 /// How a photograph shows the leaf: as seen from far away along an axis, pixels counted to the right
 /// and down.

@@ -1,8 +1,8 @@
 //! Leaves with bases, tissue, loads and holders anywhere: their keys as they are read, replaced,
 //! refused and written.
 
-use super::entries::Entries;
-use super::{Hold, Key, Part, Profile, Scenario, Tissue, schema};
+use crate::scenario::format::entries::Entries;
+use crate::scenario::{Hold, Key, Part, Profile, Scenario, Tissue, schema};
 use leafdyn_testing::pairs;
 use serde_json::{Value, json};
 

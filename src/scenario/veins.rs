@@ -1,16 +1,16 @@
 //! The veins of a leaf: from numbers, from sections, or from a blade.
+//!
+//! Tissue between neighbouring veins: the table `[tissue]`.
 
+use crate::scenario::blade::{Blade, BladeProperty, Parts, blade};
+use crate::scenario::format::Key;
+use crate::scenario::format::entries::Entries;
+use crate::scenario::format::item::Item;
+use crate::scenario::format::source::ScenarioResult;
+use crate::scenario::section::{Property, Section};
+use crate::scenario::{Profile, Radii, Rod, section};
 use std::f64::consts::PI;
 use std::sync::Arc;
-
-use super::blade::{Blade, BladeProperty, Parts, blade};
-use super::entries::Entries;
-use super::error::ScenarioResult;
-use super::item::Item;
-use super::key::Key;
-use super::material;
-use super::section::{Property, Section};
-use super::{Profile, Radii, Rod};
 
 /// What the stiffnesses of the veins follow from.
 pub(super) enum Made {
@@ -26,7 +26,7 @@ impl Made {
             let parts = blade.parts();
             return Ok(Made::Blade(Arc::new(blade), parts));
         }
-        Ok(match material::sections(entries, rods)? {
+        Ok(match section::sections(entries, rods)? {
             Some(sections) => Made::Sections(sections),
             None => Made::Stiffnesses,
         })
@@ -50,7 +50,7 @@ impl Made {
     pub fn profiles(&self, property: Property) -> Option<Vec<Profile>> {
         match self {
             Made::Stiffnesses => None,
-            Made::Sections(sections) => Some(material::profiles(sections, property)),
+            Made::Sections(sections) => Some(section::profiles(sections, property)),
             Made::Blade(_, parts) => Some(parts.profiles(property.into())),
         }
     }
@@ -149,4 +149,53 @@ fn angles(item: Item, rods: usize) -> ScenarioResult<Vec<f64>> {
             "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
         ))),
     }
+}
+
+/// Tissue that fills the gap between two neighbouring veins and turns with them. It is without
+/// force in the natural leaf: every vein in its rest shape from its base, each for itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tissue {
+    /// k1, k2 and k3, force per displacement and length of leaf, along the directors between both
+    /// veins: against neighbours that slide along each other, against a change of the width, and
+    /// against one vein that rises above the other.
+    pub stiffness: [Profile; 3],
+    /// c1, moment per angle and length of leaf, against a fold along the veins.
+    pub fold: Profile,
+}
+
+impl Default for Tissue {
+    fn default() -> Self {
+        Tissue {
+            stiffness: [0.0; 3].map(Profile::Constant),
+            fold: Profile::Constant(0.0),
+        }
+    }
+}
+
+impl Tissue {
+    /// k1, k2, k3 and c1.
+    pub(crate) fn profiles(&self) -> [&Profile; 4] {
+        let [along, across, normal] = &self.stiffness;
+        [along, across, normal, &self.fold]
+    }
+}
+
+/// Reads `[tissue]` of a leaf with so many gaps; `None` if no gap has any.
+pub(super) fn tissue(entries: &Entries, gaps: usize) -> ScenarioResult<Option<Vec<Tissue>>> {
+    let mut tissue = vec![Tissue::default(); gaps];
+    for (which, key) in Key::TISSUE.into_iter().enumerate() {
+        let Some(item) = entries.given(key) else {
+            continue;
+        };
+        let why = "tissue lies between veins: it needs leaf.rods = 2 or more";
+        item.ensure(gaps > 0, why)?;
+        for (gap, stiffness) in tissue.iter_mut().zip(item.one_each(gaps)?) {
+            match which {
+                3 => gap.fold = Profile::Constant(stiffness),
+                axis => gap.stiffness[axis] = Profile::Constant(stiffness),
+            }
+        }
+    }
+    let some = tissue.iter().any(|gap| *gap != Tissue::default());
+    Ok(some.then_some(tissue))
 }

@@ -10,17 +10,24 @@
 //! r' = L R v,   q' = L/2 (R u) q,   n' = -L f,   m' = n x r'
 //! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
 //! ```
+//!
+//! Conditions at the bases, which clamps or hinges hold.
+//!
+//! Loads that veins have of their own: weights, loads along them, and on points.
+//!
+//! The leaf whose rest shape is known: stretched circular arcs from the fan at
+//! the base to one common tip. Free rods have their own rest shapes.
+//!
+//! The numbers that describe a leaf at one sigma.
 
-mod base;
+#[cfg(test)]
+mod tests;
 
-use glam::{DMat3, DQuat, DVec3};
-
-use crate::limit::Limit;
+use crate::run::Limit;
 use crate::scenario::{Hold, Profile, Scenario, Turning, longest};
-use crate::shooting::arcs;
-use crate::shooting::arcs::Arc;
-use crate::shooting::state::{Derivatives, RodState, STATE};
-use crate::shooting::tissue::{Tangent, Tissue};
+use crate::shooting::sensitivities::{Tangent, Tissue};
+use glam::{DMat3, DQuat, DVec3};
+use std::f64::consts::PI;
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -28,7 +35,7 @@ use crate::shooting::tissue::{Tangent, Tissue};
 /// energy of everything from the base up to sigma.
 #[derive(Clone, Debug)]
 pub struct Equations<'a> {
-    pub(in crate::shooting) scenario: &'a Scenario,
+    pub(super) scenario: &'a Scenario,
     /// Unit of length: the longest rod.
     pub length: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
@@ -37,7 +44,7 @@ pub struct Equations<'a> {
     coupling: Vec<DVec3>,
     tissue: Option<Tissue<'a>>,
     /// Whether veins have loads of their own.
-    pub(in crate::shooting) own_loads: bool,
+    pub(super) own_loads: bool,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
@@ -65,7 +72,7 @@ pub struct Equations<'a> {
 }
 
 /// Fractions of the length closer to each other than this are the same.
-pub(in crate::shooting) const SAME_PLACE: f64 = 1e-11;
+pub(super) const SAME_PLACE: f64 = 1e-11;
 
 /// Constraint on the tips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,7 +164,7 @@ impl<'a> Equations<'a> {
             hinged: scenario.base_held == Hold::Pinned,
             softest,
             turnings: scenario.turnings(),
-            arcs: arcs::arcs(scenario, &lengths),
+            arcs: arcs(scenario, &lengths),
             kinks: scenario.kinks(),
             lengths,
             part: 1.0,
@@ -389,5 +396,205 @@ fn cross(a: DVec3) -> DMat3 {
     DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
 }
 
-#[cfg(test)]
-mod tests;
+impl Equations<'_> {
+    /// The first of the six components of a rod's perturbation that are free at its base: of the force
+    /// and the moment at a clamp, of the rotation and the force at a hinge.
+    pub fn free_at_base(&self) -> usize {
+        match self.hinged {
+            true => 3,
+            false => 6,
+        }
+    }
+
+    /// The state at the base nearest to a given one: a hinge carries no moment.
+    pub fn held_base(&self, j: usize, rod: &RodState) -> RodState {
+        let clamped = self.base(j, rod.n, rod.m);
+        match self.hinged {
+            true => RodState {
+                q: rod.q,
+                m: DVec3::ZERO,
+                ..clamped
+            },
+            false => clamped,
+        }
+    }
+
+    /// The state at the base for given forces and moments: conditions (a) and (c).
+    pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
+        let (position, q) = self.scenario.base(j);
+        RodState {
+            r: position / self.length,
+            q,
+            n,
+            m,
+        }
+    }
+
+    /// A flat state at the base without stress.
+    pub fn clamped(&self) -> Vec<f64> {
+        let mut y = vec![0.0; self.size()];
+        for j in 0..self.rods() {
+            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
+        }
+        y
+    }
+}
+
+impl Equations<'_> {
+    /// Load of rod `j` alone, per length: its weight besides the common one, and what is
+    /// distributed along it.
+    pub(super) fn own_load(&self, j: usize, sigma: f64) -> DVec3 {
+        if !self.own_loads {
+            return DVec3::ZERO;
+        }
+        let s = self.scenario;
+        let weight = DVec3::from_array(s.weight(j).at(sigma)) - DVec3::from_array(s.gravity);
+        let along = s.distributed.as_ref().map_or(DVec3::ZERO, |loads| {
+            DVec3::from_array(loads[j].each_ref().map(|load| load.at(sigma)))
+        });
+        (weight + along) * (self.length / self.force)
+    }
+
+    /// Passes the loads on points at `sigma`, by which forces and moments jump, on the way to the tip; false if
+    /// there are none.
+    pub fn pass_points(&self, sigma: f64, y: &mut [f64]) -> bool {
+        let mut any = false;
+        for (j, [force, moment]) in self.on_points(sigma) {
+            let mut rod = RodState::read(y, j);
+            rod.n -= force;
+            rod.m -= moment;
+            y[STATE * self.rods()] -= force.dot(rod.r);
+            rod.write(y, j);
+            any = true;
+        }
+        any
+    }
+
+    /// Rods, forces and moments of the loads on points at `sigma`.
+    pub(super) fn on_points(&self, sigma: f64) -> impl Iterator<Item = (usize, [DVec3; 2])> {
+        let points = self
+            .scenario
+            .points
+            .iter()
+            .filter(move |point| (point.at - sigma).abs() < SAME_PLACE);
+        let unit = self.part / self.force;
+        let units = [unit, unit / self.length];
+        points.map(move |point| {
+            let [force, moment] = [self.scenario.force_on(point), point.moment];
+            let loads = [0, 1].map(|k| units[k] * DVec3::from_array([force, moment][k]));
+            (point.vein, loads)
+        })
+    }
+
+    /// The force and the moment on the tip of rod `j` by loads on points.
+    pub(super) fn on_tip(&self, j: usize) -> [DVec3; 2] {
+        let here = self.on_points(1.0).filter(|(rod, _)| *rod == j);
+        here.fold([DVec3::ZERO; 2], |sum, (_, [force, moment])| {
+            [sum[0] + force, sum[1] + moment]
+        })
+    }
+}
+
+/// Lower bound on the ratio of chord to arc length, which vanishes for arcs that turn by
+/// nearly a full circle.
+const SHORTEST_CHORD: f64 = 0.05;
+
+/// Rest shape of one rod of that leaf: stretch v1, and bend about d3.
+#[derive(Clone, Copy, Debug)]
+pub struct Arc {
+    pub stretch: f64,
+    pub bend: f64,
+}
+
+/// One arc per rod, for these dimensionless lengths without growth; none
+/// for free rods.
+pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
+    if !scenario.joined || lengths.len() == 1 {
+        return Vec::new();
+    }
+    let angles = scenario.rods.iter().map(|rod| rod.angle.sin_cos());
+    let (sin, cos) = angles.fold((0.0, 0.0), |(s, c), (sin, cos)| (s + sin, c + cos));
+    let mean = if sin.hypot(cos) > 1e-9 * lengths.len() as f64 {
+        sin.atan2(cos)
+    } else {
+        scenario.rods[0].angle
+    };
+    let openings: Vec<f64> = (scenario.rods.iter())
+        .map(|rod| (rod.angle - mean + PI).rem_euclid(2.0 * PI) - PI)
+        .collect();
+    // Chord over length of an arc that turns by twice the opening.
+    let chord = |opening: f64| match opening.abs() {
+        small if small < 1e-8 => 1.0,
+        _ => (opening.sin() / opening).max(SHORTEST_CHORD),
+    };
+    let grown = (scenario.rods.iter().zip(lengths))
+        .map(|(rod, length)| length * rod.rest_stretch.integral(1.0));
+    let chords = (openings.iter().zip(grown)).map(|(&opening, length)| length * chord(opening));
+    let tip = chords.sum::<f64>() / lengths.len() as f64;
+    (openings.iter().zip(lengths))
+        .map(|(&opening, length)| Arc {
+            stretch: tip / (length * chord(opening)),
+            bend: -2.0 * opening / length,
+        })
+        .collect()
+}
+
+/// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
+pub const STATE: usize = 13;
+
+/// Numbers that describe its perturbation: displacement, spatial rotation,
+/// and the changes of n and m.
+pub const TANGENT: usize = 12;
+
+/// One rod at one sigma.
+#[derive(Clone, Copy, Debug)]
+pub struct RodState {
+    /// Centerline.
+    pub r: DVec3,
+    /// Directors.
+    pub q: DQuat,
+    /// Force along the lab axes.
+    pub n: DVec3,
+    /// Moment along the lab axes.
+    pub m: DVec3,
+}
+
+impl RodState {
+    /// The numbers of rod `j` in a flat state; q of any length but zero.
+    #[inline]
+    pub fn read(y: &[f64], j: usize) -> Self {
+        let y = &y[STATE * j..STATE * (j + 1)];
+        RodState {
+            r: DVec3::from_slice(y),
+            q: DQuat::from_slice(&y[3..]).normalize(),
+            n: DVec3::from_slice(&y[7..]),
+            m: DVec3::from_slice(&y[10..]),
+        }
+    }
+
+    #[inline]
+    pub fn write(&self, y: &mut [f64], j: usize) {
+        let y = &mut y[STATE * j..STATE * (j + 1)];
+        self.r.write_to_slice(y);
+        self.q.write_to_slice(&mut y[3..]);
+        self.n.write_to_slice(&mut y[7..]);
+        self.m.write_to_slice(&mut y[10..]);
+    }
+}
+
+/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Derivatives {
+    /// Of r' with respect to the rotation.
+    pub r_theta: DMat3,
+    /// Of r' with respect to n.
+    pub r_n: DMat3,
+    /// Of the rotation rate with respect to the rotation.
+    pub theta_theta: DMat3,
+    /// Of the rotation rate with respect to m.
+    pub theta_m: DMat3,
+    /// Of m' with respect to the rotation.
+    pub m_theta: DMat3,
+    /// Of m' with respect to n.
+    pub m_n: DMat3,
+}

@@ -36,23 +36,347 @@
 //! **Error.** Every problem is solved with two tolerances; the difference is the
 //! estimate ([`Solution::error`]). Near a bifurcation [`Solution::neutral`] is
 //! the direction in which the leaf can move without resistance.
+//!
+//! Requests to the boundary-value solver, and its results.
 
-mod arcs;
-mod condensed;
-mod continuation;
-mod dop853;
 mod equations;
+mod integrate;
 mod intervals;
 mod newton;
-mod own_loads;
-mod propagate;
-mod solution;
+mod sensitivities;
 mod solve;
-mod state;
-mod tissue;
-mod trajectory;
 
-pub use crate::shooting::solution::{
-    Correction, Failure, Neutral, Options, Precision, Reason, Solution, Start, Work,
-};
+use crate::memory::TooMuch;
+use crate::run::{Limit, Unmodelled};
+use crate::shape::{Difference, RodShape};
+use crate::shooting::integrate::Unbounded;
 pub use crate::shooting::solve::{check_models, solve};
+use glam::DVec3;
+use serde::Serialize;
+use std::fmt;
+use std::ops::AddAssign;
+
+/// Work of the shooting, counted so that tests can check it exactly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Number of corrections.
+    pub iterations: usize,
+    /// Linearisations: sensitivities of all intervals, and their factorisation.
+    pub linearizations: usize,
+    /// Steps of the integrator.
+    pub steps: usize,
+    /// Evaluations of the slopes of the whole leaf.
+    pub slopes: usize,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
+        self.iterations += other.iterations;
+        self.linearizations += other.linearizations;
+        self.steps += other.steps;
+        self.slopes += other.slopes;
+    }
+}
+
+/// Progress of a shooting.
+#[derive(Clone, Copy, Debug)]
+pub struct Correction {
+    /// From arcs: the part of the present change towards the scenario's leaf (of its
+    /// loads, or of its stiffness) that is done, from 0 to 1; 1 for a start near the leaf.
+    pub way: f64,
+    /// Number of corrections for the present solution.
+    pub iteration: usize,
+    /// Part of the linearisation for the next correction that is done, from 0 to 1.
+    pub linearized: f64,
+    /// The largest component of the last correction, in the units of the unknowns;
+    /// infinite before the first.
+    pub size: f64,
+    /// The size below which corrections have converged.
+    pub wanted: f64,
+}
+
+/// Counts the work of a shooting and reports its progress.
+struct Log<'p> {
+    pub work: Work,
+    /// Part of the present change of the leaf of arcs that is done.
+    pub part: f64,
+    /// Called for each correction.
+    pub progress: &'p mut dyn FnMut(&Correction),
+}
+
+/// Displacements below this part of the largest are not mentioned.
+const MOVES: f64 = 0.2;
+
+/// The start of a solution.
+#[derive(Clone, Copy, Debug)]
+pub enum Start<'s> {
+    /// Without a given start: from arcs by continuation.
+    Arcs,
+    /// From the shape of the leaf at some stations, in the scenario's units.
+    Leaf {
+        /// Fractions of the length, from 0 to 1.
+        stations: &'s [f64],
+        /// One shape per rod.
+        rods: &'s [RodShape],
+    },
+}
+
+/// Required precision of a solution.
+#[derive(Clone, Copy, Debug)]
+pub enum Precision {
+    /// Estimated error of the positions relative to the longest rod, or the best that
+    /// double precision allows: see [`Solution::error`].
+    Error(f64),
+    /// Local error allowed per integration step, in dimensionless form.
+    LocalError(f64),
+}
+
+/// Options of the shooting.
+#[derive(Clone, Debug)]
+pub struct Options<'s> {
+    /// The start.
+    pub start: Start<'s>,
+    /// Fractions of the length at which the solution is returned, from 0 to 1.
+    pub stations: &'s [f64],
+    /// The required precision.
+    pub precision: Precision,
+    /// Number of intervals; `None`: as many as the growth of perturbations needs.
+    pub intervals: Option<usize>,
+    /// Time limit of Newton's method.
+    pub limit: Limit,
+    /// Whether it gives up where Newton's method does not converge as it does near a solution: for a
+    /// start that is one.
+    pub gives_up: bool,
+}
+
+impl<'s> Options<'s> {
+    /// With automatic intervals and without a time limit.
+    pub fn new(start: Start<'s>, stations: &'s [f64], precision: Precision) -> Self {
+        Options {
+            start,
+            stations,
+            precision,
+            intervals: None,
+            limit: Limit::default(),
+            gives_up: false,
+        }
+    }
+}
+
+/// A direction that the equations leave undetermined, or nearly so: the leaf
+/// is at a bifurcation, or its equilibria form a family.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Neutral {
+    /// Smallest singular value of the condensed equations over the largest.
+    pub ratio: f64,
+    /// Displacement of every rod along it at the stations, scaled so that the largest
+    /// is 1.
+    pub displacement: Vec<Vec<DVec3>>,
+}
+
+/// A solution of the boundary-value problem, in the units of the scenario.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Fractions of the length.
+    pub stations: Vec<f64>,
+    /// The shape there, one per rod.
+    pub rods: Vec<RodShape>,
+    /// Total potential energy (a dead moment has none).
+    pub energy: f64,
+    /// Estimated global error: the difference from a solution with local errors
+    /// larger by two orders of magnitude, plus one local error.
+    pub error: Difference,
+    /// Largest jump between intervals or violation of a condition at the tip,
+    /// relative to lengths, radians, and the forces and moments of each rod.
+    pub defect: f64,
+    /// Ends of the intervals as fractions of the length, from 0 to 1.
+    pub intervals: Vec<f64>,
+    /// Decimal logarithm of the growth of perturbations from base to tip: the
+    /// sum over the intervals.
+    pub growth: f64,
+    /// Smallest singular value of the condensed equations over the largest.
+    pub condition: f64,
+    /// The corresponding direction, where the equations are nearly singular.
+    pub neutral: Option<Neutral>,
+    /// Why no attempt to reach the accuracy with smaller local errors succeeded, if this is the
+    /// solution before it.
+    pub unsharpened: Option<Reason>,
+    /// Work done.
+    pub work: Work,
+}
+
+/// Growth over an interval to which a failure is attributed, as a power of ten.
+const TOO_MUCH_GROWTH: f64 = 5.0;
+
+/// Why there is no solution.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// An initial-value problem grows without bound before its interval ends.
+    Unbounded {
+        /// The sigma it reached.
+        sigma: f64,
+        /// Whether the number of intervals was given.
+        fixed: bool,
+        /// Whether the start was a leaf at rest.
+        from_leaf: bool,
+    },
+    /// Newton's method does not converge.
+    NoConvergence {
+        /// The last correction, relative.
+        correction: f64,
+        /// Decimal logarithm of the largest growth over one interval.
+        growth: f64,
+        /// Whether the number of intervals was given.
+        fixed: bool,
+        /// Whether the start was a leaf at rest.
+        from_leaf: bool,
+    },
+    /// From a leaf at rest corrections do not decrease as they do near a solution: rounding, in
+    /// perturbations that grow, leaves no smaller ones.
+    Rounding {
+        /// The last correction, relative.
+        correction: f64,
+        /// Decimal logarithm of the growth of perturbations from base to tip.
+        growth: f64,
+    },
+    /// The equations are singular.
+    Singular(Neutral),
+    /// The necessary number of intervals takes too much memory.
+    TooMuch(TooMuch),
+    /// The time allowed was over, or the run was cancelled.
+    OutOfTime,
+    /// The boundary-value problem does not contain all of the scenario.
+    Unmodelled(Unmodelled),
+}
+
+impl From<Unmodelled> for Reason {
+    fn from(unmodelled: Unmodelled) -> Self {
+        Reason::Unmodelled(unmodelled)
+    }
+}
+
+impl From<TooMuch> for Reason {
+    fn from(too_much: TooMuch) -> Self {
+        Reason::TooMuch(too_much)
+    }
+}
+
+impl From<Unbounded> for Reason {
+    fn from(Unbounded { sigma }: Unbounded) -> Self {
+        Reason::Unbounded {
+            sigma,
+            fixed: false,
+            from_leaf: false,
+        }
+    }
+}
+
+impl Reason {
+    /// What may help is known where the number of intervals and the start are.
+    fn in_context(mut self, given: bool, leaf: bool) -> Self {
+        if let Reason::Unbounded {
+            fixed, from_leaf, ..
+        }
+        | Reason::NoConvergence {
+            fixed, from_leaf, ..
+        } = &mut self
+        {
+            (*fixed, *from_leaf) = (given, leaf);
+        }
+        self
+    }
+
+    /// What to change.
+    fn advice(&self) -> &'static str {
+        match *self {
+            Reason::Unbounded { fixed: true, .. } => "use more intervals",
+            Reason::NoConvergence {
+                fixed: true,
+                growth,
+                ..
+            } if growth > TOO_MUCH_GROWTH => "use more intervals",
+            Reason::Unbounded {
+                from_leaf: true, ..
+            } => "more intervals than are allowed would be needed",
+            Reason::NoConvergence {
+                from_leaf: true, ..
+            } => "lower the load",
+            _ => "lower the load, or start from the relaxed leaf",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let advice = self.advice();
+        match self {
+            Reason::Unbounded { sigma, .. } => write!(
+                f,
+                "integrated from the start, the leaf grows out of all bounds at {sigma:.3} of its length: {advice}"
+            ),
+            Reason::NoConvergence {
+                correction, growth, ..
+            } if *growth > TOO_MUCH_GROWTH => write!(
+                f,
+                "Newton's method stops at corrections of {correction:.1e}; perturbations grow 10^{growth:.0} times over an interval: {advice}"
+            ),
+            Reason::NoConvergence { correction, .. } => write!(
+                f,
+                "Newton's method stops at corrections of {correction:.1e}: {advice}"
+            ),
+            Reason::Rounding { correction, growth } => write!(
+                f,
+                "shooting cannot resolve this leaf: perturbations grow 10^{growth:.0} times from base to tip, and \
+                 from the leaf at rest corrections of {correction:.1e} do not decrease"
+            ),
+            Reason::Singular(neutral) => write!(
+                f,
+                "the equations are singular (ratio of singular values {:.1e}): {neutral}",
+                neutral.ratio
+            ),
+            Reason::TooMuch(too_much) => too_much.fmt(f),
+            Reason::Unmodelled(unmodelled) => unmodelled.fmt(f),
+            Reason::OutOfTime => {
+                f.write_str("the time allowed was over before shooting had converged: allow more")
+            }
+        }
+    }
+}
+
+/// The meaning of the direction, in words.
+impl fmt::Display for Neutral {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let longer = |a: DVec3, b: &DVec3| if b.length() > a.length() { *b } else { a };
+        let largest: Vec<DVec3> = (self.displacement.iter())
+            .map(|rod| rod.iter().fold(DVec3::ZERO, longer))
+            .collect();
+        let veins: Vec<String> = (largest.iter().enumerate())
+            .filter(|(_, moved)| moved.length() > MOVES)
+            .map(|(j, _)| (j + 1).to_string())
+            .collect();
+        let who = match veins.as_slice() {
+            all if all.len() == largest.len() && all.len() > 1 => "all veins".to_string(),
+            [one] => format!("vein {one}"),
+            several => format!("veins {}", several.join(", ")),
+        };
+        let sum: DVec3 = largest.iter().map(|moved| *moved * *moved).sum();
+        let axis = ["x", "y", "z"][sum.max_position()];
+        write!(
+            f,
+            "a bifurcation is near, or the leaf can move without resistance; {who} would move, mostly along {axis}"
+        )
+    }
+}
+
+/// Why no solution was found.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// The reason.
+    pub reason: Reason,
+    /// Part of the change from the leaf of arcs to the scenario's that was made.
+    pub part: f64,
+    /// The last shape computed, at the stations.
+    pub rods: Vec<RodShape>,
+    /// Work done.
+    pub work: Work,
+}

@@ -19,38 +19,37 @@
 //! # assert!((simulation.frame().time - 10.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! Where a motion begins.
+//!
+//! Requests that cannot be simulated.
+//!
+//! What makes a motion doubtful from its beginning: it starts where it would stay for ever but for
+//! rounding.
 
-mod accuracy;
 mod choice;
-mod cost;
-mod doubt;
-mod error;
 mod record;
 mod refinement;
-mod start;
-mod stills;
 
 pub use crate::leaf::HalfTurn;
+use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, State, System, shift, turn};
+use crate::modes::{Eigenpair, Wanted, lowest};
 pub use crate::motion::{Energy, Stopped};
-pub use choice::{Choice, Reason};
-pub use cost::Cost;
-pub use error::{MOST_SECONDS, Refused};
-pub use record::{Frame, Imbalance, Moment, Record, Still};
-pub use refinement::{REFINEMENT_SECONDS, Refinement, Watch};
-pub use stills::{film, stills};
-
-use accuracy::{Comparison, Trajectory, compared_points};
-
-use crate::clock::Instant;
-use crate::refusal::RefusedOption;
+use crate::motion::{
+    Explicit, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps, TimeIntegrator, unstrained,
+};
+use crate::newton::{Newton, Work};
+use crate::numbers::two_digits;
+use crate::relax::{ANY_SIGN, Equilibrium, Follower, RelaxError, Route, polish};
+use crate::run::{Instant, Limit, RefusedOption};
+use crate::scenario::{Scenario, Schedule, Start, slips};
+pub use crate::simulate::choice::{Choice, Cost, Reason};
+pub use crate::simulate::record::{Frame, Imbalance, Moment, Record, Still, film, stills};
+use crate::simulate::refinement::{Comparison, Trajectory, compared_points};
+pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, Watch};
+use crate::{relax, words};
+use std::f64::consts::PI;
 use std::time::Duration;
-
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::limit::Limit;
-use crate::motion::{Explicit, TimeIntegrator, Physics, Rigid, SemiImplicit, Snapshot, StableStep, Steps};
-use crate::relax::{self, Equilibrium, Follower, RelaxError};
-use crate::scenario::{Scenario, slips};
-use crate::words;
 
 /// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;
@@ -117,8 +116,7 @@ impl Simulation {
     /// The leaf at time 0.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-        let from =
-            |leaf: &Leaf, grid: &Grid| start::state(leaf, grid, tolerance, options.limit.clone());
+        let from = |leaf: &Leaf, grid: &Grid| state(leaf, grid, tolerance, options.limit.clone());
         Simulation::from(scenario, options, &from)
     }
 
@@ -166,16 +164,16 @@ impl Simulation {
         let physics = Physics::new(&leaf);
         let state = state(&leaf, &grid)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
-        let doubt = doubt::unstable(&discrete, &physics, &state);
+        let doubt = unstable(&discrete, &physics, &state);
         let rigid = discrete.least_compliance() == 0.0;
         let mut begun = None;
         let choice = match Choice::without_costs(options, &physics, rigid) {
             Some(choice) => choice,
             None => {
                 let explicit = &begun.insert(explicit(&discrete, &physics, &state, None)?).0;
-                let cost = cost::explicit(&discrete, &physics, explicit);
+                let cost = choice::explicit(&discrete, &physics, explicit);
                 let other =
-                    cost::semi_implicit(&discrete, &physics, &state, tolerance, cost.seconds);
+                    choice::semi_implicit(&discrete, &physics, &state, tolerance, cost.seconds);
                 Choice::by_costs(cost, other)
             }
         };
@@ -258,8 +256,8 @@ impl Simulation {
     fn seconds_of_a_step(&self) -> f64 {
         let (rods, segments) = (self.leaf.rods(), self.grid.segments());
         match self.choice.scheme {
-            Scheme::Explicit => cost::explicit_step(rods, segments),
-            Scheme::SemiImplicit => cost::semi_implicit_step(rods, segments),
+            Scheme::Explicit => choice::explicit_step(rods, segments),
+            Scheme::SemiImplicit => choice::semi_implicit_step(rods, segments),
         }
     }
 
@@ -477,4 +475,240 @@ fn explicit(
             Ok((explicit, StableStep { step, ..bound }))
         }
     }
+}
+
+/// Largest force in a segment of the arcs that a leaf is released from, in units of A/L^2 of its
+/// rod. A rod under a larger one buckles in waves shorter than an eighth of its length, which few
+/// segments do not resolve.
+const LARGEST_FORCE: f64 = 256.0 * PI * PI;
+
+/// The positions and rotations at time 0.
+pub(super) fn state(
+    leaf: &Leaf,
+    grid: &Grid,
+    tolerance: f64,
+    limit: Limit,
+) -> Result<State, Refused> {
+    match leaf.scenario().dynamics.start {
+        Start::Released if !leaf.is_held() => Ok(released(&DiscreteLeaf::new(leaf, grid.clone()))),
+        // Held tips and grips are moved to their positions by the relaxation.
+        Start::Released | Start::AtRest => at_rest(leaf, grid, tolerance, limit),
+    }
+}
+
+/// The initial state of a relaxation or, where its arcs would strain rods that hardly yield, a
+/// state near it without such strains: otherwise the energy of these would drive the motion.
+fn released(leaf: &DiscreteLeaf) -> State {
+    let mut arcs = relax::start(leaf);
+    leaf.strain_forces(&mut arcs);
+    let strained = leaf.each(0..leaf.segments()).any(|(j, i)| {
+        let softest = leaf.section(j, i).couple_stiffness.min_element();
+        let unit = softest / leaf.leaf.length(j).powi(2);
+        arcs.n[j * leaf.segments() + i].length() > LARGEST_FORCE * unit
+    });
+    let unstrained = strained.then(|| unstrained(leaf, &arcs)).flatten();
+    unstrained.unwrap_or(arcs)
+}
+
+/// The equilibrium under the loads, in the wind and with the rest shape at time 0.
+fn at_rest(leaf: &Leaf, grid: &Grid, tolerance: f64, limit: Limit) -> Result<State, Refused> {
+    let scenario = at_beginning(leaf.scenario());
+    let options = relax::Options {
+        method: relax::Method::default().on_grid(Some(grid.segments())),
+        tolerance: Some(tolerance),
+        limit,
+        route: match scenario.wind {
+            Some(_) => Route::Release,
+            None => Route::default(),
+        },
+        ..relax::Options::default()
+    };
+    let found = relax::relax(&scenario, &options, &mut |_| {})?;
+    if !found.outcome.is_success() {
+        return Err(Refused::NoRest {
+            outcome: found.outcome.word(),
+        });
+    }
+    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let x = nodes().map(|node| node.position / leaf.scale.length);
+    let q = nodes().map(|node| node.rotation);
+    Ok(State::new(grid.segments(), x.collect(), q.collect()))
+}
+
+/// The scenario with the loads, the wind and the rest shape at time 0.
+fn at_beginning(scenario: &Scenario) -> Scenario {
+    let mut scenario = scenario.clone();
+    let dynamics = &scenario.dynamics;
+    scenario.gravity = dynamics.gravity.at(0.0);
+    scenario.tip_force = dynamics.tip_force.at(0.0);
+    scenario.tip_moment = dynamics.tip_moment.at(0.0);
+    let factor = dynamics.rest.at(0.0);
+    let air = scenario.wind.as_ref().map(|wind| wind.velocity.at(0.0));
+    match (&mut scenario.wind, air) {
+        (Some(wind), Some(air)) if air != [0.0; 3] => wind.velocity = Schedule::constant(air),
+        (wind, _) => *wind = None,
+    }
+    let rods = scenario.rods.iter_mut();
+    for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {
+        *curvature = curvature.scaled(factor);
+    }
+    scenario
+}
+
+/// Longest expected duration of a simulation that is accepted, in seconds.
+pub const MOST_SECONDS: f64 = 3.0 * DAY;
+
+const DAY: f64 = 86_400.0;
+
+/// Why a request cannot be simulated. Times are in the scenario's unit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// The explicit method has no stable time step.
+    #[error(
+        "the explicit method has no stable time step for rigid rods (a stiffness is inf): \
+         use the semi-implicit method, or give a number"
+    )]
+    Rigid,
+    /// The base is free, and the semi-implicit method clamps it.
+    #[error(
+        "dynamics.clamped = false: the semi-implicit method holds the base: use the explicit method{}",
+        if *.rigid { ", and a number for every stiffness that is inf" } else { "" }
+    )]
+    Held {
+        /// Whether a rod is rigid, which the explicit method cannot move.
+        rigid: bool,
+    },
+    /// A load has a pulse that the semi-implicit method does not resolve.
+    #[error(
+        "a load in time has a pulse at {at} that is shorter than a millionth of the unit of time \
+         sqrt(rho L^4/A): make it longer with the same impulse{}",
+        if *.rigid { "" } else { ", or use the explicit method" }
+    )]
+    Pulse {
+        /// Its time.
+        at: f64,
+        /// Whether a rod is rigid, which the explicit method cannot move.
+        rigid: bool,
+    },
+    /// An option has a value that it cannot have, such as a time step that is too long for the
+    /// explicit method.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
+    /// The time step is too short for the duration.
+    #[error(
+        "the time step of {step:.3e} makes {steps:.1e} steps, which take some {} days, and at most {} are allowed: \
+         use {}",
+        (.seconds / DAY).ceil(), MOST_SECONDS / DAY,
+        match .given {
+            true => "a longer step, or leave it out",
+            false => "the semi-implicit method, softer rods, fewer segments, or a shorter duration",
+        }
+    )]
+    TooLong {
+        /// The step.
+        step: f64,
+        /// Steps to the end.
+        steps: f64,
+        /// Estimated duration.
+        seconds: f64,
+        /// Whether the step was given.
+        given: bool,
+    },
+    /// The grid is invalid.
+    #[error(transparent)]
+    Request(#[from] relax::RelaxError),
+    /// The leaf should start at rest, and its relaxation fails.
+    #[error(
+        "dynamics.start = \"at-rest\": the leaf does not come to rest under its loads at time 0 ({outcome}): use start = \"released\""
+    )]
+    NoRest {
+        /// The outcome of its relaxation.
+        outcome: &'static str,
+    },
+}
+
+/// Largest distance of a start from the equilibrium that it is compared with, in lengths.
+const NEAR: f64 = 0.1;
+
+/// Largest deviation from that equilibrium along an unstable mode, radians or lengths, that is
+/// none: it would have to grow by e fourteen times.
+const NO_DEVIATION: f64 = 1e-6;
+
+/// Accuracy of these modes.
+const MODE_ACCURACY: f64 = 1e-9;
+
+/// A sentence on a start at an unstable equilibrium, or beside one but without a deviation along
+/// its unstable modes, such as that of a straight column under its weight.
+pub(super) fn unstable(leaf: &DiscreteLeaf, physics: &Physics, start: &State) -> Option<String> {
+    let mut leaf = leaf.clone();
+    leaf.loads = physics.loads(0.0);
+    if leaf.leaf.in_wind() || leaf.loads.has_moments() || !physics.clamped() {
+        // Its rest is no minimum of an energy, or it has none.
+        return None;
+    }
+    leaf.set_rest(physics.rest(0.0));
+    let (mut system, mut work) = (System::new(&leaf), Work::default());
+    if !may_be_near(&leaf, start, &mut system) {
+        return None;
+    }
+    let mut exact = start.clone();
+    let index = polish(&leaf, &mut exact, &mut system, &mut work).filter(|&index| index > 0)?;
+    let wanted = Wanted {
+        count: index,
+        above: None,
+        accuracy: MODE_ACCURACY,
+        near: &[],
+        time: &Limit::default(),
+    };
+    let mut modes = lowest(&leaf, physics, &exact, wanted)?;
+    modes.retain(|mode| mode.eigenvalue < 0.0);
+    let fastest = -modes.first()?.eigenvalue;
+    let deviates =
+        |mode: &Eigenpair| deviation(&leaf, physics, (&exact, start), &mode.shape) > NO_DEVIATION;
+    if modes.iter().any(deviates) {
+        return None;
+    }
+    let time = two_digits(physics.time / fastest.sqrt());
+    Some(format!(
+        "the motion starts at an unstable equilibrium (negative eigenvalues: {index}), and nothing displaces the leaf \
+         the way it would leave: a deviation grows by e in {time}, and rounding decides when and to which side; \
+         give it a small push, such as a short dynamics.tip_force"
+    ))
+}
+
+/// Whether the first step of Newton's method is short enough for an equilibrium nearby.
+fn may_be_near(leaf: &DiscreteLeaf, start: &State, system: &mut System) -> bool {
+    let mut next = start.clone();
+    let first = Newton {
+        accuracy: 0.0,
+        iterations: 1,
+        work: &mut Work::default(),
+        progress: &mut |_, _| {},
+    };
+    // It is not converged after one step.
+    let _ = first.solve(leaf, &mut next, system, ANY_SIGN);
+    start.shift_to(&next) < NEAR
+}
+
+/// The largest rotation or displacement in the part along a mode of what leads from one state to
+/// another. Modes are orthonormal in the mass product.
+fn deviation(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    (from, to): (&State, &State),
+    mode: &[Increment],
+) -> f64 {
+    let (mut field, mut along, mut largest) = (Vec::new(), 0.0, 0.0_f64);
+    from.increments_to(to, leaf.first_node(), &mut field);
+    for (j, i) in leaf.each(leaf.moving_nodes()) {
+        let (k, inertia) = (from.base(j) + i, physics.inertia(leaf, j, i));
+        let (off, mode, tensor) = (
+            &field[j][i - leaf.first_node()],
+            &mode[k],
+            inertia.tensor(from.q[k]),
+        );
+        along += turn(mode).dot(tensor * turn(off)) + inertia.mass * shift(mode).dot(shift(off));
+        largest = largest.max(turn(mode).length()).max(shift(mode).length());
+    }
+    along.abs() * largest
 }

@@ -1,18 +1,16 @@
 //! Equilibria shapes of a leaf, as far as many starts find them.
 
-use glam::DVec3;
-use rayon::prelude::*;
-use serde::{Serialize, Serializer};
-
-use super::judge::{common, differences};
-use crate::clock::Instant;
-use crate::limit::Limit;
 use crate::numbers::power_of_ten;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index, without_wind,
 };
+use crate::run::{Instant, Limit};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
+use crate::study::judge::{common, differences};
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
 
 /// Starts relaxed in parallel, before the next check for new equilibria.
 const BATCH: usize = 16;
@@ -20,6 +18,7 @@ const BATCH: usize = 16;
 /// The search ends after so many starts in a row without a new equilibrium, or after
 /// all starts.
 pub const IN_VAIN: usize = 32;
+
 const MOST: usize = 160;
 
 /// Equilibria closer to each other than this part of the longest rod, or than

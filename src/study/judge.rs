@@ -5,15 +5,13 @@
 //! The reference is determined by two independent methods: the relaxed leaf,
 //! and the solution of the boundary-value problem that starts from it.
 
-use crate::clock::Instant;
-
 use crate::leaf::{Grid, Leaf};
-use crate::limit::Limit;
-use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
+use crate::relax;
+use crate::relax::{Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
+use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
-use crate::shape::{Difference, RodShape};
+use crate::shape::{Difference, RodShape, Undulation};
 use crate::shooting::{Solution, Start};
-use crate::undulation::Undulation;
 
 /// Stations closer than this are the same.
 const SAME_STATION: f64 = 1e-9;

@@ -6,7 +6,7 @@
 //! lets go of the base.
 
 use leafdyn::internals::leaf::DiscreteLeaf;
-use leafdyn::internals::motion::{TimeIntegrator, Physics, Snapshot};
+use leafdyn::internals::motion::{Physics, Snapshot, TimeIntegrator};
 use leafdyn::simulate::{self, Refused, Simulation};
 use leafdyn_testing::motion::{Scheme, discrete, explicit, moving, released};
 use leafdyn_testing::*;

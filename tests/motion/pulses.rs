@@ -1,7 +1,7 @@
 //! Pulses of loads and rest curvatures, however much shorter than a step, have their impulse
 //! and their work by both methods.
 
-use leafdyn::internals::motion::{TimeIntegrator, Physics, Snapshot, Steps};
+use leafdyn::internals::motion::{Physics, Snapshot, Steps, TimeIntegrator};
 use leafdyn_testing::motion::*;
 use leafdyn_testing::{DVec3, Leaf, Schedule, table};
 

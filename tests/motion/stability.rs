@@ -2,7 +2,7 @@
 //! shorter than it must be; beyond, it says that it diverged: it never returns
 //! a motion that is none.
 
-use leafdyn::internals::motion::{Energy, TimeIntegrator, Stopped};
+use leafdyn::internals::motion::{Energy, Stopped, TimeIntegrator};
 use leafdyn::simulate::{Options, Refused, Simulation};
 use leafdyn_testing::motion::{explicit, ramp, released};
 use leafdyn_testing::random::{cases, movers};

@@ -3,7 +3,7 @@
 //! loses its order, and what it damps vanishes with the step.
 
 use leafdyn::internals::leaf::State;
-use leafdyn::internals::motion::{TimeIntegrator, Snapshot, Steps};
+use leafdyn::internals::motion::{Snapshot, Steps, TimeIntegrator};
 use leafdyn_testing::motion::{
     distance, explicit, numbers, ramp, released, rest, semi_implicit, three_veins, twisted_rod,
 };

@@ -2,7 +2,7 @@
 //! methods follow it with second order, and its work is accounted for.
 
 use leafdyn::internals::leaf::State;
-use leafdyn::internals::motion::{Energy, TimeIntegrator as _, Steps};
+use leafdyn::internals::motion::{Energy, Steps, TimeIntegrator as _};
 use leafdyn::relax::Route;
 use leafdyn::scenario::{Dynamics, Start, Tissue, Wind};
 use leafdyn_testing::motion::{

@@ -1,7 +1,7 @@
 //! Results do not depend on the number of threads, to the last bit: neither of
 //! relaxation, nor of shooting, nor of motion; nor on whether a motion is looked at on its way.
 
-use leafdyn::internals::motion::{TimeIntegrator, Snapshot, Steps};
+use leafdyn::internals::motion::{Snapshot, Steps, TimeIntegrator};
 use leafdyn::internals::shooting::{self, Start};
 use leafdyn_testing::motion::{explicit, released, semi_implicit};
 use leafdyn_testing::*;

@@ -2,7 +2,7 @@
 //! paper's leaves.
 
 use glam::{DMat3, DQuat};
-use leafdyn::undulation::{Hand, Undulation, Vein};
+use leafdyn::shape::{Hand, Undulation, Vein};
 use leafdyn_testing::*;
 
 const SEGMENTS: usize = 64;

@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::internals::motion::{Explicit, TimeIntegrator, Physics, SemiImplicit, Snapshot, Steps};
+use leafdyn::internals::motion::{
+    Explicit, Physics, SemiImplicit, Snapshot, Steps, TimeIntegrator,
+};
 use leafdyn::internals::relax::start;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Grip, Hold, PointLoad, Profile, Scenario, Schedule, Tissue};

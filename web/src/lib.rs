@@ -71,7 +71,7 @@ fn clock() {
     fn now() -> f64 {
         seconds()
     }
-    leafdyn::clock::set(now);
+    leafdyn::run::set(now);
 }
 
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]

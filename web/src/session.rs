@@ -165,7 +165,7 @@ fn calm(scenario: Scenario) -> Scenario {
 
 /// So many seconds from now.
 fn within(seconds: u64) -> Limit {
-    Limit::at(leafdyn::clock::Instant::now() + Duration::from_secs(seconds))
+    Limit::at(leafdyn::run::Instant::now() + Duration::from_secs(seconds))
 }
 
 /// How leaves are relaxed.

@@ -1,40 +1,44 @@
 //! The boundary of stability: curves in the plane of two numbers, with the index on both
 //! sides, and leaves from either side.
+//!
+//! Labels with the index on both sides of the curves of a boundary.
+//!
+//! The ground of a plane of two numbers on which the branch is stable, between the curves of a
+//! boundary.
 
-use std::collections::BTreeSet;
-
-use super::boundary_sides::{Line, write_indices};
-use super::map::{DARKEST_INDEX, fill_index};
-use super::stable_ground::shade;
-use crate::figure::axes::Axes;
-use crate::figure::axis::Axis;
-use crate::figure::drawing::{
-    Anchor, BLUE, Color, Dash, Drawing, GREEN, INK, PURPLE, SKY, SLATE, Stroke, VERMILION,
+use crate::figure::drawing::axes::{Axes, Axis, round_step};
+use crate::figure::drawing::labels::{
+    Cell, HEADER, Key, LEFT, Labels, MOST_NAMED, PANEL_AXIS, PANEL_TITLE, SmallPanels, TICK_SIZE,
+    clearest, label_size, new_page, title,
 };
-use crate::figure::labels::Labels;
-use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, title};
-use crate::figure::markers::Marker;
-use crate::figure::page::{Key, MOST_NAMED, new_page};
-use crate::figure::quantity::Quantity;
-use crate::figure::round::round_step;
-use crate::figure::setting::Setting;
-use crate::figure::small::SmallPanels;
-use crate::figure::veins::{Veins, longest, tips};
+use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::{
+    Anchor, BLUE, Color, Dash, Drawing, GREEN, INK, NOTE, PURPLE, SKY, SLATE, Stroke, VERMILION,
+    polygon,
+};
+use crate::figure::leaf::{Veins, longest, tips};
+use crate::figure::map::{DARKEST_INDEX, PALE, fill_index};
+use crate::figure::scenario::{Quantity, Setting};
 use crate::report::numbers::{counted, number_of_veins, power_of_ten, short};
-use crate::report::sides;
-use crate::report::words::stable_or_index;
+use crate::report::{is_special, sides, stable_or_index};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::{Scenario, Units};
-use leafdyn::study::CriticalKind as Kind;
-use leafdyn::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
+use leafdyn::study::{
+    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CriticalKind as Kind, LeafBeside,
+};
+use std::collections::{BTreeSet, HashMap};
 
 const DIAGRAM: f64 = 400.0;
+
 /// Right of the panel, for the key.
 const KEY: f64 = 210.0;
+
 /// Displacements of a buckled leaf below this fraction of its length are magnified.
 const VISIBLE: f64 = 0.1;
+
 /// Most leaves drawn, each at a named point.
 const MOST_LEAVES: usize = 4;
+
 /// Colours of neighbouring curves; they also differ in their dashes.
 const COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
@@ -299,5 +303,447 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, (lines, shaded): (&[Line], 
         if points().any(|point| point.kind == kind) {
             key.marker(page, kind, "", marker, INK);
         }
+    }
+}
+
+/// Spacing of the places that are tried along a curve, and their largest number.
+const STEP: f64 = 5.0;
+
+const MOST_TRIED: usize = 400;
+
+/// Curves closer than this are labelled together, with the indices outside them.
+const NEIGHBOURS: f64 = 16.0;
+
+/// From a curve to its label.
+const GAP: f64 = 4.0;
+
+/// Labels need at least this clearance.
+const LEAST: f64 = 2.0;
+
+/// The normal of a curve must have at least this component along the first number, which
+/// distinguishes the sides.
+const ACROSS: f64 = 0.15;
+
+/// Labels both sides of every curve where the clearance is largest; curves close to each other
+/// only on the outside. A curve without enough clearance anywhere is described by the key alone.
+pub fn write_indices(page: &mut Drawing, curves: &[Line], labels: &mut Labels) {
+    let mut named = vec![false; curves.len()];
+    for c in 0..curves.len() {
+        if named[c] {
+            continue;
+        }
+        let places = curves[c].places().into_iter();
+        let best = clearest(places.map(|place| Sides::of(curves, c, place)), |sides| {
+            let room = sides.texts.iter().map(|(cell, _)| labels.clearance(cell));
+            room.fold(f64::INFINITY, f64::min)
+        });
+        if let Some((_, sides)) = best.filter(|(room, _)| *room >= LEAST) {
+            for (cell, text) in sides.texts {
+                labels.write(page, cell, &text, NOTE);
+            }
+            sides.curves.iter().for_each(|&curve| named[curve] = true);
+        }
+    }
+}
+
+/// A place on a curve: the point, the normal to the right, and the indices on both sides.
+type Place = (DVec2, DVec2, [usize; 2]);
+
+/// A curve on the page.
+pub struct Line {
+    /// Segments: their ends, and the indices to the left and to the right.
+    pieces: Vec<([DVec2; 2], [usize; 2])>,
+    /// Whether two branches meet and vanish there, so that it has no sides.
+    fold: bool,
+    /// Of a fold, to which side there is a stable leaf, if that is known.
+    stable: Option<[bool; 2]>,
+}
+
+impl Line {
+    /// A line of these segments, along which branches cross, or where two meet.
+    pub fn new(pieces: Vec<([DVec2; 2], [usize; 2])>, fold: bool) -> Self {
+        Line {
+            pieces,
+            fold,
+            stable: None,
+        }
+    }
+
+    pub fn of(axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) -> Self {
+        // Along the axis the first number may move towards the end of its range, or away.
+        let [from, to] = boundary.ranges[0].map(|end| axes.across.fraction(end));
+        let points = curve.points.iter();
+        let points: Vec<(f64, f64)> = points.map(|it| (it.values[0], it.values[1])).collect();
+        let drawn = axes.smooth(&points).into_iter();
+        let pieces = curve
+            .points
+            .windows(2)
+            .zip(drawn)
+            .flat_map(|(pair, drawn)| {
+                // Where curves cross, the index counts other modes as well.
+                let point = match is_special(&pair[1]) {
+                    true => &pair[0],
+                    false => &pair[1],
+                };
+                let (before, after) = (point.index_before, point.index_behind);
+                let sides = match from < to {
+                    true => [before, after],
+                    false => [after, before],
+                };
+                let ends = drawn.windows(2).map(|ends| ([ends[0], ends[1]], sides));
+                ends.collect::<Vec<_>>()
+            });
+        let first = curve.points.first();
+        let fold = curve.multiplicity == 1
+            && first.is_some_and(|point| matches!(point.kind, "fold" | "cusp"));
+        let line = Line::new(pieces.collect(), fold);
+        let mut stable = curve.beside.iter();
+        let stable = stable.find(|leaf| leaf.index == 0 && leaf.fallen_from.is_none());
+        let stable = stable.and_then(|leaf| axes.at((leaf.values[0], leaf.values[1])));
+        let to_left = stable.and_then(|at| Some(line.crossings(at, DVec2::X).next()?.0 > 0.0));
+        Line {
+            stable: to_left.map(|left| [left, !left]),
+            ..line
+        }
+    }
+
+    /// Its segments.
+    pub fn segments(&self) -> impl Iterator<Item = [DVec2; 2]> {
+        self.pieces.iter().map(|(ends, _)| *ends)
+    }
+
+    /// Whether ground on one of its sides is stable.
+    pub fn bounds_stable(&self) -> bool {
+        self.pieces.iter().any(|(_, sides)| sides.contains(&0))
+    }
+
+    /// Its crossings with a line: how far along the line, and whether the ground on both sides is
+    /// stable, unless that is not known.
+    pub fn stable_beside(
+        &self,
+        at: DVec2,
+        normal: DVec2,
+    ) -> impl Iterator<Item = (f64, Option<[bool; 2]>)> {
+        self.crossings(at, normal).map(|(along, sides)| {
+            let stable = match self.fold {
+                true => self.stable.filter(|_| sides.contains(&0)),
+                false => Some(sides.map(|index| index == 0)),
+            };
+            (along, stable)
+        })
+    }
+
+    /// Places on it, from the middle outwards.
+    fn places(&self) -> Vec<Place> {
+        let length = |ends: &[DVec2; 2]| ends[0].distance(ends[1]);
+        let whole: f64 = self.pieces.iter().map(|(ends, _)| length(ends)).sum();
+        let spacing = STEP.max(whole / MOST_TRIED as f64);
+        let (mut places, mut before) = (Vec::new(), 0.0);
+        for (ends, sides) in &self.pieces {
+            let (own, step) = (length(ends), ends[1] - ends[0]);
+            let normal = step.perp().normalize_or_zero();
+            let normal = if normal.x < 0.0 { -normal } else { normal };
+            let count = (own / spacing).ceil().max(1.0) as usize;
+            for k in 0..count {
+                let part = (k as f64 + 0.5) / count as f64;
+                let off = (before + part * own - 0.5 * whole).abs();
+                if normal.x > ACROSS {
+                    places.push((off, (ends[0] + part * step, normal, *sides)));
+                }
+            }
+            before += own;
+        }
+        places.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        places.into_iter().map(|(_, place)| place).collect()
+    }
+
+    /// Its crossings with a line: how far along the line, and the indices on both sides.
+    fn crossings(&self, at: DVec2, normal: DVec2) -> impl Iterator<Item = (f64, [usize; 2])> {
+        self.pieces.iter().filter_map(move |([a, b], sides)| {
+            let step = *b - *a;
+            let across = normal.perp_dot(step);
+            let part = (at - *a).perp_dot(normal) / step.perp_dot(normal);
+            let along = (*a - at).perp_dot(step) / across;
+            (across != 0.0 && (0.0..=1.0).contains(&part)).then_some((along, *sides))
+        })
+    }
+}
+
+/// Labels on the sides of a curve, or of several curves close to each other.
+struct Sides {
+    texts: Vec<(Cell, String)>,
+    curves: Vec<usize>,
+}
+
+impl Sides {
+    fn of(curves: &[Line], c: usize, (at, normal, sides): Place) -> Self {
+        let label = |along: f64, sign: f64, text: String| {
+            let size = label_size(&text);
+            let reach = 0.5 * (size * normal.abs()).element_sum() + GAP;
+            let middle = at + (along + sign * reach) * normal;
+            let corner = middle - 0.5 * size;
+            (Cell { corner, size }, text)
+        };
+        if curves[c].fold {
+            let (fewer, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
+            let text = format!("{fewer} and {more} meet");
+            return Sides {
+                texts: vec![label(0.0, 1.0, text)],
+                curves: vec![c],
+            };
+        }
+        let others = curves
+            .iter()
+            .enumerate()
+            .filter(|(k, it)| *k != c && !it.fold);
+        let mut others: Vec<(f64, [usize; 2], usize)> = others
+            .flat_map(|(k, it)| {
+                it.crossings(at, normal)
+                    .map(move |(at, sides)| (at, sides, k))
+            })
+            .collect();
+        let mut named = vec![c];
+        // From the curve outwards, while the next one is close and the indices between them agree.
+        let mut outside = |sign: f64, out: usize| {
+            others.sort_by(|a, b| (sign * a.0).total_cmp(&(sign * b.0)));
+            let (mut along, mut index) = (0.0, sides[out]);
+            for (at, it, k) in &others {
+                if (0.0..NEIGHBOURS).contains(&(sign * (at - along))) && it[1 - out] == index {
+                    (along, index) = (*at, it[out]);
+                    named.push(*k);
+                }
+            }
+            label(along, sign, format!("index {index}"))
+        };
+        let texts = vec![outside(-1.0, 0), outside(1.0, 1)];
+        Sides {
+            texts,
+            curves: named,
+        }
+    }
+}
+
+/// Distance in pixels of the rows in which crossings with curves are looked for, and of the columns.
+const ROW: f64 = 2.0;
+
+const COLUMN: f64 = 4.0;
+
+/// Least distance of a column from the ends of a stretch in which it is.
+const BESIDE: f64 = 0.5;
+
+/// A part of a row between two crossings with curves, or a crossing and an end of the row.
+struct Stretch {
+    row: usize,
+    /// The curves at both ends.
+    between: [Option<usize>; 2],
+    ends: [f64; 2],
+    /// Whether the curves say that it is stable: one, both alike, or not all.
+    stable: Option<bool>,
+}
+
+/// Shades where the branch is stable in a part of the plane that curves leave only at its rim; whether
+/// there is such ground.
+pub fn shade(page: &mut Drawing, cell: Cell, curves: &[Line]) -> bool {
+    let rows = (cell.size.y / ROW).floor().max(1.0) as usize;
+    let height = cell.size.y / rows as f64;
+    let y = |row: usize| cell.corner.y + (row as f64 + 0.5) * height;
+    let stretches: Vec<Stretch> = (0..rows)
+        .flat_map(|row| stretches(cell, curves, (row, y(row))))
+        .collect();
+    let regions = regions(&stretches, cell, curves, y);
+    // Of the stretches of a region those with curves must all say that it is stable.
+    let stable = |place: usize| {
+        let mut said = (stretches.iter().zip(&regions))
+            .filter(|(_, region)| **region == regions[place])
+            .filter_map(|(stretch, _)| stretch.stable)
+            .peekable();
+        said.peek().is_some() && said.all(|stable| stable)
+    };
+    let mut verdicts: HashMap<usize, bool> = HashMap::new();
+    // One polygon for stretches between the same curves in one row after the other.
+    let mut polygons: Vec<(&Stretch, Vec<[DVec2; 2]>)> = Vec::new();
+    for (place, stretch) in stretches.iter().enumerate() {
+        if !*(verdicts.entry(regions[place])).or_insert_with(|| stable(place)) {
+            continue;
+        }
+        let ends = stretch.ends.map(|x| DVec2::new(x, y(stretch.row)));
+        let above = polygons
+            .iter_mut()
+            .rev()
+            .find(|(last, _)| last.row + 1 == stretch.row && last.between == stretch.between);
+        match above {
+            Some((last, ends_of)) => {
+                *last = stretch;
+                ends_of.push(ends);
+            }
+            None => polygons.push((stretch, vec![ends])),
+        }
+    }
+    let any = !polygons.is_empty();
+    for (_, mut ends) in polygons {
+        // To the rims of its rows.
+        let half = DVec2::new(0.0, 0.5 * height);
+        let (first, last) = (ends[0], ends[ends.len() - 1]);
+        ends.insert(0, first.map(|at| at - half));
+        ends.push(last.map(|at| at + half));
+        let left = ends.iter().map(|ends| ends[0]);
+        let right = ends.iter().rev().map(|ends| ends[1]);
+        let corners: Vec<DVec2> = left.chain(right).collect();
+        page.shape(polygon(&corners), PALE, None);
+    }
+    any
+}
+
+/// The stretches of a row, from left to right.
+fn stretches(cell: Cell, curves: &[Line], (row, y): (usize, f64)) -> Vec<Stretch> {
+    let from = cell.corner.with_y(y);
+    let mut crossings: Vec<(f64, [bool; 2], usize)> = (curves.iter().enumerate())
+        .flat_map(|(k, curve)| {
+            let found = curve.stable_beside(from, DVec2::X);
+            found.map(move |(x, sides)| (x, sides.unwrap_or_default(), k))
+        })
+        .filter(|(x, ..)| (0.0..=cell.size.x).contains(x))
+        .collect();
+    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let at = |k: Option<usize>| k.and_then(|k| crossings.get(k));
+    (0..=crossings.len())
+        .map(|k| {
+            let (left, right) = (at(k.checked_sub(1)), at(Some(k)));
+            let said = [left.map(|it| it.1[1]), right.map(|it| it.1[0])];
+            Stretch {
+                row,
+                between: [left, right].map(|it| it.map(|it| it.2)),
+                ends: [
+                    left.map_or(0.0, |it| it.0),
+                    right.map_or(cell.size.x, |it| it.0),
+                ]
+                .map(|x| from.x + x),
+                stable: said.into_iter().flatten().reduce(|a, b| a && b),
+            }
+        })
+        .collect()
+}
+
+/// The region of each stretch: those of neighbouring rows are one where a column leads from one to the
+/// other without a curve in between.
+fn regions(
+    stretches: &[Stretch],
+    cell: Cell,
+    curves: &[Line],
+    y: impl Fn(usize) -> f64,
+) -> Vec<usize> {
+    let columns = (cell.size.x / COLUMN).ceil().max(1.0) as usize;
+    let x = |k: usize| cell.corner.x + (k as f64 + 0.5) * cell.size.x / columns as f64;
+    let crossed: Vec<Vec<f64>> = (0..columns)
+        .map(|k| {
+            let top = DVec2::new(x(k), 0.0);
+            let found = curves.iter().flat_map(|it| it.stable_beside(top, DVec2::Y));
+            found.map(|(y, _)| y).collect()
+        })
+        .collect();
+    let mut parent: Vec<usize> = (0..stretches.len()).collect();
+    fn root(parent: &mut [usize], mut place: usize) -> usize {
+        while parent[place] != place {
+            parent[place] = parent[parent[place]];
+            place = parent[place];
+        }
+        place
+    }
+    let rows: Vec<usize> = {
+        let last = stretches.last().map_or(0, |stretch| stretch.row);
+        (0..=last + 1)
+            .map(|row| stretches.partition_point(|stretch| stretch.row < row))
+            .collect()
+    };
+    for (place, stretch) in stretches.iter().enumerate() {
+        let Some(&end) = rows.get(stretch.row + 2) else {
+            continue;
+        };
+        let (here, below) = (y(stretch.row), y(stretch.row + 1));
+        for other in rows[stretch.row + 1]..end {
+            let [low, high] = [
+                stretch.ends[0].max(stretches[other].ends[0]),
+                stretch.ends[1].min(stretches[other].ends[1]),
+            ];
+            // A column along a curve leads nowhere.
+            let open = (0..columns).any(|k| {
+                let inside = low + BESIDE < x(k) && x(k) < high - BESIDE;
+                inside && !crossed[k].iter().any(|y| (here..=below).contains(y))
+            });
+            if open {
+                let [a, b] = [place, other].map(|it| root(&mut parent, it));
+                parent[a] = b;
+            }
+        }
+    }
+    (0..stretches.len())
+        .map(|place| root(&mut parent, place))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::drawing::formats::text;
+    use crate::figure::drawing::{Mark, Step};
+
+    /// A line through these points with the index on both sides.
+    fn line(points: &[[f64; 2]], sides: [usize; 2]) -> Line {
+        let points: Vec<DVec2> = points.iter().map(|&it| DVec2::from_array(it)).collect();
+        let pieces = points.windows(2).map(|ends| ([ends[0], ends[1]], sides));
+        Line::new(pieces.collect(), false)
+    }
+
+    /// The area that is shaded of a panel of 100 x 100.
+    fn area(curves: &[Line]) -> f64 {
+        let cell = Cell::new(DVec2::ZERO, DVec2::splat(100.0));
+        let mut page = Drawing::new(100.0, "");
+        assert_eq!(shade(&mut page, cell, curves), !page.marks.is_empty());
+        text(&page);
+        let area = |mark: &Mark| {
+            let Mark::Shape { path, .. } = mark else {
+                return 0.0;
+            };
+            let at = path.iter().filter_map(|step| match step {
+                Step::Move(at) | Step::Line(at) => Some(*at),
+                _ => None,
+            });
+            let at: Vec<DVec2> = at.collect();
+            let next = at.iter().cycle().skip(1);
+            0.5 * at
+                .iter()
+                .zip(next)
+                .map(|(a, b)| a.perp_dot(*b))
+                .sum::<f64>()
+                .abs()
+        };
+        page.marks.iter().map(area).sum()
+    }
+
+    fn vertical(x: f64, sides: [usize; 2]) -> Line {
+        line(&[[x, -1.0], [x, 101.0]], sides)
+    }
+
+    #[test]
+    fn ground_is_stable_where_all_curves_say_so() {
+        for (curves, wanted) in [
+            (vec![vertical(60.0, [1, 0]), vertical(30.0, [0, 1])], 7000.0),
+            (vec![vertical(30.0, [1, 0])], 7000.0),
+            (vec![vertical(30.0, [2, 0]), vertical(40.0, [0, 1])], 1000.0),
+            // They contradict each other, or there is none.
+            (vec![vertical(30.0, [1, 0]), vertical(40.0, [1, 2])], 0.0),
+            (vec![], 0.0),
+        ] {
+            assert!((area(&curves) - wanted).abs() < 1e-6, "{wanted}");
+        }
+    }
+
+    /// Ground reaches below the lowest point of a curve that turns back, and around it.
+    #[test]
+    fn rows_without_a_curve_belong_to_the_ground_beside_them() {
+        let inside = line(&[[20.0, -1.0], [20.0, 60.0], [50.0, 61.0]], [0, 1]);
+        let other = line(&[[50.0, 61.0], [80.0, 60.0], [80.0, -1.0]], [1, 0]);
+        let hollow = 60.0 * 60.0;
+        assert!((area(&[inside, other]) - (10_000.0 - hollow)).abs() < 100.0);
     }
 }

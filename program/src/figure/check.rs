@@ -1,20 +1,18 @@
 //! The figure of a check: the relaxed leaf as lines, the boundary-value
 //! solution as dots, and their differences along the veins.
 
-use super::panels::Panels;
-use crate::figure::axes::{Axes, Curve};
-use crate::figure::axis::{Axis, Ticks};
-use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
-use crate::figure::font::Font;
-use crate::figure::layout::{
-    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH, title,
+use crate::figure::drawing::axes::{Axes, Axis, Curve, Ticks};
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::labels::{
+    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, WIDTH,
+    header, title,
 };
-use crate::figure::markers::{Marker, dot};
-use crate::figure::page::{Key, KeyRows, NOTE_BASE, header};
-use crate::figure::setting::Setting;
-use crate::figure::veins::Veins;
+use crate::figure::drawing::markers::{Marker, dot};
+use crate::figure::drawing::{Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, vein_color};
+use crate::figure::leaf::{Panels, Veins};
+use crate::figure::scenario::Setting;
 use crate::report::numbers::power_of_ten;
-use crate::report::words::{equilibrium_of_index, headline, verdict};
+use crate::report::{equilibrium_of_index, headline, verdict};
 use glam::DVec2;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Check, Quantity, Verdict};
@@ -86,12 +84,17 @@ fn notes(check: &Check, veins: &Veins, setting: &Setting) -> Vec<String> {
 }
 
 const FRAME_HEIGHT: f64 = 216.0;
+
 /// Right of the frame, for the key.
 const KEY: f64 = 212.0;
+
 const HEIGHT: f64 = PANEL_TITLE + FRAME_HEIGHT + PANEL_AXIS;
+
 const FEWEST_DECADES: f64 = 3.0;
+
 /// Height of the strip below for differences of exactly zero: one lane per quantity.
 const ZERO_STRIP: f64 = 30.0;
+
 const MOST_MARKED: usize = 70;
 
 /// Differences of a quantity along the veins, and the largest one at which the
@@ -194,7 +197,7 @@ fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::svg::text;
+    use crate::figure::drawing::formats::text;
     use crate::report::sample;
 
     fn svg(check: &Check) -> String {

@@ -1,19 +1,34 @@
 //! A fit: its numbers with their intervals, results of experiments with the model and its confidence
 //! band along what varied, measured points over the veins, and below each the residuals.
+//!
+//! The free numbers of a fit with their intervals.
+//!
+//! The panels of the figure of a fit.
+//!
+//! The results of experiments as series along the column that varies.
 
-use super::fit_numbers::draw_numbers;
-use super::fit_panels::{draw_results, draw_veins};
-use super::fit_series::results;
-use crate::figure::drawing::Drawing;
-use crate::figure::layout::{HEADER, LEFT, letters};
-use crate::figure::page::new_page;
-use crate::report::numbers::{brief, counted};
-use leafdyn::scenario::Scenario;
-use leafdyn::study::Fit;
+use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::labels::{
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, letters, new_page,
+};
+use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::{
+    Anchor, BLUE, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, circle, color_of_vein, polygon,
+    rectangle,
+};
+use crate::figure::scenario::{Quantity, with_unit};
+use crate::report::numbers::{brief, counted, rounded_to, short};
+use glam::{DVec2, DVec3};
+use leafdyn::scenario::{Scenario, Units};
+use leafdyn::study::{Fit, FitLeaf, FitParameter, FitResidual, Keys, MeasuredQuantity};
+use std::collections::HashMap;
 
 const BOTTOM: f64 = 4.0;
+
 /// Most panels of results, and most leaves, that are drawn.
 const MOST_RESULTS: usize = 8;
+
 const MOST_LEAVES: usize = 3;
 
 pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
@@ -52,4 +67,594 @@ pub fn draw(fit: &Fit, scenario: &Scenario) -> Drawing {
     }
     page.height = (top + BOTTOM).ceil();
     page
+}
+
+/// Left of the intervals, for the numbers in words; right of them, for the values; and a row.
+const WORDS: f64 = 216.0;
+
+const VALUES: f64 = 200.0;
+
+const ROW: f64 = 24.0;
+
+const MOST_NUMBERS: usize = 30;
+
+/// Intervals are drawn up to this part of the value.
+const WIDEST: f64 = 1.0;
+
+/// Draws the free numbers with their intervals; returns where that ends.
+pub fn draw_numbers(
+    page: &mut Drawing,
+    top: f64,
+    letter: &str,
+    all: &[FitParameter],
+    units: &Units,
+) -> f64 {
+    let shown = &all[..all.len().min(MOST_NUMBERS)];
+    let corner = DVec2::new(LEFT + WORDS, top + PANEL_TITLE);
+    let size = DVec2::new(
+        WIDTH - RIGHT - VALUES - corner.x,
+        ROW * shown.len().max(1) as f64,
+    );
+    let cell = Cell::new(corner, size);
+    // The ends of the intervals as parts of the values.
+    let parts = |it: &FitParameter| {
+        let part = |end: Option<f64>| end.map(|end| (end - it.value) / it.value.abs());
+        [part(it.low), part(it.high)]
+    };
+    let known = shown.iter().flat_map(parts).flatten();
+    let widest = known.map(f64::abs).filter(|it| it.is_finite());
+    let widest = widest.fold(0.0, f64::max).min(WIDEST);
+    let open = shown
+        .iter()
+        .flat_map(parts)
+        .any(|end| end.is_none_or(|it| it.abs() > WIDEST));
+    let end = 110.0
+        * if open || widest == 0.0 {
+            WIDEST
+        } else {
+            widest
+        };
+    let across = Axis {
+        emphasizes_zero: true,
+        ..Axis::linear("from the value / %", -end, end)
+    };
+    let up = Axis {
+        ticks: Ticks::At(Vec::new()),
+        labelled: false,
+        ..Axis::linear("", 0.0, 1.0)
+    };
+    let axes = Axes::titled(page, cell, [letter, "95 % intervals"], across, up);
+    for (k, it) in shown.iter().enumerate() {
+        let middle = corner.y + ROW * (k as f64 + 0.5);
+        let label = |page: &mut Drawing, x: f64, text: &str, room: f64, anchor: Anchor| {
+            let text = Font::embedded().shortened(text, TICK_SIZE, room);
+            page.centered_label(DVec2::new(x, middle), &text, TICK_SIZE, anchor, INK);
+        };
+        let number = Quantity::of(&it.key, units);
+        label(
+            page,
+            corner.x - 10.0,
+            &number.words,
+            WORDS + LEFT - 16.0,
+            Anchor::End,
+        );
+        let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let text = interval(it) + &unit;
+        label(
+            page,
+            cell.end().x + 12.0,
+            &text,
+            WIDTH - cell.end().x - 16.0,
+            Anchor::Start,
+        );
+        // An open interval leaves the frame, dashed.
+        let [low, high] = parts(it);
+        let place = |part: f64| axes.at((100.0 * part, 0.0)).map(|at| at.with_y(middle));
+        let ends = [(low, -1.0), (high, 1.0)].map(|(part, sign)| {
+            let inside = part.filter(|part| part.abs() <= WIDEST);
+            (
+                inside.is_some(),
+                place(inside.unwrap_or(0.0099 * sign * end)),
+            )
+        });
+        let Some(value) = place(0.0).filter(|_| it.value != 0.0) else {
+            continue;
+        };
+        for (known, at) in ends {
+            if let Some(at) = at {
+                page.line(value, at, Stroke::new(BLUE, 1.8).dashed(!known));
+            }
+            if let Some(at) = at.filter(|_| known) {
+                let half = DVec2::new(0.0, 4.5);
+                page.line(at - half, at + half, Stroke::new(BLUE, 1.8));
+            }
+        }
+        if it.determined {
+            Marker::Circle.draw(page, value, BLUE);
+        }
+    }
+    cell.end().y + PANEL_AXIS
+}
+
+/// A fitted number with its interval, without digits below it.
+fn interval(it: &FitParameter) -> String {
+    let error = match (it.low, it.high) {
+        (Some(low), Some(high)) => 0.05 * (high - low),
+        _ => 0.0,
+    };
+    let [value, low, high] =
+        [Some(it.value), it.low, it.high].map(|it| it.map(|it| short(rounded_to(it, error))));
+    let value = value.unwrap_or_default();
+    match (it.determined, low, high) {
+        (true, Some(low), Some(high)) => format!("{value} ({low} to {high})"),
+        (true, ..) => value,
+        (false, Some(low), Some(high)) => format!("open: {low} to {high}"),
+        (false, Some(low), None) => format!("open: above {low}"),
+        (false, None, Some(high)) => format!("open: below {high}"),
+        (false, None, None) => "not determined".into(),
+    }
+}
+
+const RESULT: f64 = 190.0;
+
+const RESIDUALS: f64 = 70.0;
+
+/// Least pixels between ticks of residuals.
+const RESIDUAL_TICKS: f64 = 16.0;
+
+/// Between results and their residuals.
+const GAP: f64 = 12.0;
+
+/// Heights of a leaf, and between its two views.
+const LOWEST: f64 = 110.0;
+
+const HIGHEST: f64 = 300.0;
+
+const VIEWS_GAP: f64 = 70.0;
+
+/// Right of the panels, for the key.
+const KEY: f64 = 200.0;
+
+const BAND: Color = Color(200, 222, 238);
+
+const MODEL: Stroke = Stroke::new(BLUE, 1.6);
+
+/// Half the width of the band of a single experiment, in pixels.
+const SINGLE: f64 = 5.0;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Views, and their axes.
+const VIEWS: [(&str, [usize; 2]); 3] = [
+    ("from above", [0, 1]),
+    ("from the side", [0, 2]),
+    ("along x", [1, 2]),
+];
+
+/// A result in words, with its unit.
+fn result(kind: &str, units: &Units) -> Quantity {
+    let (words, unit) = match kind.parse() {
+        Ok(MeasuredQuantity::Tip(axis)) => (format!("{} of the tip", AXES[axis]), &units.length),
+        Ok(MeasuredQuantity::Reaction(axis)) => {
+            (format!("reaction along {}", AXES[axis]), &units.force)
+        }
+        Ok(MeasuredQuantity::Grip(grip, axis)) => {
+            let words = format!("force on grip {} along {}", grip + 1, AXES[axis]);
+            (words, &units.force)
+        }
+        Ok(MeasuredQuantity::Frequency(mode)) => (format!("frequency of mode {mode}"), &None),
+        Err(()) => (kind.into(), &None),
+    };
+    let unit = unit.clone();
+    Quantity { words, unit }
+}
+
+/// Draws results of one kind with the model along what varied, and their residuals along the same;
+/// returns where that ends.
+pub fn draw_results(
+    page: &mut Drawing,
+    top: f64,
+    letter: &str,
+    units: &Units,
+    results: &Results,
+) -> f64 {
+    let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
+    let quantity = result(results.kind, units);
+    let values = results.all().flat_map(|(_, r)| {
+        let (band, sd) = (r.band, 2.0 * r.sd);
+        [r.data - sd, r.data + sd, r.model - band, r.model + band]
+    });
+    let up = Axis {
+        emphasizes_zero: false,
+        ..Axis::holding(&quantity.axis(), values)
+    };
+    let places = || results.all().map(|(x, _)| x);
+    let across = match results.along {
+        Some(keys) => Axis::holding(&Quantity::of(&keys.to_string(), units).axis(), places()),
+        None => {
+            let mut numbers: Vec<f64> = places().collect();
+            numbers.dedup();
+            let ends = [numbers.first(), numbers.last()].map(|end| end.copied().unwrap_or(1.0));
+            Axis {
+                ticks: Ticks::At(numbers),
+                ..Axis::linear("experiment", ends[0] - 0.5, ends[1] + 0.5)
+            }
+        }
+    };
+    let unlabelled = Axis {
+        labelled: false,
+        ..across.clone()
+    };
+    let axes = Axes::titled(page, cell, [letter, &quantity.words], unlabelled, up);
+    for series in &results.series {
+        match results.along {
+            Some(_) => draw_model(page, &axes, series),
+            None => draw_single(page, &axes, series),
+        }
+    }
+    for (x, r) in results.all() {
+        let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
+        axes.curve(page, &bar, Stroke::new(DOT, 1.0));
+    }
+    axes.markers(
+        page,
+        results.all().map(|(x, r)| (x, r.data)),
+        Marker::Dot,
+        DOT,
+    );
+    let mut key = Key::right_of(cell);
+    key.marker(
+        page,
+        "data",
+        "with two standard deviations",
+        Marker::Dot,
+        DOT,
+    );
+    key.line(page, "model", "", MODEL);
+    key.entry(
+        page,
+        "95 % band",
+        "what the data leave open",
+        |page, cell| {
+            page.shape(rectangle(cell.corner, cell.size), BAND, None);
+        },
+    );
+    let points = results.all().map(|(x, r)| (x, r.residual, INK)).collect();
+    draw_residuals(page, cell, across, points)
+}
+
+/// Draws the model through a series of experiments, with its band.
+fn draw_model(page: &mut Drawing, axes: &Axes, series: &[(f64, &FitResidual)]) {
+    let mut once = series.to_vec();
+    once.dedup_by_key(|(x, _)| *x);
+    let line = |of: &dyn Fn(&FitResidual) -> f64| -> Vec<DVec2> {
+        let points: Vec<(f64, f64)> = once.iter().map(|(x, r)| (*x, of(r))).collect();
+        axes.smooth(&points).into_iter().flatten().collect()
+    };
+    let mut band = line(&|r| r.model + r.band);
+    band.extend(line(&|r| r.model - r.band).into_iter().rev());
+    if !band.is_empty() {
+        page.shape(polygon(&band), BAND, None);
+    }
+    let model: Vec<Option<DVec2>> = line(&|r| r.model).into_iter().map(Some).collect();
+    axes.line(page, &model, MODEL);
+    if let [(x, r)] = once[..] {
+        draw_single(page, axes, &[(x, r)]);
+    }
+}
+
+/// Draws the model of single experiments, each with its band.
+fn draw_single(page: &mut Drawing, axes: &Axes, experiments: &[(f64, &FitResidual)]) {
+    for (x, r) in experiments {
+        let ends = [r.model + r.band, r.model - r.band].map(|y| axes.at((*x, y)));
+        if let ([Some(top), Some(end)], Some(at)) = (ends, axes.at((*x, r.model))) {
+            let half = DVec2::new(SINGLE, 0.0);
+            page.shape(rectangle(top - half, end - top + 2.0 * half), BAND, None);
+            page.line(at - half, at + half, MODEL);
+        }
+    }
+}
+
+/// Draws residuals below a panel along the same axis; returns where they end.
+fn draw_residuals(
+    page: &mut Drawing,
+    above: Cell,
+    across: Axis,
+    points: Vec<(f64, f64, Color)>,
+) -> f64 {
+    let corner = DVec2::new(above.corner.x, above.end().y + GAP);
+    let cell = Cell::new(corner, DVec2::new(above.size.x, RESIDUALS));
+    let sizes = points.iter().map(|(_, residual, _)| residual.abs());
+    let most = 1.2 * sizes.filter(|it| it.is_finite()).fold(2.5, f64::max);
+    let up = Axis {
+        emphasizes_zero: true,
+        tick_spacing: Some(RESIDUAL_TICKS),
+        ..Axis::linear("residual", -most, most)
+    };
+    let axes = Axes { cell, across, up };
+    axes.draw(page);
+    let two = Stroke::new(NOTE, 1.0).dashed(true);
+    for bound in [-2.0, 2.0] {
+        let fraction = 1.0 - axes.up.fraction(bound);
+        let from = corner + DVec2::new(0.0, fraction * cell.size.y);
+        page.line(from, from.with_x(cell.end().x), two);
+    }
+    for (x, residual, color) in points {
+        axes.markers(page, [(x, residual)], Marker::Dot, color);
+    }
+    let mut key = Key::right_of(cell);
+    let note = "in standard deviations";
+    key.marker(page, "data less model", note, Marker::Dot, INK);
+    cell.end().y + PANEL_AXIS
+}
+
+/// Draws a leaf in the one or two views in which points were measured, with these, and their
+/// residuals along the veins; returns where that ends.
+pub fn draw_veins(
+    page: &mut Drawing,
+    top: f64,
+    letter: &str,
+    (experiment, units): (&str, &Units),
+    leaf: &FitLeaf,
+    residuals: Vec<&FitResidual>,
+) -> f64 {
+    let measured = |(_, [a, b]): &(&str, [usize; 2])| {
+        let mut points = leaf.traced.iter();
+        points.any(|(_, at)| at[*a].is_some() && at[*b].is_some())
+    };
+    let mut views: Vec<_> = VIEWS.into_iter().filter(measured).collect();
+    if views.is_empty() {
+        // Of marked points a single coordinate.
+        views = VIEWS.into();
+    }
+    views.truncate(2);
+    let whole = WIDTH - LEFT - RIGHT - KEY;
+    let width = match views.len() {
+        1 => whole,
+        _ => 0.5 * (WIDTH - LEFT - RIGHT - VIEWS_GAP),
+    };
+    let count = leaf.curves.len();
+    let panels: Vec<_> = (views.iter())
+        .map(|(_, axes)| {
+            let seen = |at: [Option<f64>; 3]| Some((at[axes[0]]?, at[axes[1]]?));
+            let traced = leaf.traced.iter();
+            let points = traced.filter_map(|(rod, at)| Some((*rod, seen(*at)?)));
+            let points: Vec<(usize, (f64, f64))> = points.collect();
+            let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
+            let curves = leaf.curves.iter();
+            let curves = curves.map(|curve| curve.iter().map(flat).collect());
+            let curves: Vec<Vec<(f64, f64)>> = curves.collect();
+            let all = || curves.iter().flatten().chain(points.iter().map(|it| &it.1));
+            let name = |k: usize| with_unit(AXES[axes[k]], units.length.as_deref());
+            let across = Axis::holding(&name(0), all().map(|p| p.0));
+            let up = Axis::holding(&name(1), all().map(|p| p.1));
+            (across, up, curves, points)
+        })
+        .collect();
+    let tall = |(across, up, ..): &(Axis, Axis, _, _)| {
+        width * (up.end - up.start) / (across.end - across.start)
+    };
+    let height = panels
+        .iter()
+        .map(tall)
+        .fold(0.0, f64::max)
+        .clamp(LOWEST, HIGHEST);
+    let experiment = match experiment {
+        "as it is" => "traced veins".to_string(),
+        name => format!("traced veins, experiment {name}"),
+    };
+    let mut below = Cell::left_of_key(top + PANEL_TITLE, height, KEY);
+    for (k, ((view, _), (across, up, curves, points))) in views.iter().zip(panels).enumerate() {
+        let corner = DVec2::new(LEFT + k as f64 * (width + VIEWS_GAP), top + PANEL_TITLE);
+        let cell = Cell::new(corner, DVec2::new(width, height));
+        let letter = if k == 0 { letter } else { "" };
+        let what = format!("{experiment}, {view}");
+        let (across, up) = equal_scales(across, up, cell.size);
+        let panel = Axes::titled(page, cell, [letter, &what], across, up);
+        for (rod, line) in curves.iter().enumerate() {
+            let drawn = panel.smooth(line).into_iter().flatten().map(Some);
+            let stroke = Stroke::new(color_of_vein(rod, count), 1.4);
+            panel.line(page, &drawn.collect::<Vec<_>>(), stroke);
+        }
+        for (rod, point) in points {
+            if let Some(at) = panel.at(point) {
+                let rim = Stroke::new(color_of_vein(rod, count), 1.2);
+                page.shape(circle(at, 2.6), WHITE, Some(rim));
+            }
+        }
+        if views.len() == 1 {
+            let mut key = Key::right_of(cell);
+            key.line(page, "model", "each vein in its colour", MODEL);
+            key.entry(page, "traced points", "", |page, cell| {
+                let rim = Stroke::new(BLUE, 1.2);
+                page.shape(circle(cell.middle(), 2.6), WHITE, Some(rim));
+            });
+        }
+    }
+    below.corner.y += PANEL_AXIS - GAP;
+    let along = Axis::linear("fraction of the length", 0.0, 1.0);
+    let points = residuals.iter().filter_map(|it| {
+        let color = color_of_vein(it.rod?.checked_sub(1)?, count);
+        Some((it.sigma?, it.residual, color))
+    });
+    draw_residuals(page, below, along, points.collect())
+}
+
+/// The axes, one widened so that both have the same number of pixels per length.
+fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
+    let extents = [across.end - across.start, up.end - up.start];
+    let unit = (extents[0] / size.x).max(extents[1] / size.y);
+    for (axis, pixels) in [(&mut across, size.x), (&mut up, size.y)] {
+        let (middle, half) = (0.5 * (axis.start + axis.end), 0.5 * unit * pixels);
+        (axis.start, axis.end) = (middle - half, middle + half);
+        axis.emphasizes_zero = false;
+    }
+    (across, up)
+}
+
+/// Fewest experiments of a series among others.
+const FEWEST: usize = 4;
+
+/// Experiments are in line up to this part of their distance.
+const IN_LINE: f64 = 1e-6;
+
+/// Results of one kind, drawn in one panel.
+pub struct Results<'f> {
+    /// As in the data: `tip_x`.
+    pub kind: &'f str,
+    /// The number of the scenario along which the panel has them; `None`: the numbers of the
+    /// experiments.
+    pub along: Option<&'f Keys>,
+    /// Series along it, each with its values in ascending order.
+    pub series: Vec<Vec<(f64, &'f FitResidual)>>,
+}
+
+impl<'f> Results<'f> {
+    pub fn all(&self) -> impl Iterator<Item = (f64, &'f FitResidual)> {
+        self.series.iter().flatten().copied()
+    }
+}
+
+type Settings = [(Keys, f64)];
+
+/// The results of all experiments by their kinds. Those of experiments that differ along a line, as
+/// one column varies or several together, are a series; those of others keep their numbers.
+pub fn results(fit: &Fit) -> Vec<Results<'_>> {
+    let leaves = fit.leaves.iter();
+    let settings: HashMap<usize, &Settings> = leaves
+        .map(|(_, leaf)| (leaf.number, &leaf.settings[..]))
+        .collect();
+    let mut kinds: Vec<(&str, Vec<&FitResidual>)> = Vec::new();
+    for result in fit.residuals.iter().filter(|it| it.rod.is_none()) {
+        match kinds.iter_mut().find(|(kind, _)| *kind == result.what) {
+            Some((_, of)) => of.push(result),
+            None => kinds.push((&result.what, vec![result])),
+        }
+    }
+    let mut all = Vec::new();
+    for (kind, of) in kinds {
+        let first = all.len();
+        let own: Vec<&Settings> = (of.iter())
+            .map(|it| settings.get(&it.number).copied().unwrap_or_default())
+            .collect();
+        let mut numbered = Vec::new();
+        let mut from = 0;
+        while from < of.len() {
+            let whole = (from == 0).then(|| varied(&own)).flatten();
+            let found = match whole {
+                Some(key) => Some((of.len(), key)),
+                None => (from + FEWEST..=of.len())
+                    .map_while(|to| Some((to, varied(&own[from..to])?)))
+                    .last(),
+            };
+            let Some((to, key)) = found else {
+                numbered.push((of[from].number as f64, of[from]));
+                from += 1;
+                continue;
+            };
+            let keys = &own[from][key].0;
+            let mut series: Vec<_> = (from..to).map(|k| (own[k][key].1, of[k])).collect();
+            series.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let along = Some(keys);
+            let mut of_kind = all[first..].iter_mut();
+            match of_kind.find(|it: &&mut Results| it.along == along) {
+                Some(same) => same.series.push(series),
+                None => all.push(Results {
+                    kind,
+                    along,
+                    series: vec![series],
+                }),
+            }
+            from = to;
+        }
+        if !numbered.is_empty() {
+            all.push(Results {
+                kind,
+                along: None,
+                series: vec![numbered],
+            });
+        }
+    }
+    all
+}
+
+/// Which of their numbers varies most, if the experiments differ along a line.
+fn varied(settings: &[&Settings]) -> Option<usize> {
+    let first = settings.first()?;
+    let same = |it: &&Settings| {
+        it.iter()
+            .map(|(keys, _)| keys)
+            .eq(first.iter().map(|(keys, _)| keys))
+    };
+    if !settings.iter().all(same) {
+        return None;
+    }
+    let sizes: Vec<f64> = (0..first.len())
+        .map(|k| {
+            settings
+                .iter()
+                .fold(0.0, |most: f64, it| most.max(it[k].1.abs()))
+        })
+        .collect();
+    let from_first = |it: &&Settings| -> Vec<f64> {
+        let each = it.iter().zip(first.iter()).zip(&sizes);
+        each.map(|((a, b), size)| if *size > 0.0 { (a.1 - b.1) / size } else { 0.0 })
+            .collect()
+    };
+    let steps: Vec<Vec<f64>> = settings.iter().map(from_first).collect();
+    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let longest = steps
+        .iter()
+        .max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
+    let square = dot(longest, longest);
+    if square.is_nan() || square <= 0.0 {
+        return None;
+    }
+    let in_line = |step: &Vec<f64>| {
+        let part = dot(step, longest) / square;
+        let off = step
+            .iter()
+            .zip(longest)
+            .map(|(a, b)| (a - part * b).powi(2));
+        off.sum::<f64>() <= IN_LINE * IN_LINE * square
+    };
+    if !steps.iter().all(in_line) {
+        return None;
+    }
+    // The first of those that vary alike.
+    (0..longest.len()).reduce(|best, k| {
+        match longest[k].abs() > (1.0 + 1e-9) * longest[best].abs() {
+            true => k,
+            false => best,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(keys: [&str; 2], values: &[[f64; 2]]) -> Vec<Vec<(Keys, f64)>> {
+        let row = |values: &[f64; 2]| {
+            let each = keys.iter().zip(values);
+            each.map(|(key, value)| (key.parse().unwrap(), *value))
+                .collect()
+        };
+        values.iter().map(row).collect()
+    }
+
+    #[test]
+    fn experiments_in_line_vary_by_one_number() {
+        let of = |values: &[[f64; 2]]| {
+            let rows = rows(["load.tip_force[0]", "load.tip_force[2]"], values);
+            varied(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&[[0.0, 1.0], [0.0, 2.0], [0.0, 5.0]]), Some(1));
+        // Two that vary together, one more than the other.
+        assert_eq!(of(&[[1.0, 1.0], [2.0, 1.1], [3.0, 1.2]]), Some(0));
+        assert_eq!(of(&[[-1.0, 1.0], [-2.0, 2.0]]), Some(0));
+        assert_eq!(of(&[[0.0, 1.0], [0.0, 2.0], [1.0, 2.0]]), None);
+        assert_eq!(of(&[[1.0, 1.0], [1.0, 1.0]]), None);
+        assert_eq!(of(&[]), None);
+    }
 }

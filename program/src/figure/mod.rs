@@ -4,63 +4,33 @@
 //! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
 //! `png` write the same drawing in both formats.
 
-mod axes;
-mod axis;
 mod boundary;
-mod boundary_sides;
 mod chart;
-mod chart_panel;
 mod check;
-mod curve;
-pub mod drawing;
-mod energy;
-mod film;
-mod filmstrip;
+pub(crate) mod drawing;
 mod fit;
-mod fit_numbers;
-mod fit_panels;
-mod fit_series;
-mod font;
-mod forces;
-mod labels;
-mod layout;
-mod leaf;
+pub(crate) mod leaf;
 mod map;
-mod markers;
-pub mod marks;
 mod modes;
-mod moments;
-mod page;
-mod panels;
-pub mod png;
-mod quantity;
+mod motion;
 mod rod;
-mod round;
+pub(crate) mod scenario;
 mod sensitivity;
-pub mod setting;
-mod small;
-mod smooth;
-mod space;
-mod stable_ground;
-pub mod svg;
 mod trace;
-pub mod veins;
 
-pub use boundary::draw as boundary;
-pub use chart::{draw_chart as chart, draw_scaling as scaling};
-pub use check::draw as check;
-pub use energy::draw_energies as energy;
-pub use film::write as film;
-pub use filmstrip::draw_filmstrip as filmstrip;
-pub use fit::draw as fit;
-pub use leaf::{draw as leaf, draw_equilibria as equilibria};
-pub use map::draw as map;
-pub use modes::draw as modes;
-pub use sensitivity::draw as sensitivity;
-pub use trace::draw as trace;
-
-pub use drawing::Drawing;
-
+pub use crate::figure::boundary::draw as boundary;
+pub use crate::figure::chart::{draw_chart as chart, draw_scaling as scaling};
+pub use crate::figure::check::draw as check;
+pub use crate::figure::drawing::Drawing;
+pub use crate::figure::fit::draw as fit;
+pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria};
+pub use crate::figure::map::draw as map;
+pub use crate::figure::modes::draw as modes;
+pub use crate::figure::motion::{
+    draw_energies as energy, draw_filmstrip as filmstrip, write as film,
+};
+pub use crate::figure::sensitivity::draw as sensitivity;
+pub use crate::figure::trace::draw as trace;
 use leafdyn::scenario::Scenario;
 
 /// Draws a result of a scenario.
@@ -68,10 +38,12 @@ pub type Figure<R> = fn(&R, &Scenario) -> Drawing;
 
 #[cfg(test)]
 mod tests {
+    use crate::figure::drawing::formats;
+    use crate::report::sample;
     use std::io::Cursor;
 
     use super::*;
-    use crate::report::sample;
+
     use glam::DVec3;
     use leafdyn::relax::Mode;
     use leafdyn::scenario::{Grip, Hold, PointLoad, Scenario, Schedule, Wind};
@@ -92,9 +64,9 @@ mod tests {
             energy(&sample::record(5, 16), &scenario()),
             filmstrip(&sample::record(5, 16), &scenario()),
         ] {
-            svg::text(&drawing);
+            formats::text(&drawing);
             let mut bytes = Vec::new();
-            png::write_png(&drawing, &mut bytes).unwrap();
+            formats::write_png(&drawing, &mut bytes).unwrap();
             let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
             let reader = reader.unwrap();
             assert_eq!(reader.info().width, 1800, "{}", drawing.description);
@@ -122,7 +94,7 @@ mod tests {
                 filmstrip(&record, scenario),
                 energy(&record, scenario),
             ]
-            .map(|drawing| svg::text(&drawing))
+            .map(|drawing| formats::text(&drawing))
         };
         let [rest, checked, strip, energies] = drawn(&in_cm());
         for svg in [&rest, &checked] {
@@ -156,7 +128,7 @@ mod tests {
         for point in fan.shape.curves.iter_mut().flatten().chain(&mut fan.tips) {
             *point *= 10.0;
         }
-        let svg = svg::text(&leaf(&fan, &large));
+        let svg = formats::text(&leaf(&fan, &large));
         assert!(svg.contains(">8</text>") && !svg.contains(">0.8</text>"));
     }
 
@@ -165,7 +137,7 @@ mod tests {
         let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
         let count = |scenario: &Scenario| {
             [leaf(&fan, scenario), filmstrip(&record, scenario)]
-                .map(|drawing| svg::text(&drawing).matches(">gravity<").count())
+                .map(|drawing| formats::text(&drawing).matches(">gravity<").count())
         };
         assert_eq!(count(&scenario()), [4, 1]);
         let mut without = scenario();
@@ -194,7 +166,7 @@ mod tests {
                 width: Vec::new(),
             });
             [leaf(&fan, &windy), filmstrip(&record, &windy)]
-                .map(|drawing| svg::text(&drawing).matches(">wind<").count())
+                .map(|drawing| formats::text(&drawing).matches(">wind<").count())
         };
         assert_eq!(count(&[0.0], &[[1.0, 0.0, 0.0]]), [4, 1]);
         // One that changes in every picture, as soon as it blows.
@@ -218,7 +190,7 @@ mod tests {
             displacement: [0.0; 3],
         };
         let drawn = |scenario: &Scenario| {
-            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|it| svg::text(&it))
+            [leaf(&fan, scenario), filmstrip(&record, scenario)].map(|it| formats::text(&it))
         };
         let free = drawn(&held);
         held.grips = vec![
@@ -240,7 +212,7 @@ mod tests {
     fn moments_are_drawn_on_a_rod_as_they_act() {
         let (rod, record) = (sample::fan(1, 8), sample::record(1, 8));
         let drawn = |scenario: &Scenario| {
-            let paths = |drawing| svg::text(&drawing).matches("<path").count();
+            let paths = |drawing| formats::text(&drawing).matches("<path").count();
             [leaf(&rod, scenario), filmstrip(&record, scenario)].map(paths)
         };
         let mut turned = sample::scenario("rod", 1);
@@ -264,13 +236,13 @@ mod tests {
     fn names_are_escaped() {
         let mut fan = sample::fan(5, 8);
         fan.scenario = "a < b & \"c\"\u{1}".into();
-        let svg = svg::text(&leaf(&fan, &scenario()));
+        let svg = formats::text(&leaf(&fan, &scenario()));
         assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
     }
 
     fn motion(record: &Record) -> [String; 2] {
         [energy(record, &scenario()), filmstrip(record, &scenario())]
-            .map(|drawing| svg::text(&drawing))
+            .map(|drawing| formats::text(&drawing))
     }
 
     #[test]
@@ -306,7 +278,7 @@ mod tests {
             displacement: shape.clone(),
             rotation: shape,
         }]);
-        svg::text(&modes(&fan, &scenario()));
+        formats::text(&modes(&fan, &scenario()));
         let curves = fan.shape.curves.iter_mut();
         curves.for_each(|curve| curve[4].z = value);
         fan.tips[0].x = value;
@@ -328,11 +300,11 @@ mod tests {
         if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
             solution.rods[1].nodes[4].position = DVec3::splat(value);
         }
-        svg::text(&check(&found, &scenario()));
+        formats::text(&check(&found, &scenario()));
         let worst = found.along[0];
         found.along.fill(worst);
         found.tolerance = value;
-        svg::text(&check(&found, &scenario()));
+        formats::text(&check(&found, &scenario()));
     }
 
     fn draw_extreme_chart(value: f64) {
@@ -342,7 +314,7 @@ mod tests {
             spread.median = value;
         }
         found.reference.as_mut().unwrap().known_within = value;
-        svg::text(&chart(&found));
+        formats::text(&chart(&found));
     }
 
     fn draw_extreme_motion(value: f64) {

@@ -1,21 +1,21 @@
 //! The modes of a leaf at rest: each mode drawn over the leaf.
 
+use crate::figure::drawing::labels::{HEADER, SIDE, SmallPanels, THINNER, new_page};
+use crate::figure::drawing::space::{FRONT, OBLIQUE, View};
 use crate::figure::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
-use crate::figure::layout::HEADER;
-use crate::figure::page::new_page;
-use crate::figure::setting::Setting;
-use crate::figure::small::{SIDE, SmallPanels, THINNER};
-use crate::figure::space::{FRONT, OBLIQUE, View};
-use crate::figure::veins::{Veins, tips};
+use crate::figure::leaf::{Veins, tips};
+use crate::figure::scenario::Setting;
 use crate::report::numbers::short;
-use crate::report::words::verdict;
+use crate::report::verdict;
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Scenario;
 
 const MOST: usize = 12;
+
 /// A motion towards the viewer in one view is visible in the other.
 const VIEWS: [View; 2] = [OBLIQUE, FRONT];
+
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
@@ -88,7 +88,7 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::svg::text;
+    use crate::figure::drawing::formats::text;
     use crate::report::sample;
 
     #[test]

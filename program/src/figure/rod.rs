@@ -1,16 +1,16 @@
 //! A single rod at rest in one large view: of the plane in which it lies, or in space; with its loads,
 //! its supports and its unloaded shape.
 
-use crate::figure::curve::{is_drawable, stretch};
-use crate::figure::drawing::{Drawing, FRAME, INK, Path, Step, Stroke, polyline};
-use crate::figure::forces::{Force, forces};
-use crate::figure::layout::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, title};
-use crate::figure::markers::{hold_marker, tip_marker, vein_markers};
-use crate::figure::page::{KeyRows, NOTE_BASE, new_page};
-use crate::figure::panels::flat;
-use crate::figure::setting::Setting;
-use crate::figure::space::{Margins, OBLIQUE, Scene, surrounding_box};
-use crate::figure::veins::Veins;
+use crate::figure::drawing::labels::{
+    Cell, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, new_page, title,
+};
+use crate::figure::drawing::markers::{Force, forces, hold_marker, tip_marker, vein_markers};
+use crate::figure::drawing::space::{Margins, OBLIQUE, Scene, surrounding_box};
+use crate::figure::drawing::{
+    Drawing, FRAME, INK, Path, Step, Stroke, is_drawable, polyline, stretch,
+};
+use crate::figure::leaf::{Veins, flat};
+use crate::figure::scenario::Setting;
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
@@ -18,23 +18,35 @@ use leafdyn::scenario::{Hold, Scenario};
 
 /// Heights of the view.
 const LOWEST: f64 = 240.0;
+
 const HIGHEST: f64 = 560.0;
+
 const BOTTOM: f64 = 4.0;
+
 /// Padding around the rod and its arrows, as a fraction of the largest extent.
 const PADDING: f64 = 0.07;
+
 /// A rod within this fraction of its extent of a plane is drawn in that.
 const FLAT: f64 = 0.02;
+
 /// Unloaded shapes nearer than this to the rod are not drawn, in its extents.
 const VISIBLE: f64 = 0.004;
+
 /// An unloaded shape that is so many times as large as a coiled rod is cut off.
 const FARTHEST: f64 = 4.0;
+
 /// Points of the unloaded shape.
 const POINTS: usize = 96;
+
 const LINE: f64 = 2.4;
+
 const UNLOADED: Stroke = Stroke::new(FRAME, 1.4);
+
 /// Half the length of a wall, the depth of its hatching, and the strokes of that.
 const WALL: f64 = 15.0;
+
 const DEPTH: f64 = 8.0;
+
 const STROKES: i32 = 3;
 
 /// Names of planes, and their two axes.
@@ -282,9 +294,10 @@ fn draw_wall(page: &mut Drawing, at: DVec2, inward: DVec2, size: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figure::drawing::formats::text;
     use crate::figure::leaf;
-    use crate::figure::svg::text;
     use crate::report::sample;
+
     use glam::DVec3;
     use leafdyn::scenario::{Clamp, HeldTip, PointLoad};
 

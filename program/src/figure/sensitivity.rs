@@ -1,16 +1,15 @@
 //! What a change of each number does to the tip of a leaf or, if that is held, to the force on its
 //! holder: signed bars along each axis.
 
-use super::quantity::Quantity;
-use crate::figure::axes::Axes;
-use crate::figure::axis::{Axis, Ticks};
+use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::labels::{
+    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page,
+};
 use crate::figure::drawing::{
     Anchor, BLUE, Drawing, FRAME, INK, NOTE, Stroke, VERMILION, rectangle,
 };
-use crate::figure::font::Font;
-use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
-use crate::figure::page::new_page;
-use crate::figure::setting::with_unit;
+use crate::figure::scenario::{Quantity, with_unit};
 use crate::report::numbers::{power_of_ten, rounded_to, short};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Sensitivity};
@@ -18,19 +17,29 @@ use leafdyn::scenario::{Scenario, Units};
 
 /// Room left of the panels, for the numbers in words, and between the panels.
 const WORDS: f64 = 216.0;
+
 const GAP: f64 = 16.0;
+
 const ROW: f64 = 34.0;
+
 const BAR: f64 = 12.0;
+
 /// From a bar to its value.
 const VALUE: f64 = 4.0;
+
 /// Room for the values beside the longest bars, as a fraction of the panel.
 const BESIDE: f64 = 0.42;
+
 /// Least pixels between ticks.
 const TICKS: f64 = 40.0;
+
 /// Values are shown to this part of them.
 const SHOWN: f64 = 5e-3;
+
 const BOTTOM: f64 = 4.0;
+
 const MOST_ROWS: usize = 40;
+
 /// By how much each number changes: this part of it or, if it is zero, of its unit.
 const PART: f64 = 0.01;
 
@@ -198,7 +207,7 @@ fn draw_bars(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::svg::text;
+    use crate::figure::drawing::formats::text;
     use crate::report::sample;
 
     /// The sample leaf with numbers that move its tip so far along the axes.

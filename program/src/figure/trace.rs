@@ -1,37 +1,41 @@
 //! Branches of equilibria: a coordinate of the tip against the number that
 //! varies, and the leaf at some of the points.
 
-use crate::figure::axes::Axes;
-use crate::figure::axis::Axis;
+use crate::figure::drawing::axes::{Axes, Axis};
+use crate::figure::drawing::labels::{
+    Cell, HEADER, Key, LEFT, Labels, PANEL_AXIS, PANEL_TITLE, SmallPanels, letters, new_page,
+};
+use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::{CURVES, Drawing, INK, Stroke};
-use crate::figure::labels::Labels;
-use crate::figure::layout::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, letters};
-use crate::figure::markers::Marker;
-use crate::figure::page::{Key, new_page};
-use crate::figure::quantity::Quantity;
-use crate::figure::setting::{Setting, with_unit};
-use crate::figure::small::SmallPanels;
-use crate::figure::veins::{Veins, longest};
+use crate::figure::leaf::{Veins, longest};
+use crate::figure::scenario::{Quantity, Setting, with_unit};
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
-use crate::report::words::{branch_end, stable_or_index};
-use crate::report::{error_location, passes_crossings, slope_unit};
+use crate::report::{branch_end, error_location, passes_crossings, slope_unit, stable_or_index};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
 const DIAGRAM: f64 = 380.0;
+
 /// Height of the further panels.
 const MORE: f64 = 220.0;
+
 /// Right of the panel, for the key.
 const KEY: f64 = 190.0;
+
 const LAW: f64 = 240.0;
+
 const BETWEEN: f64 = 26.0;
+
 /// Most leaves drawn.
 const MOST_LEAVES: usize = 8;
+
 /// Smaller differences are invisible in small panels, in lengths.
 const VISIBLE: f64 = 0.04;
+
 /// Equal parts of each vein at whose ends leaves are compared.
 const PARTS: usize = 8;
+
 /// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
 

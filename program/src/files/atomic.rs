@@ -1,15 +1,13 @@
 //! Files that are complete or absent: each is written under another name in
 //! its folder and renamed when it is complete.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::mem;
+use crate::report::FileError;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
+use std::{fs, io, mem};
 use tempfile::{Builder, NamedTempFile};
-
-use crate::report::FileError;
 
 /// Large enough to write the centerline file of a wide leaf in few pieces.
 const BUFFER_BYTES: usize = 1 << 16;

@@ -1,12 +1,11 @@
 //! Tables of measurements of other programs, as `benches/peers` writes them.
 
+use crate::report::FileError;
+use leafdyn::study::PeerRow;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-
-use crate::report::FileError;
-use leafdyn::study::PeerRow;
 
 /// Columns that a table must have, in any order.
 const COLUMNS: [&str; 7] = [

@@ -1,16 +1,16 @@
 //! The scenario whose results a folder holds: the JSON files in it name its file; and files that
 //! results must not replace.
 
-use std::ffi::OsStr;
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Component, Path, PathBuf, absolute};
-
-use super::Written;
+use crate::files::Written;
 use crate::report::FileError;
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
 use leafdyn::study::{Boundary, Chart, Check, Equilibria, Fit, Map, Trace};
+use std::ffi::OsStr;
+use std::fs;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Component, Path, PathBuf, absolute};
 
 /// The JSON files of all verbs.
 const FILES: [Option<&str>; 9] = [

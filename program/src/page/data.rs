@@ -1,14 +1,12 @@
 //! The data of the page: results, thinned to what is visible, with large arrays as
 //! base64 of little-endian numbers.
 
+use crate::figure::leaf::{node_stride, tamed};
+use crate::figure::scenario::{Arrow, HoldMark, LoadMark};
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
-use serde::Serialize;
-
-use crate::figure::marks::{HoldMark, LoadMark};
-use crate::figure::setting::Arrow;
-use crate::figure::veins::{node_stride, tamed};
 use leafdyn::relax::{Equilibrium, Shape};
+use serde::Serialize;
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
 const STATE: usize = 16;

@@ -3,29 +3,35 @@
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
 
-use std::io::{self, Write};
-
-use glam::{DVec3, Vec3};
-use serde_json::{Value, json};
-
 use crate::figure::drawing::{Color, color_of_vein};
-use crate::figure::veins::{node_stride, tamed};
+use crate::figure::leaf::{node_stride, tamed};
+use glam::{DVec3, Vec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::simulate::Record;
+use serde_json::{Value, json};
+use std::io;
+use std::io::Write;
 
 /// Most shapes of a film: each has all vertices.
 const MOST_SHAPES: usize = 61;
+
 /// Most segments of a vein.
 const MOST_SEGMENTS: usize = 32;
+
 /// Length of a film in seconds, as the unit of time is not known.
 const SECONDS: f64 = 10.0;
+
 /// Radius of a vein, as a fraction of the longest.
 const RADIUS: f64 = 0.004;
 
 const FLOAT: u32 = 5126;
+
 const UNSIGNED_INT: u32 = 5125;
+
 const UNSIGNED_BYTE: u32 = 5121;
+
 const ARRAY: u32 = 34962;
+
 const ELEMENT_ARRAY: u32 = 34963;
 
 /// A leaf at rest.

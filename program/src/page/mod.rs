@@ -24,22 +24,27 @@ mod results;
 pub mod vtk;
 
 use crate::figure::Figure;
-use crate::figure::drawing::{Drawing, color_of_vein};
-use crate::figure::marks::{LoadMark, hold_marks, load_marks};
-use crate::figure::setting::Setting;
-use crate::figure::svg::{self, hex};
-use crate::figure::veins::is_drawn;
-use crate::report::{Reported, json};
-pub use data::{Leaf, View};
+use crate::figure::drawing::formats::hex;
+use crate::figure::drawing::{Drawing, color_of_vein, formats};
+use crate::figure::leaf::is_drawn;
+use crate::figure::scenario::{LoadMark, Setting, hold_marks, load_marks};
+pub use crate::page::data::{Leaf, View};
+use crate::report;
+use crate::report::Reported;
 use glam::DVec3;
-use leafdyn::scenario::{self, Scenario, Units};
+use leafdyn::scenario;
+use leafdyn::scenario::{Scenario, Units};
 use leafdyn::simulate::Record;
 use leafdyn::study::Trace;
-use std::io::{self, Write};
+use std::io;
+use std::io::Write;
 
 const FRAME: &str = include_str!("page.html");
+
 const STYLE: &str = include_str!("page.css");
+
 const THREE: &str = include_str!("three/three.min.js");
+
 const SCRIPTS: [&str; 7] = [
     include_str!("given.js"),
     include_str!("data.js"),
@@ -172,14 +177,14 @@ pub fn moving(stations: &[f64], curves: &[Vec<DVec3>], page: &View) -> Leaf {
 fn assemble(view: &View, still: &Drawing) -> String {
     let (mut data, mut figure) = (Vec::new(), Vec::new());
     // Writing to memory cannot fail.
-    let _ = json::write_json(view, &mut data);
-    let _ = svg::write_svg(still, &mut figure);
+    let _ = report::write_json(view, &mut data);
+    let _ = formats::write_svg(still, &mut figure);
     // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
     let figure = String::from_utf8_lossy(&figure).into_owned();
     let scripts = SCRIPTS.concat();
     let parts = [
-        ("TITLE", svg::escaped(&view.title)),
+        ("TITLE", formats::escaped(&view.title)),
         ("STYLE", STYLE.into()),
         ("FIGURE", figure),
         ("DATA", data),
@@ -206,6 +211,7 @@ fn assemble(view: &View, still: &Drawing) -> String {
 mod tests {
     use super::*;
     use crate::report::sample;
+
     use serde_json::Value;
 
     fn scenario(rods: usize) -> Scenario {

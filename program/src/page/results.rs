@@ -1,17 +1,14 @@
 //! The data of the pages: what each kind of result shows of its leaves, and the chart beside
 //! them.
 
-use std::slice;
-
-use glam::DVec3;
-
-use super::Viewed;
-use super::data::{Chart, Curve, Leaf, ModeShape, View, vectors};
-use crate::figure::setting::with_unit;
-use crate::figure::{self, Figure};
+use crate::figure;
+use crate::figure::Figure;
+use crate::figure::scenario::with_unit;
+use crate::page::Viewed;
+use crate::page::data::{Chart, Curve, Leaf, ModeShape, View, vectors};
 use crate::report::numbers::{brief, counted, short, significant};
-use crate::report::words::{equilibrium_of_index, verdict};
-use crate::report::{Reported, is_special};
+use crate::report::{Reported, equilibrium_of_index, is_special, verdict};
+use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
 use leafdyn::scenario::Units;
 use leafdyn::simulate::{Moment, Record};
@@ -19,12 +16,16 @@ use leafdyn::study::{
     Boundary, BoundaryPoint, Equilibria, Keys, PointKind, Target, Trace, TraceBranch, TracePoint,
     TraceShow,
 };
+use std::slice;
 
 /// Most segments of a vein that are drawn of each of many leaves, and of those of a motion.
 const MOST_NODES: usize = 32;
+
 const MOST_MOVING_NODES: usize = 64;
+
 /// More equilibria could not be distinguished side by side.
 const MOST_EQUILIBRIA: usize = 24;
+
 /// Most points of a curve over time.
 const MOST_POINTS: usize = 1000;
 

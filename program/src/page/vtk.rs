@@ -3,17 +3,16 @@
 //!
 //! Source: "VTK XML formats", version 1.0, of the VTK documentation.
 
-use std::io::{self, Write};
-use std::path::Path;
-
+use crate::figure::drawing::formats::escaped;
+use crate::page::Shape;
 use base64::prelude::{BASE64_STANDARD as STANDARD, Engine};
 use glam::DVec3;
-
-use super::Shape;
-use crate::figure::svg::escaped;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Radii;
 use leafdyn::shape::NodeState;
+use std::io;
+use std::io::Write;
+use std::path::Path;
 
 /// Values at all nodes, vein by vein: name, values per node, all values.
 struct Array<'a>(&'a str, usize, Vec<f64>);

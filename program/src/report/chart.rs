@@ -1,17 +1,15 @@
 //! A chart as text, and as rows of `chart.csv` and `chart_rods.csv`, one per measurement;
 //! `chart.json` has the same values under the same names.
 
-use std::io::{self, Write};
-
-use serde::Serialize;
-use serde_json::Value;
-
-use crate::report::Reported;
 use crate::report::numbers::{power_of_ten, seconds, veins_of};
 use crate::report::table::{Lines, labelled, text_cell};
-use crate::report::words::contender;
+use crate::report::{Reported, contender};
 use leafdyn::scenario::Units;
 use leafdyn::study::{Chart, Decade, Peer, Reference, Row, Scaling};
+use serde::Serialize;
+use serde_json::Value;
+use std::io;
+use std::io::Write;
 
 /// Names of the columns that both files have.
 const COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,runs,steps,\
@@ -253,6 +251,7 @@ fn write_columns(
 #[cfg(test)]
 mod tests {
     use crate::report::sample;
+
     use leafdyn::study::Ending;
 
     use super::*;

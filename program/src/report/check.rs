@@ -1,19 +1,16 @@
 //! The text report of a check.
 
-use glam::DVec3;
-
-use super::relax::found;
-use crate::report::Reported;
 use crate::report::numbers::{
     as_accurate, bound, bound_of_positions, decimals, eigenvalues, grids, in_unit, point,
     power_of_ten, seconds, veins,
 };
+use crate::report::relax::found;
 use crate::report::table::{Lines, labelled};
-use crate::report::words::{equilibrium_of_index, headline, shooting};
+use crate::report::{Reported, equilibrium_of_index, headline, shooting};
+use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH};
-use leafdyn::study::ShootingSolution as Solution;
-use leafdyn::study::{Check, Place, Quantity, Verdict};
+use leafdyn::study::{Check, Place, Quantity, ShootingSolution as Solution, Verdict};
 
 impl Reported for Check {
     fn heading(&self) -> String {

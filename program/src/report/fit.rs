@@ -1,13 +1,13 @@
 //! The text report of a fit, and its table.
 
-use std::io::{self, Write};
-use std::path::Path;
-
 use crate::report::Reported;
 use crate::report::numbers::{brief, counted, in_unit_of_key, rounded_to, seconds};
 use crate::report::table::{Lines, labelled, text_cell};
 use leafdyn::scenario::Units;
 use leafdyn::study::{DataFile, Fit, FitOutcome, FitParameter, FitResidual};
+use std::io;
+use std::io::Write;
+use std::path::Path;
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;

@@ -1,14 +1,13 @@
 //! A map as text, and its rows as CSV.
 
-use std::fmt::Write as _;
-use std::io::{self, Write};
-
-use crate::report::Reported;
 use crate::report::numbers::{brief, in_unit, in_unit_of_key, seconds};
 use crate::report::table::{Lines, append_csv, labelled, text_cell};
-use crate::report::words::map_shows;
+use crate::report::{Reported, map_shows};
 use leafdyn::scenario::Units;
 use leafdyn::study::{Map, MapOutcome, MapRow};
+use std::fmt::Write as _;
+use std::io;
+use std::io::Write;
 
 /// The columns after those of the varied keys.
 const COLUMNS: &str = "method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,\

@@ -1,38 +1,37 @@
 //! Output of results: as lines on the console, as rows of tables, as JSON.
+//!
+//! JSON, for scripts: compact, numbers that are not finite as null.
+//!
+//! Phrases about results that figures and the command line share.
 
-mod blade;
-mod centerlines;
 mod chart;
 mod check;
-mod equilibria;
 mod fit;
-pub mod json;
 mod map;
-mod margin;
-pub mod numbers;
+pub(crate) mod numbers;
 mod relax;
 #[cfg(test)]
-pub mod sample;
+pub(crate) mod sample;
 mod simulate;
-pub mod table;
+pub(crate) mod table;
 mod trace;
-pub mod words;
 
-use std::io;
-use std::path::Path;
-
-use serde::Serialize;
-
+pub use crate::report::chart::{chart_table, scaling_table};
+pub use crate::report::fit::{fitted, table as fit_table};
+pub use crate::report::map::{MapWork, map_table};
 use crate::report::table::{Lines, labelled};
-use leafdyn::scenario::{Scenario, Units, printable};
-
-pub use centerlines::{centerlines, modes_table, sensitivity_table};
-pub use chart::{chart_table, scaling_table};
-pub use fit::{fitted, table as fit_table};
-pub use map::{MapWork, map_table};
-pub use trace::{
+pub use crate::report::table::{centerlines, modes_table, sensitivity_table};
+pub use crate::report::trace::{
     boundary_table, error_location, is_special, passes_crossings, sides, slope_unit, trace_table,
 };
+use leafdyn::relax::{Equilibrium, Method, Outcome};
+use leafdyn::scenario::{Scenario, Units, printable};
+use leafdyn::study::{BranchEnd as End, Contender, MapShow, Stuck, Verdict};
+use serde::Serialize;
+use serde_json::ser::Formatter;
+use std::io;
+use std::io::Write;
+use std::path::Path;
 
 /// A result with a report: labelled lines under a heading.
 pub trait Reported {
@@ -149,5 +148,161 @@ impl FileError {
     /// A file belongs to another run or map, or is damaged.
     pub fn unfit(file: &Path, why: &str) -> Self {
         FileError(format!("{} {why}", file.display()))
+    }
+}
+
+/// Writes the whole file. Numbers that are not finite are null.
+pub fn write_json(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
+    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
+    object.serialize(&mut serializer)?;
+    out.write_all(b"\n")
+}
+
+/// Compact JSON with each key of the outermost object on its own line.
+#[derive(Default)]
+struct Layout {
+    depth: usize,
+}
+
+impl Formatter for Layout {
+    fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        out.write_all(b"{")
+    }
+
+    fn end_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        out.write_all(if self.depth == 0 { b"\n}" } else { b"}" })
+    }
+
+    fn begin_object_key<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> io::Result<()> {
+        if !first {
+            out.write_all(b",")?;
+        }
+        out.write_all(match (self.depth, first) {
+            (1, _) => b"\n  ",
+            (_, true) => b"",
+            (_, false) => b" ",
+        })
+    }
+
+    fn begin_object_value<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        out.write_all(b": ")
+    }
+}
+
+/// How the run ended and what was found, in one phrase.
+pub fn verdict(equilibrium: &Equilibrium) -> String {
+    match equilibrium.outcome {
+        Outcome::Converged => at_rest(equilibrium),
+        Outcome::ConvergedAfterSaddle => {
+            let saddle = equilibrium.stability.saddle.as_ref();
+            let index = saddle.map(|saddle| format!(" of index {}", saddle.negative_eigenvalues));
+            let left = format!(", after leaving a saddle{}", index.unwrap_or_default());
+            at_rest(equilibrium) + &left
+        }
+        Outcome::Saddle => at_rest(equilibrium),
+        Outcome::ToleranceNotReached => {
+            format!("{}, tolerance not reached", at_rest(equilibrium))
+        }
+        Outcome::NotAtRest if equilibrium.method.is_shooting() => "no equilibrium".into(),
+        Outcome::NotAtRest => "not at rest".into(),
+        Outcome::Singular => "singular equations".into(),
+        Outcome::Diverged => "diverged".into(),
+    }
+}
+
+fn at_rest(equilibrium: &Equilibrium) -> String {
+    equilibrium_of_index(equilibrium.stability.negative_eigenvalues)
+}
+
+/// The title of what a map shows.
+pub fn map_shows(show: MapShow) -> &'static str {
+    match show {
+        MapShow::Outcomes => "where methods fail",
+        MapShow::Waves => "waves along the margins",
+    }
+}
+
+/// The kind of equilibrium with this number of negative eigenvalues.
+pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
+    match negative_eigenvalues {
+        Some(0) => "stable equilibrium".into(),
+        Some(index) => format!("unstable equilibrium of index {index}"),
+        None => "equilibrium of unknown stability".into(),
+    }
+}
+
+/// The same in a word or two, of a known index.
+pub fn stable_or_index(index: usize) -> String {
+    match index {
+        0 => "stable".into(),
+        index => format!("index {index}"),
+    }
+}
+
+pub fn shooting(intervals: usize) -> String {
+    match intervals {
+        1 => "single shooting".into(),
+        count => format!("multiple shooting over {count} intervals"),
+    }
+}
+
+/// The verdict of a check, in one phrase.
+pub fn headline(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Agree => "both methods agree",
+        Verdict::Differ => "the methods differ",
+        Verdict::NotCompared(_) => "could not be compared",
+        Verdict::NotIndependent(_) => "not confirmed by an independent solution",
+    }
+}
+
+/// The name of a contender in a chart.
+pub fn contender(contender: Contender) -> &'static str {
+    match (contender.method, contender.one_grid) {
+        (Method::SemiImplicit(_), false) => "semi-implicit, extrapolated",
+        (Method::SemiImplicit(_), true) => "semi-implicit, single grids",
+        (Method::Explicit { .. }, false) => "explicit, extrapolated",
+        (Method::Explicit { .. }, true) => "explicit, single grids",
+        (Method::SingleShooting, _) => "single shooting",
+        (Method::Shooting { .. }, _) => "multiple shooting",
+        (Method::ShootingFromRest { .. }, _) => "shooting from the relaxed leaf",
+    }
+}
+
+/// How a branch ended, in a phrase.
+pub fn branch_end(end: &End) -> &'static str {
+    match end {
+        End::Reached => "to the end of the range",
+        End::Returned => "back to the start of the range",
+        End::Closed => "closed",
+        End::Met => "met",
+        End::MostPoints | End::Enough => "goes on",
+        End::Unstable => "ends: loses its stability",
+        End::Stopped | End::Stuck(Stuck::Stopped) => "goes on: stopped",
+        End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
+        End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
+        End::Stuck(_) => "lost",
+        End::Unverified(_) => "ends: not verified further",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn numbers_keep_every_digit_or_are_null() {
+        let mut leaf = sample::fan(5, 8);
+        leaf.energy = Some(0.1 + 0.2);
+        leaf.accuracy.residual = Some(f64::INFINITY);
+        let mut bytes = Vec::new();
+        write_json(&leaf, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        for line in ["\"energy\": 0.30000000000000004", "\"residual\": null"] {
+            assert!(text.contains(&format!("\n  {line},\n")), "{text}");
+        }
     }
 }

@@ -1,19 +1,28 @@
 //! The text report of a relaxation.
+//!
+//! A blade in the report of a relaxation.
+//!
+//! All equilibria of a leaf, as text.
+//!
+//! The stability margin of a leaf, as text.
 
-use crate::report::Reported;
-use crate::report::blade::blade_lines;
-use crate::report::margin::{margin_lines, tip};
 use crate::report::numbers::{
-    ROUNDING, as_accurate, bound, bound_of_positions, brief, decimals, eigenvalues, grids, in_unit,
-    in_unit_of_key, known, point, rounded_to, seconds, veins,
+    ROUNDING, as_accurate, bound, bound_of_positions, brief, counted, decimals, decimals_within,
+    eigenvalues, grids, in_unit, in_unit_of_key, known, point, rounded_to, seconds, veins,
 };
 use crate::report::table::{Lines, labelled};
-use crate::report::words::{shooting, verdict};
+use crate::report::{Reported, shooting, stable_or_index, verdict};
 use glam::DVec3;
-use leafdyn::largest::largest;
-use leafdyn::relax::{Equilibrium, Event, Mode, Model, Outcome, Path, Sensitivity};
-use leafdyn::scenario::units::{ENERGY, FORCE, LENGTH, RATE, STRESS};
+use leafdyn::numbers::largest;
+use leafdyn::relax::{
+    Barrier, BladeReport, Direction, Equilibrium, Event, Fate, Loss, Margin, Mode, Model, Outcome,
+    Path, Push, Sensitivity,
+};
+use leafdyn::scenario::units::{
+    COUPLE_STIFFNESS, ENERGY, FORCE, FORCE_PER_AREA, LENGTH, MASS, RATE, STRESS,
+};
 use leafdyn::scenario::{Stress, Units};
+use leafdyn::study::{Equilibria, Found};
 use std::f64::consts::TAU;
 
 /// Most modes that are listed.
@@ -330,4 +339,261 @@ fn work(equilibrium: &Equilibrium) -> String {
     format!(
         "{steps} steps, {factorizations} factorisations, {evaluations} force evaluations in {time}"
     )
+}
+
+/// The lines about a blade.
+pub fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
+    let length = |it: f64| in_unit(brief(it), units, LENGTH);
+    let stiffness = |it: f64| in_unit(brief(it), units, COUPLE_STIFFNESS);
+    let mass = |it: f64| match units.grams() {
+        Some(grams) => format!("; its mass is {} g", brief(grams * it)),
+        None => format!("; its mass is {}", in_unit(brief(it), units, MASS)),
+    };
+    let mut lines = vec![format!(
+        "at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
+        length(blade.width),
+        stiffness(blade.bending),
+        stiffness(blade.torsion),
+        blade.mass.map(mass).unwrap_or_default()
+    )];
+    let [a1, a2, a3] = blade.couple_stiffness.map(stiffness);
+    let strip = length(blade.strip_width);
+    lines.push(format!(
+        "each vein there: a strip {strip} wide, torsion {a1}, bending_2 {a2}, bending_3 {a3}"
+    ));
+    if let Some([along, across, normal, fold]) = blade.tissue {
+        let stiffness = |it: f64| in_unit(brief(it), units, FORCE_PER_AREA);
+        let [along, across, normal] = [along, across, normal].map(stiffness);
+        let fold = in_unit(brief(fold), units, FORCE);
+        lines.push(format!(
+            "tissue there: along {along}, across {across}, normal {normal}, fold {fold}"
+        ));
+    }
+    if let Some(least) = blade.least_width {
+        let effect = blade.least_width_effect;
+        let effect = effect.map(|it| bound_of_positions(it, units));
+        let effect = effect.map(|it| format!("; half of that moves it by {it}"));
+        lines.push(format!(
+            "where narrower than {} it is as stiff as there{}",
+            length(least),
+            effect.unwrap_or_default()
+        ));
+    }
+    if let Some(fewer) = blade.half_as_many {
+        let (rods, apart) = (fewer.rods, bound_of_positions(fewer.difference, units));
+        lines.push(format!(
+            "with {rods} veins in place of these it differs by {apart}"
+        ));
+    }
+    lines
+}
+
+impl Reported for Equilibria {
+    fn heading(&self) -> String {
+        let leaf = self.found.first();
+        let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+        format!("{}: {veins}, all shapes", self.scenario)
+    }
+
+    /// The equilibria, lowest energy first.
+    fn lines(&self, units: &Units) -> Lines {
+        let found = self.found.iter().enumerate();
+        let mut lines = labelled(
+            "found",
+            found.map(|(number, found)| equilibrium_line(number, found, units)),
+        );
+        let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
+        let stable = self.found.iter().filter(stable).count();
+        let others = self.found.len() - stable;
+        let failed = match self.failed {
+            0 => String::new(),
+            failed => format!(", {failed} of them without coming to rest"),
+        };
+        let starts = self.starts;
+        let count =
+            format!("{stable} stable and {others} other equilibria from {starts} starts{failed}");
+        lines.push(("starts", count));
+        lines
+    }
+
+    fn work(&self) -> Option<String> {
+        Some(format!("{} in all", seconds(self.wall_seconds)))
+    }
+
+    fn remarks(&self) -> Lines {
+        let more = "there may be more: no number of starts proves that these are all";
+        let remark = labelled("remark", self.remark.clone());
+        [remark, labelled("remark", Some(more.into()))].concat()
+    }
+}
+
+fn equilibrium_line(number: usize, found: &Found, units: &Units) -> String {
+    let leaf = &found.equilibrium;
+    let index = leaf.stability.negative_eigenvalues;
+    let stability = index.map_or("of unknown stability".into(), stable_or_index);
+    let tip = match &leaf.tips[..] {
+        [tip] => {
+            let tip = point(tip.to_array(), decimals(leaf));
+            format!(", tip {}", in_unit(tip, units, LENGTH))
+        }
+        _ => String::new(),
+    };
+    let within = match leaf.accuracy.error_estimate {
+        Some(error) => format!(", within {}", bound_of_positions(error, units)),
+        None => String::new(),
+    };
+    let plain = if found.plain {
+        ", the plain one among them"
+    } else {
+        ""
+    };
+    let starts = counted(found.starts, "start", "starts");
+    let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
+    let energy = in_unit(as_accurate(leaf, energy, energy), units, ENERGY);
+    format!("{number:>2}. energy {energy}: {stability}{tip}{within} ({starts}{plain})")
+}
+
+/// Part of the longest vein to which positions are told that were found on one grid.
+const ON_ONE_GRID: f64 = 1e-3;
+
+/// The lines about a margin of a leaf of this length, the smallest push first.
+pub fn margin_lines(margin: &Margin, length: f64, units: &Units) -> Vec<String> {
+    let lost = margin.pushes.iter().filter(|push| push.force.is_some());
+    let mut lines: Vec<String> = lost
+        .filter(|push| !push.mirrored)
+        .map(|push| destabilizing_push((margin, push), length, units))
+        .collect();
+    lines.extend(stable_directions(margin, units));
+    let unknown = margin.pushes.iter();
+    let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
+    lines.extend(unknown.map(|push| {
+        let why = push.remark.as_deref().unwrap_or_default();
+        let which = directions(margin, push);
+        match push.more_than.filter(|least| *least > 0.0) {
+            Some(least) => {
+                let least = force(units, least);
+                format!(
+                    "a push {which} is known up to {least} only, under which it is stable: {why}"
+                )
+            }
+            None => format!("the effect of a push {which} is not known: {why}"),
+        }
+    }));
+    match &margin.barrier {
+        Some(found) => lines.push(barrier(found, length, units)),
+        None if margin.climbs > 0 => {
+            let what = "no pass to another equilibrium found";
+            lines.push(format!("{what} from {} places", margin.climbs));
+        }
+        None => {}
+    }
+    lines.extend(margin.remark.clone());
+    lines
+}
+
+/// A push under which stability is lost.
+fn destabilizing_push((margin, push): (&Margin, &Push), length: f64, units: &Units) -> String {
+    let error = push.error.unwrap_or(0.0);
+    let exact = push.force.unwrap_or_default();
+    let at = force(units, rounded_to(exact, error));
+    let then = match push.then {
+        Some(Fate::BendsAside) => "makes it bend aside",
+        Some(Fate::Snaps) | None => "snaps it",
+    };
+    let rest = (push.neighbour.as_ref())
+        .map(|it| format!(" to rest with tip {}", tip(it.tip, length, units)));
+    let within = push.error.map(|error| in_unit(bound(error), units, FORCE));
+    let within = within.map(|error| format!(", within {error}"));
+    let weights = push.per_weight.map(|part| {
+        let part = rounded_to(part, part * error / exact);
+        format!(" ({} weights)", brief(part))
+    });
+    let place = match margin.every_tip {
+        true => "at every tip",
+        false => "at the tip",
+    };
+    format!(
+        "a push of {at} {} {place} {then}{}{}{}",
+        directions(margin, push),
+        rest.unwrap_or_default(),
+        within.unwrap_or_default(),
+        weights.unwrap_or_default(),
+    )
+}
+
+/// Directions in which the leaf stays stable up to the largest push.
+fn stable_directions(margin: &Margin, units: &Units) -> Option<String> {
+    let none = margin.pushes.iter();
+    let none = none.filter(|push| push.kind == Loss::NoneUpTo);
+    let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
+    let largest = force(units, margin.largest_push?);
+    (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
+}
+
+fn barrier(barrier: &Barrier, length: f64, units: &Units) -> String {
+    let energy = rounded_to(barrier.energy, barrier.error.unwrap_or(0.0));
+    let energy = in_unit(brief(energy), units, ENERGY);
+    let error = barrier
+        .error
+        .map(|error| in_unit(bound(error), units, ENERGY));
+    let error = error.map(|error| format!(" within {error}"));
+    let lifted = barrier.height.map(|height| {
+        let height = in_unit(brief(height), units, LENGTH);
+        format!(", as the leaf lifted by {height}")
+    });
+    format!(
+        "barrier of {energy}{}{}, over a saddle with tip {} to rest with tip {}",
+        error.unwrap_or_default(),
+        lifted.unwrap_or_default(),
+        tip(barrier.saddle.tip, length, units),
+        tip(barrier.neighbour.tip, length, units),
+    )
+}
+
+pub fn tip(tip: DVec3, length: f64, units: &Units) -> String {
+    let tip = point(tip.to_array(), decimals_within(ON_ONE_GRID * length));
+    in_unit(tip, units, LENGTH)
+}
+
+fn force(units: &Units, force: f64) -> String {
+    in_unit(brief(force), units, FORCE)
+}
+
+/// The direction of a push, with that of its mirror image.
+fn directions(margin: &Margin, push: &Push) -> String {
+    let image = push.direction.opposite();
+    let mut pushes = margin.pushes.iter();
+    match pushes.any(|other| other.mirrored && other.direction == image) {
+        true => format!("{} ({} or {image})", word(push.direction), push.direction),
+        false => format!("{} ({})", word(push.direction), push.direction),
+    }
+}
+
+fn word(direction: Direction) -> &'static str {
+    match (direction.axis, direction.negative) {
+        (0, false) => "forwards",
+        (0, true) => "backwards",
+        (1, _) => "sideways",
+        (_, false) => "upwards",
+        (_, true) => "downwards",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A position found on one grid has three digits whatever the unit of length.
+    #[test]
+    fn positions_on_one_grid_have_digits_of_the_leaf() {
+        let at = |unit: f64| {
+            tip(
+                DVec3::new(1.2345, 0.0, -0.5) * unit,
+                1.5 * unit,
+                &Units::default(),
+            )
+        };
+        assert_eq!(at(1.0), "(1.23, 0, -0.50)");
+        assert_eq!(at(1e-3), "(0.00123, 0, -0.00050)");
+    }
 }

@@ -2,16 +2,16 @@
 //! motion, and made-up studies of it.
 
 use glam::{DQuat, DVec3};
-
-use leafdyn::relax::{self, Equilibrium, Method, Outcome};
+use leafdyn::relax::{Equilibrium, Method, Outcome};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
-use leafdyn::simulate::{self, Frame, Moment, Record, Simulation, Still, stills};
+use leafdyn::simulate::{Frame, Moment, Record, Simulation, Still, stills};
 use leafdyn::study::{
-    Base, Chart, Check, Confidence, Ending, Map, MapMethod, MapOutcome, MapRequest, MapRow, Peer,
-    Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
+    Base, Chart, Check, Confidence, Ending, Map, MapMethod, MapOutcome, MapRequest, MapRow,
+    Neutral, Peer, Reference, Row, Scaling, ScalingRow, Setting, ShootingSolution as Solution,
+    Shot, Spread,
 };
-use leafdyn::study::{Neutral, ShootingSolution as Solution};
+use leafdyn::{relax, simulate};
 
 /// The scenario of most samples.
 pub fn scenario(name: &str, rods: usize) -> Scenario {

@@ -5,7 +5,7 @@ use crate::report::numbers::{
     bound_of_positions, brief, in_unit, known, point, power_of_ten, rounded_to, seconds, veins_of,
 };
 use crate::report::table::{Lines, labelled};
-use leafdyn::largest::{larger, largest};
+use leafdyn::numbers::{larger, largest};
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{ENERGY, LENGTH, TIME};
 use leafdyn::simulate::{Reason, Record};
@@ -136,6 +136,7 @@ fn speed(record: &Record) -> String {
 mod tests {
     use super::*;
     use crate::report::sample;
+
     use leafdyn::simulate::Stopped;
 
     /// The balance has the digits that its change leaves, and what is rounding is none.

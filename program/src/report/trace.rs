@@ -1,17 +1,11 @@
 //! A trace, and a boundary, as text and as rows of CSV: every point of every branch or curve.
 
-use std::io::{self, Write};
-
-use serde::Serialize;
-
-use super::numbers;
-use crate::report::Reported;
 use crate::report::numbers::{
     ROUNDING, bound_of_positions, brief, decimals_within, in_unit, known, power_of_ten, rounded_to,
     seconds, short, veins_of,
 };
 use crate::report::table::{Lines, csv_without_header, header, labelled};
-use crate::report::words::{branch_end, stable_or_index};
+use crate::report::{Reported, branch_end, numbers, stable_or_index};
 use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH};
@@ -19,6 +13,9 @@ use leafdyn::study::{
     Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd as End, Doubt, Law, PointKind,
     Stuck, Trace, TraceBranch, TracePoint,
 };
+use serde::Serialize;
+use std::io;
+use std::io::Write;
 
 /// `value` is that of the varied number. Branches and points are numbered from 1. The tip is
 /// the joint one, or the first rod's.

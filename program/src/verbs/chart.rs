@@ -1,17 +1,15 @@
 //! `leafdyn chart`: charts speed against accuracy.
 
-use std::path::PathBuf;
-
-use super::help::FOR_EXPERTS;
-use super::job::{Delivered, Job};
-use super::progress::fraction_of;
-use super::request::{Request, VerbTraits, words};
-use super::{Refusal, Status};
 use crate::files;
-use crate::report::words::contender;
+use crate::report::contender;
+use crate::verbs::help::FOR_EXPERTS;
+use crate::verbs::progress::fraction_of;
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
+use crate::verbs::{Refusal, Status};
 use clap::{Args, ValueHint};
-use leafdyn::relax;
-use leafdyn::study::{self, Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
+use leafdyn::study::{Chart as Charted, ChartOptions, Contender, Keys, Turn, VaryError};
+use leafdyn::{relax, study};
+use std::path::PathBuf;
 
 /// Measure every method over its own accuracy, and chart time against true error.
 ///

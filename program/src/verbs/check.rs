@@ -1,10 +1,10 @@
 //! `leafdyn check`: compares the shapes found by two independent methods.
 
-use super::job::{Delivered, Job};
-use super::request::{Request, VerbTraits};
-use super::{Refusal, Status};
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
+use crate::verbs::{Refusal, Status};
 use clap::Args;
-use leafdyn::study::{self, Check as Checked, CheckOptions, Verdict};
+use leafdyn::study;
+use leafdyn::study::{Check as Checked, CheckOptions, Verdict};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
 ///

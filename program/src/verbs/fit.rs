@@ -1,19 +1,17 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
-use std::num::NonZeroUsize;
-use std::path::PathBuf;
-
-use super::job::{Delivered, Job};
-use super::progress::{duration, fraction_of};
-use super::request::{Request, VerbTraits};
-use super::{Refusal, Status, note};
+use crate::verbs::progress::{duration, fraction_of};
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
+use crate::verbs::{Refusal, Status, note};
 use clap::{Args, ValueHint};
 use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
+use leafdyn::study;
 use leafdyn::study::{
-    self, Data, Fit as Fitted, FitBudget, FitRequest, FitStep, Free, MeasuredColumn, Reading,
-    RowChoice,
+    Data, Fit as Fitted, FitBudget, FitRequest, FitStep, Free, MeasuredColumn, Reading, RowChoice,
 };
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
 ///

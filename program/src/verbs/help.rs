@@ -1,15 +1,13 @@
 //! `leafdyn new`, `schema`, `completions`, `man`: a scenario to begin with, and descriptions of
 //! the program for editors, shells and readers.
 
-use std::io::ErrorKind;
-use std::path::PathBuf;
-
+use crate::files;
+use crate::verbs::{Cli, Refusal, Status, show, show_report};
 use clap::{Args, CommandFactory, ValueEnum, ValueHint};
 use clap_complete::Shell;
-
-use super::{Cli, Refusal, Status, show, show_report};
-use crate::files;
 use leafdyn::scenario::schema;
+use std::io::ErrorKind;
+use std::path::PathBuf;
 
 /// The heading in the help of options that few need.
 pub const FOR_EXPERTS: &str = "Options for experts";

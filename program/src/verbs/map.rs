@@ -1,17 +1,14 @@
 //! `leafdyn map`: maps where each method fails.
 
+use crate::report;
+use crate::verbs::progress::fraction_of;
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits};
+use crate::verbs::{Interrupted, Refusal, Status};
+use clap::Args;
+use leafdyn::study;
+use leafdyn::study::{CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary};
 use std::sync::Mutex;
 use std::time::Instant;
-
-use super::job::{Delivered, Job};
-use super::progress::fraction_of;
-use super::request::{Request, VerbTraits};
-use super::{Interrupted, Refusal, Status};
-use crate::report;
-use clap::Args;
-use leafdyn::study::{
-    self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
-};
 
 /// What is told of an option that is gone.
 const SHARD: &str = "--shard is gone: give each job a part of the range, as in --vary KEY=1..5:5 and KEY=6..10:5, \

@@ -4,7 +4,6 @@ mod chart;
 mod check;
 mod fit;
 mod help;
-mod job;
 mod map;
 mod progress;
 mod relax;
@@ -12,25 +11,22 @@ mod request;
 mod simulate;
 mod trace;
 
-use std::env;
-use std::error::Error;
-use std::ffi::OsString;
-use std::io::{self, IsTerminal, Write};
-use std::iter::successors;
-use std::process::{self, ExitCode};
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
-use std::time::Duration;
-
+use crate::report::Refused;
+use crate::{files, report};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Parser, Subcommand};
-
-use crate::files;
-use crate::report::{Refused, json};
 use leafdyn::memory::TooMuch;
 use leafdyn::relax::{Limit, RefusedOption};
 use leafdyn::scenario::{ScenarioError, printable};
+use std::error::Error;
+use std::ffi::OsString;
+use std::io::{IsTerminal, Write};
+use std::iter::successors;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use std::{env, io, process, thread};
 
 /// What the program says without a verb.
 const FIRST_HELP: &str = "\
@@ -162,7 +158,7 @@ fn refuse(error: &str, json: bool) -> Status {
 
 fn show_refused(error: &str, exit_status: i32) {
     let mut bytes = Vec::new();
-    if json::write_json(&Refused::new(error, exit_status), &mut bytes).is_ok() {
+    if report::write_json(&Refused::new(error, exit_status), &mut bytes).is_ok() {
         // A failure to report the error cannot be reported.
         let _ = show(&bytes);
     }
@@ -239,7 +235,9 @@ struct Interrupted(&'static str);
 /// The signals that end a run: a closed terminal, Ctrl-C, and a request to end.
 #[cfg(unix)]
 const SIGHUP: i32 = 1;
+
 const SIGINT: i32 = 2;
+
 #[cfg(unix)]
 const SIGTERM: i32 = 15;
 

@@ -1,11 +1,10 @@
 //! A progress line on standard error for long runs.
 
-use std::io::{self, IsTerminal};
-use std::time::{Duration, Instant};
-
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
 use leafdyn::relax::{Correction, Progress};
+use std::io;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
 
 /// Shorter runs show no line, which would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);

@@ -1,15 +1,15 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
-use super::help::FOR_EXPERTS;
-use super::job::{Delivered, Job};
-use super::progress::{ProgressLine, fraction_of};
-use super::request::{Request, VerbTraits, words};
-use super::{Interrupted, Refusal, Status};
 use crate::files::{Kind, LIVE};
 use crate::report::numbers::brief;
+use crate::verbs::help::FOR_EXPERTS;
+use crate::verbs::progress::{ProgressLine, fraction_of};
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
+use crate::verbs::{Interrupted, Refusal, Status};
 use clap::Args;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Route, Settings};
-use leafdyn::study::{self, Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
+use leafdyn::study;
+use leafdyn::study::{Equilibria, Keys, MarginError, MarginProgress, SensitivityError};
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;

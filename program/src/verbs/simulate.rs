@@ -1,11 +1,10 @@
 //! `leafdyn simulate`: follows the motion of a leaf.
 
-use super::job::{Delivered, Job};
-use super::progress::{ProgressLine, duration, fraction_between};
-use super::request::{Request, VerbTraits, words};
-use super::{Interrupted, Refusal, Status, note};
 use crate::files::Recording;
 use crate::report::numbers::brief;
+use crate::verbs::progress::{ProgressLine, duration, fraction_between};
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
+use crate::verbs::{Interrupted, Refusal, Status, note};
 use clap::Args;
 use leafdyn::memory;
 use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
@@ -13,6 +12,7 @@ use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped
 /// Longer simulations, in seconds, are announced with their expected duration, and longer runs on
 /// finer grids.
 const ANNOUNCED: f64 = 60.0;
+
 const FINER_ANNOUNCED: f64 = 5.0;
 
 /// Larger recordings, in bytes, are announced with their expected size.

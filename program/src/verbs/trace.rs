@@ -1,14 +1,14 @@
 //! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
-use super::job::{Delivered, Job};
-use super::progress::fraction_between;
-use super::request::{Request, VerbTraits, words};
-use super::{Interrupted, Refusal, Status};
 use crate::report::numbers::brief;
+use crate::verbs::progress::fraction_between;
+use crate::verbs::request::{Delivered, Job, Request, VerbTraits, words};
+use crate::verbs::{Interrupted, Refusal, Status};
 use clap::Args;
+use leafdyn::study;
 use leafdyn::study::{
-    self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest,
-    TraceShow, TraceUntil, Vary,
+    Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, TraceShow,
+    TraceUntil, Vary,
 };
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.

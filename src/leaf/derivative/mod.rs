@@ -1,24 +1,27 @@
 //! The derivative of a leaf with respect to a number of its scenario: of its forces in a given
 //! state, and of its energy. Exact except for the finite differences of scenarios that define
 //! the number's effect on the scenario itself.
+//!
+//! Bases: their motion, and its effect where clamps hold them.
+//!
+//! The forces by which a parameter change unbalances a leaf, and the linear response to them.
+//!
+//! What depends on the leaf as a whole, or on its natural state: tissue, and loads of single veins.
+//! Their changes are weighted sums over leaves that differ in the number.
+//!
+//! Dead moments on a single rod that change.
 
-mod bases;
-mod forces;
-mod held;
-mod leaves;
-mod moments;
+mod supports;
 
-use crate::leaf::derivative::bases::base_rate;
-pub use crate::leaf::derivative::forces::{Forces, Response};
-use crate::leaf::derivative::held::HeldRate;
-use crate::leaf::derivative::leaves::{leaves, rest_rates};
-use crate::leaf::derivative::moments::moment_rates;
-use crate::leaf::dimensionless::Leaf;
+use crate::leaf::Leaf;
+use crate::leaf::derivative::supports::HeldRate;
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{Field, State, add};
-use crate::rod::{Blocks, Section, SectionRate, Segment};
+use crate::leaf::state::{Field, Increment, State, add};
+use crate::rod::{Blocks, Section, SectionRate, Segment, Strip};
+use crate::rotation;
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The derivative of a leaf: weighted sums over scenarios that differ in the number, with
 /// weights that add up to zero.
@@ -135,7 +138,7 @@ impl<'s> LeafRate<'s> {
 
 impl LeafRate<'_> {
     /// The rate of displacement of the hinge of rod `j`.
-    pub(in crate::leaf::derivative) fn of_hinge(&self, j: usize) -> DVec3 {
+    fn of_hinge(&self, j: usize) -> DVec3 {
         self.rods[j].hinge
     }
 
@@ -353,4 +356,297 @@ pub fn at_constant_force(segment: &Segment, section: &Section) -> Blocks {
         condensing: DVec3::ZERO,
         ..*section
     })
+}
+
+impl DiscreteLeaf {
+    /// Adds the effect of displacing and rotating a clamped base.
+    fn add_base_motion(
+        &self,
+        state: &State,
+        segments: &[Segment],
+        j: usize,
+        [shift, turn]: [DVec3; 2],
+        forces: &mut Forces,
+    ) {
+        let n = self.segments();
+        let section = self.section(j, 0);
+        let segment = &segments[j * n];
+        let k = at_constant_force(segment, section);
+        add(
+            &mut forces.on_nodes(j, n)[0],
+            k.xb.transpose() * shift - k.ab.transpose() * turn,
+            k.xx * shift - k.xa * turn,
+        );
+        forces.on_gaps(j, n)[0] += segment.gap_increment(section, -shift, turn, DVec3::ZERO);
+        let ((g_x, g_a, _), load) = (segment.gradient(section), self.load(state, j, 0));
+        forces.energy += (g_a - load.moment).dot(turn) - (g_x + load.force).dot(shift);
+    }
+}
+
+/// The derivatives of the position and of the rotation of the base of rod `j`.
+fn base_rate(terms: &[(f64, Scenario)], j: usize, length: f64) -> [DVec3; 2] {
+    let (first, turned) = terms[0].1.base(j);
+    let mut rate = [DVec3::ZERO; 2];
+    for (weight, scenario) in terms {
+        let (x, q) = scenario.base(j);
+        rate[0] += *weight * (x - first) / length;
+        rate[1] += *weight * rotation::log(q * turned.conjugate());
+    }
+    rate
+}
+
+/// The effect of a parameter change in a fixed state. Unaffected rods have no entries.
+#[derive(Clone, Debug)]
+pub struct Forces {
+    /// On the unbalanced forces at the nodes.
+    pub nodes: Field,
+    /// On the gaps of the segments (residuals of their constitutive laws).
+    pub gaps: Vec<Vec<DVec3>>,
+    /// On the energy.
+    pub energy: f64,
+    /// Increments of held nodes. Rods on which it moves none have no entries.
+    pub moved: Field,
+}
+
+/// The linear response of a leaf to forces.
+#[derive(Clone, Debug)]
+pub struct Response {
+    /// Increments of the nodes.
+    pub nodes: Field,
+    /// Changes of the spatial forces of the segments, rod after rod.
+    pub carried: Vec<DVec3>,
+}
+
+impl Forces {
+    /// Zero, for `rods` rods.
+    pub fn zeros(rods: usize) -> Forces {
+        Forces {
+            nodes: vec![Vec::new(); rods],
+            gaps: vec![Vec::new(); rods],
+            energy: 0.0,
+            moved: vec![Vec::new(); rods],
+        }
+    }
+
+    /// The forces on the nodes of rod `j`, of which `count` have equations.
+    pub fn on_nodes(&mut self, j: usize, count: usize) -> &mut [Increment] {
+        let nodes = &mut self.nodes[j];
+        nodes.resize(count, [0.0; 6]);
+        nodes
+    }
+
+    /// The effects on the gaps of rod `j`, which has `segments` of them.
+    pub fn on_gaps(&mut self, j: usize, segments: usize) -> &mut [DVec3] {
+        let gaps = &mut self.gaps[j];
+        gaps.resize(segments, DVec3::ZERO);
+        gaps
+    }
+
+    /// Adds `times` other forces.
+    pub fn add(&mut self, times: f64, other: &Forces) {
+        for (j, (nodes, gaps)) in other.nodes.iter().zip(&other.gaps).enumerate() {
+            let count = nodes.len().max(self.nodes[j].len());
+            add_nodes(self.on_nodes(j, count), times, nodes);
+            let count = gaps.len().max(self.gaps[j].len());
+            let sums = self.on_gaps(j, count);
+            (sums.iter_mut().zip(gaps)).for_each(|(sum, more)| *sum += times * *more);
+        }
+        self.energy += times * other.energy;
+        for (moved, more) in self.moved.iter_mut().zip(&other.moved) {
+            moved.resize(moved.len().max(more.len()), [0.0; 6]);
+            add_nodes(moved, times, more);
+        }
+    }
+
+    /// Forces on all nodes and effects on all gaps of the rods of `leaf`, zeros included.
+    pub fn dense(&self, leaf: &DiscreteLeaf) -> (Field, Vec<DVec3>) {
+        let (segments, count) = (leaf.segments(), leaf.moving_nodes().len());
+        let mut gaps = vec![DVec3::ZERO; self.gaps.len() * segments];
+        for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {
+            all[..own.len()].copy_from_slice(own);
+        }
+        let rod = |nodes: &Vec<Increment>| match nodes.is_empty() {
+            true => vec![[0.0; 6]; count],
+            false => nodes.clone(),
+        };
+        (self.nodes.iter().map(rod).collect(), gaps)
+    }
+}
+
+impl Response {
+    /// Zero, for the rods of `leaf`.
+    pub fn zeros(leaf: &DiscreteLeaf) -> Response {
+        Response {
+            nodes: vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()],
+            carried: vec![DVec3::ZERO; leaf.rods() * leaf.segments()],
+        }
+    }
+
+    /// Moves a state, but not clamped bases, by `step` times the response.
+    pub fn advance(&self, state: &mut State, step: f64) {
+        for (j, rod) in self.nodes.iter().enumerate() {
+            let first = state.base(j) + state.segments() + 1 - rod.len();
+            for (i, increment) in rod.iter().enumerate() {
+                state.advance(first + i, increment, step);
+            }
+        }
+        let forces = state.n.iter_mut().zip(&self.carried);
+        forces.for_each(|(force, change)| *force += step * *change);
+    }
+
+    /// The increment of node `i` of rod `j` of `leaf`; zero for a clamped base.
+    pub fn of_node(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Increment {
+        let known = i.checked_sub(leaf.first_node());
+        known.map_or([0.0; 6], |k| self.nodes[j][k])
+    }
+
+    /// Adds `times` another response.
+    pub fn add(&mut self, times: f64, other: &Response) {
+        for (sums, more) in self.nodes.iter_mut().zip(&other.nodes) {
+            add_nodes(sums, times, more);
+        }
+        let carried = self.carried.iter_mut().zip(&other.carried);
+        carried.for_each(|(sum, more)| *sum += times * *more);
+    }
+}
+
+fn add_nodes(sums: &mut [Increment], times: f64, more: &[Increment]) {
+    for (sum, more) in sums.iter_mut().zip(more) {
+        (sum.iter_mut().zip(more)).for_each(|(sum, more)| *sum += times * more);
+    }
+}
+
+/// The leaves of neighbouring scenarios with their weights, in the units of this one.
+fn leaves(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Vec<(f64, Leaf)> {
+    let each = terms.iter().map(|(weight, scenario)| {
+        let scenario = Arc::new(scenario.clone());
+        (*weight, Leaf::in_units(scenario, leaf.scale))
+    });
+    each.collect()
+}
+
+/// The changes of the rest strain and the rest curvature of segment `i` of rod `j`.
+fn rest_rates(each: &[(f64, DiscreteLeaf)], j: usize, i: usize) -> [DVec3; 2] {
+    let Some((_, first)) = each.first() else {
+        return [DVec3::ZERO; 2];
+    };
+    let sum = |of: fn(&Section) -> DVec3| -> DVec3 {
+        let own = of(first.section(j, i));
+        each.iter()
+            .map(|(weight, leaf)| *weight * (of(leaf.section(j, i)) - own))
+            .sum()
+    };
+    [sum(|it| it.rest_strain), sum(|it| it.rest_curvature)]
+}
+
+impl DiscreteLeaf {
+    /// The weighted leaves of a rate on this grid.
+    fn each_of(&self, rate: &LeafRate) -> Vec<(f64, DiscreteLeaf)> {
+        let leaves = rate.leaves.iter();
+        leaves
+            .map(|(weight, leaf)| (*weight, DiscreteLeaf::new(leaf, self.grid.clone())))
+            .collect()
+    }
+
+    /// The change of the loads that rod `j` has of its own on its node `i`.
+    fn own_load_rate(&self, rate: &LeafRate, j: usize, i: usize) -> DVec3 {
+        let sigma = self.grid.sigma()[i];
+        let on = |leaf: &Leaf| {
+            let points = leaf.point_loads();
+            let here = points.filter(|(rod, at, _)| (*rod, self.grid.nearest(*at)) == (j, i));
+            let points: DVec3 = here.map(|(_, _, force)| force).sum();
+            self.grid.weight(i) * leaf.own_load(j, sigma) + points
+        };
+        rate.leaves
+            .iter()
+            .map(|(weight, leaf)| *weight * on(leaf))
+            .sum()
+    }
+
+    /// Adds the changes of the loads that veins have of their own, from the weighted leaves of
+    /// which they are the sum.
+    fn add_own_load_changes(
+        &self,
+        state: &State,
+        each: &[(f64, DiscreteLeaf)],
+        forces: &mut Forces,
+    ) {
+        let (n, nodes) = (self.segments(), self.moving_nodes());
+        for (j, i) in self.each(0..n + 1) {
+            let first = each[0].1.own_load(j, i);
+            let changes = each
+                .iter()
+                .map(|(w, leaf)| *w * (leaf.own_load(j, i) - first));
+            let change = self.load_factor * changes.sum::<DVec3>();
+            if change != DVec3::ZERO {
+                forces.energy -= change.dot(state.x[state.base(j) + i]);
+                if nodes.contains(&i) {
+                    let on = &mut forces.on_nodes(j, nodes.len())[i - nodes.start];
+                    add(on, DVec3::ZERO, change);
+                }
+            }
+        }
+    }
+
+    /// Adds the effect of the changes of the tissue, and of its natural state, and of loads of
+    /// single veins: from the weighted leaves of which they are the sum.
+    fn add_tissue_changes(&self, state: &State, each: &[(f64, DiscreteLeaf)], forces: &mut Forces) {
+        let (n, nodes) = (self.segments(), self.moving_nodes());
+        let Some((_, first)) = each.first() else {
+            return;
+        };
+        self.add_own_load_changes(state, each, forces);
+        let (first, each): (_, Vec<_>) = (
+            &first.strips,
+            each.iter().map(|(w, leaf)| (w, &leaf.strips)).collect(),
+        );
+        for (k, own) in first.iter().enumerate() {
+            let mut change = Strip::default();
+            for (weight, strips) in &each {
+                change.add(**weight, &strips[k].minus(own));
+            }
+            if change == Strip::default() {
+                continue;
+            }
+            let (g, i) = (k / (n + 1), k % (n + 1));
+            let (energy, loads) = self.tissue_rates(state, (g, i), &change);
+            forces.energy += energy;
+            for (j, [moment, force]) in [g, g + 1].into_iter().zip(loads) {
+                if nodes.contains(&i) {
+                    let on = &mut forces.on_nodes(j, nodes.len())[i - nodes.start];
+                    add(on, moment, force);
+                }
+            }
+        }
+    }
+}
+
+/// Sigma and derivative of every dead moment that changes, over a unit.
+fn moment_rates(terms: &[(f64, Scenario)], unit: f64) -> Vec<(f64, DVec3)> {
+    let rate = |moment: &dyn Fn(&Scenario) -> [f64; 3]| {
+        DVec3::from_array([0, 1, 2].map(|axis| change(terms, &|s| moment(s)[axis]))) / unit
+    };
+    let points = terms[0].1.points.iter().enumerate();
+    let on_points = points.map(|(k, point)| (point.at, rate(&|s| s.points[k].moment)));
+    let all = std::iter::once((1.0, rate(&|s| s.tip_moment))).chain(on_points);
+    all.filter(|(_, moment)| *moment != DVec3::ZERO).collect()
+}
+
+impl LeafRate<'_> {
+    /// Whether dead moments change.
+    pub fn changes_moments(&self) -> bool {
+        !self.moments.is_empty()
+    }
+}
+
+impl DiscreteLeaf {
+    /// Adds the changes of dead moments.
+    fn add_moment_changes(&self, rate: &LeafRate, forces: &mut Forces) {
+        for (sigma, moment) in &rate.moments {
+            let nodes = forces.on_nodes(0, self.moving_nodes().len());
+            if let Some(i) = self.grid.nearest(*sigma).checked_sub(self.first_node()) {
+                add(&mut nodes[i], self.load_factor * *moment, DVec3::ZERO);
+            }
+        }
+    }
 }

@@ -1,21 +1,22 @@
 //! The whole matrix of the leaf factorised directly, whatever the signs of its eigenvalues: for the
 //! Morse index, for modes, and for Newton's method at a saddle.
+//!
+//! Numbering of the unknowns, and positions of the matrix entries, in the sparse
+//! factorisation.
 
-mod condensed;
 mod sparse;
-mod sweep;
 #[cfg(test)]
 mod tests;
-mod unknowns;
-mod vein;
+mod veinwise;
 
-use super::state::{Field, Increment};
-use super::system::System;
+use crate::leaf::block_tridiagonal::group_and_lane;
+use crate::leaf::direct::sparse::{Cholesky, Sparse, Symbolic};
+use crate::leaf::direct::veinwise::Condensed;
+use crate::leaf::state::{Field, Increment};
+use crate::leaf::system::System;
 use crate::memory;
-use condensed::Condensed;
-use sparse::{Cholesky, Sparse, Symbolic};
+use faer::sparse::SymbolicSparseColMat;
 use std::sync::{Arc, OnceLock};
-use unknowns::{Unknowns, entries};
 
 /// Up to so many segments the matrix is factorised vein after vein. Measured with the leaf of Fig. 4:
 /// the sparse factorisation takes 1 to 3 times as long on 32 segments, 2 to 5 times on 8 and 16; its
@@ -288,4 +289,258 @@ impl Factors {
             multipliers: b[unknowns.count..].to_vec(),
         }
     }
+}
+
+/// Blocks of the grid of rods and nodes no larger than this are not dissected.
+const DISSECTION_LEAF: usize = 4;
+
+/// Of a block this many times wider than it is long, in unknowns, the rods are eliminated one
+/// after the other.
+const WIDE: f64 = 2.5;
+
+/// The numbering of the unknowns of the nodes.
+pub struct Unknowns {
+    /// The unknowns of node i (from the first with equations) of rod j, at j n + i.
+    numbers: Vec<[usize; 6]>,
+    /// First unknown of the joint tip.
+    pub tip: Option<usize>,
+    /// Nodes of a rod that have equations.
+    pub nodes: usize,
+    /// Number of unknowns.
+    pub count: usize,
+    /// Unknowns of a node that are coupled with those of the next rod.
+    coupled: [bool; 6],
+}
+
+impl Unknowns {
+    /// Ordered by nested dissection of the grid of rods and nodes, the joint tip last, for rods
+    /// of which these unknowns are coupled only.
+    pub fn new(system: &System, coupled: [bool; 6]) -> Self {
+        let (rods, n) = (system.rods(), system.nodes());
+        let mut order = Order {
+            numbers: vec![[0; 6]; rods * n],
+            count: 0,
+            nodes: n,
+            joined: system.joined,
+            coupled,
+        };
+        order.dissect((0, rods), (0, n));
+        let Order {
+            mut numbers,
+            mut count,
+            ..
+        } = order;
+        let tip = system.joined.then_some(count);
+        if let Some(tip) = tip {
+            for last in numbers.iter_mut().skip(n - 1).step_by(n) {
+                last[3..].copy_from_slice(&[tip, tip + 1, tip + 2]);
+            }
+            count += 3;
+        }
+        Unknowns {
+            numbers,
+            tip,
+            nodes: n,
+            count,
+            coupled,
+        }
+    }
+
+    /// Component `c` of node `i` (from 0) of rod `j`.
+    pub fn at(&self, j: usize, i: usize, c: usize) -> usize {
+        self.of(j, i)[c]
+    }
+
+    /// All six unknowns of node `i` (from 0) of rod `j`.
+    pub fn of(&self, j: usize, i: usize) -> [usize; 6] {
+        self.numbers[j * self.nodes + i]
+    }
+
+    /// Adds the forces on a node to a vector of all unknowns.
+    pub fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
+        for c in 0..6 {
+            all[self.at(j, i, c)] += forces[c];
+        }
+    }
+
+    /// The values at all nodes, from a vector of all unknowns.
+    pub fn field(&self, all: &[f64]) -> Field {
+        let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
+        let rods = self.numbers.chunks_exact(self.nodes).enumerate();
+        rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
+            .collect()
+    }
+}
+
+/// The numbering, as far as it has come.
+struct Order {
+    numbers: Vec<[usize; 6]>,
+    count: usize,
+    nodes: usize,
+    joined: bool,
+    coupled: [bool; 6],
+}
+
+impl Order {
+    /// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
+    /// first, then the line between them. A rod is separated from its neighbours by the
+    /// unknowns that are coupled to theirs alone: its others precede these.
+    fn dissect(&mut self, rods: (usize, usize), nodes: (usize, usize)) {
+        let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
+        let axes = self.coupled.iter().filter(|&&coupled| coupled).count();
+        let (across, along) = (6 * width, axes * length);
+        if width == 0 || length == 0 {
+        } else if width == 1 {
+            self.bisect(rods.0, nodes, |_| true);
+        } else if width * length <= DISSECTION_LEAF {
+            for j in rods.0..rods.1 {
+                (nodes.0..nodes.1).for_each(|i| self.number(j, i, |_| true));
+            }
+        } else if across as f64 >= WIDE * along as f64 {
+            (rods.0..rods.1).for_each(|j| self.separate(j, nodes));
+        } else if across > along {
+            let middle = rods.0 + width / 2;
+            self.dissect((rods.0, middle), nodes);
+            self.dissect((middle + 1, rods.1), nodes);
+            self.separate(middle, nodes);
+        } else {
+            let middle = nodes.0 + length / 2;
+            self.dissect(rods, (nodes.0, middle));
+            self.dissect(rods, (middle + 1, nodes.1));
+            (rods.0..rods.1).for_each(|j| self.number(j, middle, |_| true));
+        }
+    }
+
+    /// A rod's own unknowns, then those that are coupled.
+    fn separate(&mut self, j: usize, nodes: (usize, usize)) {
+        let coupled = self.coupled;
+        let is_coupled = |c: usize| coupled[c];
+        self.bisect(j, nodes, |c| !is_coupled(c));
+        (nodes.0..nodes.1).for_each(|i| self.number(j, i, is_coupled));
+    }
+
+    /// Nested dissection of the nodes of a rod, some components of each.
+    fn bisect(&mut self, j: usize, nodes: (usize, usize), some: impl Fn(usize) -> bool + Copy) {
+        if nodes.0 == nodes.1 {
+            return;
+        }
+        let middle = nodes.0 + (nodes.1 - nodes.0) / 2;
+        self.bisect(j, (nodes.0, middle), some);
+        self.bisect(j, (middle + 1, nodes.1), some);
+        self.number(j, middle, some);
+    }
+
+    /// Some components of a node; not those of the joint tip, which follows.
+    fn number(&mut self, j: usize, i: usize, some: impl Fn(usize) -> bool) {
+        let own = match self.joined && i + 1 == self.nodes {
+            true => 3,
+            false => 6,
+        };
+        for c in (0..own).filter(|&c| some(c)) {
+            self.numbers[j * self.nodes + i][c] = self.count;
+            self.count += 1;
+        }
+    }
+}
+
+/// Calls `add` with row, column and value of the entries of one triangle of K and its border, some
+/// of them in several parts: the same positions in the same order for all systems of a pattern.
+pub fn entries(
+    system: &System,
+    unknowns: &Unknowns,
+    border: &[Field],
+    first_border: usize,
+    shift: f64,
+    mut add: impl FnMut(usize, usize, f64),
+) {
+    let n = system.nodes();
+    for j in 0..system.rods() {
+        let (group, lane) = group_and_lane(j);
+        let chain = &system.groups[group].matrix;
+        for i in 0..n {
+            let (own, next) = chain.blocks(i, lane);
+            let mass = system.mass(j, i);
+            let (here, ahead) = (unknowns.of(j, i), unknowns.of(j, (i + 1).min(n - 1)));
+            for r in 0..6 {
+                add(here[r], here[r], shift * mass[r / 3]);
+                for c in r..6 {
+                    add(here[r], here[c], own[r][c]);
+                }
+                for c in 0..if i + 1 < n { 6 } else { 0 } {
+                    add(here[r], ahead[c], next[r][c]);
+                }
+            }
+            if let Some(spring) = system.spring(j, i)
+                && (unknowns.tip.is_none() || i + 1 < n)
+            {
+                let other = unknowns.of(j + 1, i);
+                for c in (0..3).filter(|&c| unknowns.coupled[3 + c]) {
+                    add(here[3 + c], other[3 + c], -spring[c]);
+                }
+            }
+            if let Some(across) = system.across(j, i) {
+                let other = unknowns.of(j + 1, i);
+                for (r, row) in across.iter().enumerate() {
+                    for (c, value) in row.iter().enumerate() {
+                        // The displacement of a joint tip meets itself, in either order.
+                        let both = if here[r] == other[c] { 2.0 } else { 1.0 };
+                        add(here[r], other[c], both * value);
+                    }
+                }
+            }
+        }
+        for (k, row) in border.iter().enumerate() {
+            for (i, forces) in row[j].iter().enumerate() {
+                for (at, force) in unknowns.of(j, i).into_iter().zip(forces) {
+                    add(at, first_border + k, *force);
+                }
+            }
+        }
+    }
+    for k in 0..border.len() {
+        add(first_border + k, first_border + k, 0.0);
+    }
+}
+
+/// The pattern of a lower triangle with entries in these columns and rows, possibly repeated,
+/// and the position of each of them in it.
+pub fn lower_triangle(
+    size: usize,
+    entries: &[[usize; 2]],
+) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
+    // Sorted by rows and then, in this order, by columns: the rows of each column ascend.
+    let sorted = |by: usize, order: &mut dyn Iterator<Item = usize>| {
+        let mut ends = vec![0; size + 1];
+        entries.iter().for_each(|entry| ends[entry[by] + 1] += 1);
+        for k in 0..size {
+            ends[k + 1] += ends[k];
+        }
+        let mut sorted = vec![0; entries.len()];
+        for k in order {
+            let end = &mut ends[entries[k][by]];
+            sorted[*end] = k;
+            *end += 1;
+        }
+        (sorted, ends)
+    };
+    let (by_rows, _) = sorted(1, &mut (0..entries.len()));
+    let (sorted, ends) = sorted(0, &mut by_rows.into_iter());
+    let (mut starts, mut rows) = (vec![0], Vec::<usize>::new());
+    let mut places = vec![0; entries.len()];
+    let mut begin = 0;
+    for &end in &ends[..size] {
+        let column = &sorted[begin..end];
+        begin = end;
+        let start = rows.len();
+        for &k in column {
+            let row = entries[k][1];
+            if rows[start..].last() != Some(&row) {
+                rows.push(row);
+            }
+            places[k] = rows.len() - 1;
+        }
+        starts.push(rows.len());
+    }
+    let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
+    (pattern, places)
 }

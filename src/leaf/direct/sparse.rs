@@ -1,7 +1,6 @@
 //! A sparse symmetric indefinite factorisation, with its unknowns ordered by nested dissection.
 
-use super::DirectError;
-use super::unknowns::{Unknowns, entries, lower_triangle};
+use crate::leaf::direct::{DirectError, Unknowns, entries, lower_triangle};
 use crate::leaf::state::Field;
 use crate::leaf::system::System;
 use crate::memory;

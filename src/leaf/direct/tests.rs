@@ -1,6 +1,6 @@
 //! Factors vein after vein against those of the sparse factorisation, which pivots by blocks.
 
-use super::*;
+use crate::leaf::direct::*;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::scenario::Scenario;
 use glam::DVec3;

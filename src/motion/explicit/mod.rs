@@ -16,37 +16,45 @@
 //! steps have the same length, and a time between two of
 //! them is reached by a shorter step from the earlier one, off the path, to
 //! which the motion returns. The path does not depend on the times asked for.
+//!
+//! Motion to a given time, and snapshots.
+//!
+//! Moments and forces on the nodes besides those of segments, coupling and dead loads: of the
+//! tissue between neighbouring rods, of loads of single rods, and of wind.
+//!
+//! Drag depends on the velocities at the time of the positions. Known are those half a step before,
+//! and half a step before the last step: it takes their linear extrapolation, so that the method
+//! stays of second order.
+//!
+//! Dead moments on a single rod, and their power.
+//!
+//! Work of loads and rest curvatures that vary in time.
+//!
+//! A kick takes the means of the loads over its length, and their work is this impulse times the
+//! mean of the velocities before and after it, whatever the loads are within it. Only
+//! the excess over the loads at time 0 is counted, which have a potential.
 
-mod advance;
-mod applied;
-mod fictitious;
 mod kernel;
-mod moments;
 mod packs;
-mod stable;
+mod stable_step;
 #[cfg(test)]
 mod tests;
-mod work;
 
-pub use stable::StableStep;
-
-use self::applied::Applied;
-use super::energy_balance::{EnergyBalance, Exchange};
-use super::friction::rates;
-use super::method::TimeIntegrator;
-use super::physics::Physics;
-use crate::lanes::widest_arch;
-use crate::largest::largest;
-use crate::leaf::{DiscreteLeaf, Loads, State};
-use crate::limit::Limit;
+use crate::leaf::{DiscreteLeaf, HalfTurn, Loads, State};
+use crate::motion::explicit::kernel::{Array, Block, Forces, Law, Layout, Step};
+use crate::motion::explicit::packs::{Pack, vector};
+pub use crate::motion::explicit::stable_step::StableStep;
+use crate::motion::physics::{Physics, Wind};
+use crate::motion::{
+    EnergyBalance, Exchange, Snapshot, Stopped, TimeIntegrator, Velocity, measure, rates, resolved,
+};
+use crate::numbers::largest;
 use crate::rod::RESOLVED_TURN;
+use crate::run::Limit;
+use crate::simd::widest_arch;
 use glam::{DQuat, DVec3};
-use kernel::{Array, Block, Law, Layout, Step};
-use moments::Moments;
-use packs::{Pack, vector};
 use pulp::Arch;
 use rayon::prelude::*;
-use work::VaryingWork;
 
 /// Part of the stable time step used.
 const SAFETY: f64 = 0.9;
@@ -171,7 +179,7 @@ impl Explicit {
     /// fastest motions of all segments have equal frequencies. Time steps may then be as long
     /// as one, and the leaf is stopped.
     pub fn use_fictitious_masses(&mut self) {
-        let tip = fictitious::masses(&self.leaf, &self.physics, self.layout, &mut self.packs);
+        let tip = stable_step::masses(&self.leaf, &self.physics, self.layout, &mut self.packs);
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
     }
@@ -382,5 +390,408 @@ impl Explicit {
             }
         }
         std::mem::swap(&mut self.positions, &mut self.next);
+    }
+}
+
+/// Part of a step below which differences of time are rounding.
+const NO_TIME: f64 = 1e-9;
+
+/// Advice if energy grows, besides a shorter step.
+const OTHERWISE: &str = "the semi-implicit method";
+
+/// Steps between checks of the bending, which are free, and of the energy.
+const BENDING_CHECKED: usize = 200;
+
+const ENERGY_CHECKED: usize = 2000;
+
+impl Explicit {
+    /// Positions, rotations and segment forces.
+    pub fn now(&mut self) -> State {
+        let rest = self.physics.rest(self.stepped);
+        let (law, layout) = (self.law(rest, false), self.layout);
+        let mut forces = Vec::with_capacity(layout.rods * layout.segments);
+        for (p, pack) in self.packs.iter_mut().enumerate() {
+            self.arch.dispatch(Forces {
+                layout,
+                pack: p,
+                positions: &self.positions,
+                motion: &pack.motion,
+                material: &pack.material,
+                past: &mut pack.past,
+                law,
+                forces: &mut forces,
+            });
+        }
+        let mut state = self.state();
+        state.n = forces.into_iter().map(DVec3::from).collect();
+        state
+    }
+
+    pub(super) fn state(&self) -> State {
+        let n = self.leaf.segments();
+        let nodes = || self.leaf.each(0..=n);
+        let x = nodes().map(|(j, i)| vector(&self.positions, self.layout.at(j, i)));
+        let q = nodes().map(|(j, i)| self.rotation(j, i));
+        State::new(n, x.collect(), q.collect())
+    }
+
+    /// The present state, if the motion is reliable in it.
+    fn judged(&mut self) -> Result<Snapshot, Stopped> {
+        let now = self.snapshot();
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
+        // In the balance rotations are at most pi, as in space.
+        resolved(&self.leaf, self.time, self.largest_turn())?;
+        Ok(now)
+    }
+}
+
+impl TimeIntegrator for Explicit {
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn steps(&self) -> usize {
+        self.steps
+    }
+
+    fn set_limit(&mut self, limit: Limit) {
+        self.limit = limit;
+    }
+
+    fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
+        let h = self.step;
+        loop {
+            // Times are multiples of the step, so that rounding does not accumulate.
+            let next = self.begin.0 + h * (self.steps + 1 - self.begin.1) as f64;
+            if next > until + NO_TIME * h {
+                break;
+            }
+            if self.limit.reached() {
+                return Err(Stopped::Interrupted { time: self.time });
+            }
+            let (exchange, _) = self.kick_and_drift(h);
+            self.balance.add(exchange);
+            self.steps += 1;
+            (self.stepped, self.time) = (next, next);
+            let applied = self.applied.as_ref();
+            if let Some(half_turn) = applied.and_then(|it| it.half_turn(&self.leaf)) {
+                let time = self.time;
+                return Err(Stopped::HalfTurn { time, half_turn });
+            }
+            let suspect = self.steps.is_multiple_of(BENDING_CHECKED) && !self.trusted();
+            if suspect || self.steps.is_multiple_of(ENERGY_CHECKED) {
+                self.judged()?;
+            }
+        }
+        self.time = until.max(self.time);
+        self.judged()
+    }
+
+    fn snapshot(&mut self) -> Snapshot {
+        let packs = self.packs.iter();
+        let moving: Vec<_> = packs.map(|p| (p.motion.clone(), p.past.clone())).collect();
+        let past = self.applied.as_ref().map(Applied::past);
+        let path = (self.positions.clone(), moving);
+        let (time, widths, work) = (self.stepped, self.widths, self.work);
+        let mut exchange = Exchange::default();
+        let left = self.time - self.stepped;
+        if left > NO_TIME * self.step {
+            exchange += self.kick_and_drift(left).0;
+        }
+        self.stepped = self.time;
+        exchange += self.kick(0.0, 0.0, false).0;
+        exchange.work += self.work_now();
+        let state = self.now();
+        let places = self.leaf.each(0..=self.leaf.segments());
+        let places = places.map(|(j, i)| self.layout.place(j, i));
+        let velocity: Vec<Velocity> = places.map(|(p, at)| self.packs[p].velocity(at)).collect();
+        self.positions = path.0;
+        for (pack, moving) in self.packs.iter_mut().zip(path.1) {
+            (pack.motion, pack.past) = moving;
+        }
+        if let (Some(applied), Some(past)) = (&mut self.applied, past) {
+            applied.set_past(past);
+        }
+        (self.stepped, self.widths, self.work) = (time, widths, work);
+        let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
+        Snapshot {
+            time: self.time,
+            energy: self.balance.complete(energy, exchange),
+            state,
+            velocity,
+        }
+    }
+}
+
+/// The moments and forces at an instant.
+pub struct Applied {
+    state: State,
+    /// Those of the tissue's strips at the start.
+    alignments: Vec<bool>,
+    nodes: Vec<[DVec3; 2]>,
+    /// Moments and forces, laid out as positions.
+    loads: [[Array; 3]; 2],
+    blown: Option<Blown>,
+}
+
+/// Nodes in wind.
+struct Blown {
+    wind: Wind,
+    forces: Vec<DVec3>,
+    /// Velocities before the last kick, and before the one before it.
+    velocity: Vec<DVec3>,
+    earlier: Vec<DVec3>,
+}
+
+impl Applied {
+    /// Of a leaf that moves from the state `start`; `None` if nothing acts on the nodes besides.
+    pub fn new(
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        start: &State,
+        layout: Layout,
+    ) -> Option<Self> {
+        let wind = Wind::new(leaf, physics);
+        if !leaf.tied() && leaf.loads.own == 0.0 && wind.is_none() {
+            return None;
+        }
+        let array = || Array::zeros(layout.lengths()[0]);
+        let vectors = || std::array::from_fn(|_| array());
+        let state = leaf.natural();
+        let at_rest = || vec![DVec3::ZERO; state.x.len()];
+        Some(Applied {
+            nodes: vec![[DVec3::ZERO; 2]; state.x.len()],
+            alignments: leaf.alignments(start),
+            loads: [vectors(), vectors()],
+            blown: wind.map(|wind| Blown {
+                wind,
+                forces: at_rest(),
+                velocity: at_rest(),
+                earlier: at_rest(),
+            }),
+            state,
+        })
+    }
+
+    /// Moments and forces, laid out as positions.
+    pub fn loads(&self) -> &[[Array; 3]; 2] {
+        &self.loads
+    }
+
+    /// The sum of the forces on all tips.
+    pub fn on_tips(&self, layout: Layout) -> DVec3 {
+        let tips = (0..layout.rods).map(|j| vector(&self.loads[1], layout.at(j, layout.segments)));
+        tips.sum()
+    }
+
+    /// Sets the moments and forces to those of the present positions and rotations, in air of a
+    /// velocity; velocities are extrapolated by `ahead` times their last change.
+    pub fn update(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        (layout, positions): (Layout, &[Array; 3]),
+        packs: &[Pack],
+        (air, ahead): (DVec3, f64),
+    ) {
+        for (j, i) in leaf.each(0..=layout.segments) {
+            let ((p, at), k) = (layout.place(j, i), self.state.base(j) + i);
+            self.state.x[k] = vector(positions, layout.at(j, i));
+            self.state.q[k] = packs[p].rotation(at);
+            if let Some(blown) = &mut self.blown {
+                blown.earlier[k] = blown.velocity[k];
+                blown.velocity[k] = packs[p].moving(at).0;
+            }
+        }
+        self.nodes.fill([DVec3::ZERO; 2]);
+        leaf.add_tissue_loads(&self.state, &mut self.nodes);
+        leaf.add_own_forces(&mut self.nodes);
+        if let Some(blown) = &mut self.blown {
+            let (now, earlier) = (&blown.velocity, &blown.earlier);
+            let velocity = |k: usize| now[k] + ahead * (now[k] - earlier[k]);
+            (blown.wind).set_forces(&self.state, air, velocity, &mut blown.forces);
+            for (node, force) in self.nodes.iter_mut().zip(&blown.forces) {
+                node[1] += *force;
+            }
+        }
+        for (j, i) in leaf.each(0..=layout.segments) {
+            let (at, node) = (layout.at(j, i), self.nodes[self.state.base(j) + i]);
+            for (arrays, load) in self.loads.iter_mut().zip(node) {
+                for (c, array) in arrays.iter_mut().enumerate() {
+                    array[at] = load[c];
+                }
+            }
+        }
+    }
+
+    /// Where sections had passed half a turn against each other when loads were last set.
+    pub fn half_turn(&self, leaf: &DiscreteLeaf) -> Option<HalfTurn> {
+        leaf.half_turn_since(&self.alignments, &self.state)
+    }
+
+    /// Power of the wind at the mean of the velocities before the last kick and of these.
+    pub fn power_of_wind(&self, velocity: impl Fn(usize, usize) -> DVec3) -> f64 {
+        let Some(blown) = &self.blown else { return 0.0 };
+        let nodes = self.state.segments() + 1;
+        let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
+        let power = forces.map(|(k, (force, before))| {
+            force.dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
+        });
+        power.sum()
+    }
+
+    /// The velocities that further motion depends on.
+    pub fn past(&self) -> Vec<DVec3> {
+        (self.blown.as_ref()).map_or(Vec::new(), |blown| blown.velocity.clone())
+    }
+
+    /// Replaces these velocities.
+    pub fn set_past(&mut self, past: Vec<DVec3>) {
+        if let Some(blown) = &mut self.blown {
+            blown.velocity = past;
+        }
+    }
+}
+
+/// The dead moments of a step.
+#[derive(Default)]
+pub struct Moments {
+    /// Nodes and sizes.
+    all: Vec<(usize, DVec3)>,
+    /// Rotations and angular momenta of these nodes before the step.
+    before: Vec<(DQuat, DVec3)>,
+}
+
+impl Moments {
+    /// Nodes and sizes.
+    pub fn all(&self) -> &[(usize, DVec3)] {
+        &self.all
+    }
+
+    /// Takes over those of a step that begins.
+    pub fn begin(
+        &mut self,
+        moments: impl Iterator<Item = (usize, DVec3)>,
+        layout: Layout,
+        packs: &[Pack],
+    ) {
+        self.all.clear();
+        self.all.extend(moments);
+        self.before.clear();
+        for (node, _) in &self.all {
+            let (p, at) = layout.place(0, *node);
+            let pack = &packs[p];
+            self.before.push((pack.rotation(at), pack.moving(at).1));
+        }
+    }
+
+    /// Their power at the mean of the angular momenta before the step and of these.
+    pub fn power(&self, layout: Layout, packs: &[Pack]) -> f64 {
+        let nodes = self.all.iter().zip(&self.before);
+        let power = nodes.map(|((node, moment), (rotation, before))| {
+            let (p, at) = layout.place(0, *node);
+            let momentum = 0.5 * (*before + packs[p].moving(at).1);
+            moment.dot(packs[p].spin(at, *rotation, momentum))
+        });
+        power.sum()
+    }
+}
+
+/// What the work of varying loads and rest curvatures depends on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VaryingWork {
+    /// Loads and factor of the rest curvatures at time 0.
+    loads: Loads,
+    rest: f64,
+    /// Twice the energy of bending from the rest curvatures to none.
+    straightening: f64,
+    /// At the last kick: half the impulse of the factor's excess, and the sum of the
+    /// rest curvatures times the moments without them.
+    half_impulse: f64,
+    turned: f64,
+    /// Rate of that sum before the last kick.
+    rate: f64,
+}
+
+impl VaryingWork {
+    pub(super) fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Self {
+        let straightening = leaf.sections.iter().map(|section| {
+            let rest = section.rest_curvature;
+            section.ds * rest.dot(section.couple_stiffness * rest)
+        });
+        VaryingWork {
+            loads: physics.loads(0.0),
+            rest: physics.rest(0.0),
+            straightening: straightening.sum(),
+            half_impulse: 0.0,
+            turned: 0.0,
+            rate: 0.0,
+        }
+    }
+
+    /// Work since the last kick, `width` ago, by the mean factors of the rest curvatures in that
+    /// kick and, over `length`, in this one; `bent` is the sum of the rest curvatures
+    /// times the present moments.
+    pub(super) fn of_rest(&mut self, mean: f64, bent: f64, length: f64, width: f64) -> f64 {
+        let turned = bent + mean * self.straightening;
+        let half_impulse = 0.5 * length * (mean - self.rest);
+        self.rate = match width > 0.0 {
+            true => (turned - self.turned) / width,
+            false => 0.0,
+        };
+        let work = (self.half_impulse + half_impulse) * self.rate;
+        (self.half_impulse, self.turned) = (half_impulse, turned);
+        work
+    }
+}
+
+impl Explicit {
+    /// Power of the excess of `loads` over those at time 0, at the present velocities.
+    pub(super) fn power(&self, loads: &Loads) -> f64 {
+        match self.physics.loads_change() {
+            true => self.excess(loads, |j, i| self.moving(j, i).0),
+            false => 0.0,
+        }
+    }
+
+    /// Present potential of the excess of loads and rest curvatures over those at time 0: it
+    /// is in the energies, but does not come from the motion.
+    pub(super) fn work_now(&self) -> f64 {
+        let mut work = 0.0;
+        if self.physics.loads_change() {
+            let loads = self.physics.loads(self.time);
+            work -= self.excess(&loads, |j, i| vector(&self.positions, self.layout.at(j, i)));
+        }
+        if self.physics.rest_changes() {
+            let VaryingWork {
+                rest: first,
+                straightening,
+                half_impulse,
+                turned,
+                rate,
+                ..
+            } = self.work;
+            let rest = self.physics.rest(self.time);
+            // The rate after the last kick is nearly that before it.
+            work += half_impulse * rate;
+            work += (first - rest) * turned;
+            work += 0.5 * (rest * rest - first * first) * straightening;
+        }
+        work
+    }
+
+    /// Sum of the excess of `loads` over those at time 0, times vectors of the nodes.
+    fn excess(&self, loads: &Loads, vectors: impl Fn(usize, usize) -> DVec3) -> f64 {
+        let excess = *loads - self.work.loads;
+        let mut sum = 0.0;
+        for j in 0..self.layout.rods {
+            for i in 0..=self.layout.segments {
+                let (p, at) = self.layout.place(j, i);
+                sum += self.packs[p].weight(at) * excess.gravity.dot(vectors(j, i));
+            }
+            if j == 0 || !self.leaf.leaf.joined() {
+                sum += excess.tip_force.dot(vectors(j, self.layout.segments));
+            }
+        }
+        sum
     }
 }

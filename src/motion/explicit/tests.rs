@@ -1,6 +1,6 @@
-use super::*;
 use crate::leaf::{Grid, Leaf};
-use crate::motion::energy_balance::resolved;
+use crate::motion::explicit::*;
+use crate::motion::resolved;
 use crate::relax::start;
 use crate::scenario::Scenario;
 use std::collections::HashSet;

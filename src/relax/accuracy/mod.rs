@@ -1,8 +1,582 @@
 //! How accurate a leaf at rest is: extrapolation, defects, and the leaf between its nodes.
+//!
+//! An equilibrium on nested grids: the leaf on each of them, their extrapolation with its bar, and
+//! the Morse index.
+//!
+//! It is a value: on a finer grid another one takes its place. Whoever needs the leaf more
+//! accurately, or surer of its index, asks [`grids`](crate::relax::grids) for that.
+//!
+//! The error of an equilibrium on nested grids, from these and from the defect on them.
+//!
+//! A leaf on one grid, and from grid to grid: prolongation and prediction.
+//!
+//! A leaf at rest on one grid.
 
-pub mod defect;
-pub mod dense_output;
-pub mod jump_response;
-pub mod nodal_fields;
-pub mod richardson;
-pub mod steps;
+pub(crate) mod defect;
+pub(crate) mod fields;
+pub(crate) mod richardson;
+pub(crate) mod transfer;
+
+use crate::leaf::{
+    DiscreteLeaf, Grid, Leaf, RodFields, State, System, whole_changes, whole_fields, whole_of,
+};
+use crate::memory;
+use crate::newton::{Contraction, Stop, Work};
+use crate::numbers::larger;
+use crate::relax::accuracy::defect::{Estimate, Linear};
+use crate::relax::accuracy::fields::finer_nodes;
+use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::accuracy::transfer::{Stencil, weights};
+use crate::relax::path::Path;
+use crate::relax::request::MAX_NODES;
+use crate::relax::rest::{COARSEST, Problem};
+use crate::relax::saddle::Saddle;
+use glam::DVec3;
+
+/// Segments of the finest grid.
+pub const FINEST: usize = 16_384;
+
+/// Changes of the energy below this part of it, or of the leaf's bending energy, are rounding.
+const ENERGY_NOISE: f64 = 1e-11;
+
+/// Largest number of grids over which the energy is extrapolated: errors on those before, which the
+/// finest have no more, need not be small.
+const ENERGY_GRIDS: usize = 4;
+
+/// A leaf at rest on nested grids.
+pub struct NestedEquilibrium {
+    /// The leaf on each grid, from coarse to fine. Where it failed the last is that of the failure.
+    pub levels: Vec<Level>,
+    /// The positions on all grids.
+    pub table: Richardson,
+    /// Weight of each grid in the extrapolated values.
+    pub weights: Vec<f64>,
+    /// The error of the table's best column where the energy converges otherwise than its order
+    /// indicates: then layers are thinner than the segments, and what they change in positions,
+    /// which is the same on all grids that miss them, is not seen in these.
+    unresolved: f64,
+    /// The error estimated from the defect of the extrapolated values, if it is known, and the
+    /// linear equations for it.
+    pub estimate: Option<Estimate>,
+    pub linear: Option<Linear>,
+    /// Whether its error is within the tolerance; always on a fixed grid.
+    pub keeps_tolerance: bool,
+    /// Negative eigenvalues, as counted on the finest grid.
+    pub index: Option<usize>,
+    /// Whether the lowest eigenvalue is clearly positive.
+    pub clearly_stable: bool,
+    /// Factor on the error estimate of a leaf that is beside a bifurcation: see
+    /// [`Lowest::softening`](crate::relax::eigenvalues::Lowest::softening).
+    pub softening: f64,
+    /// Rods solved for.
+    pub solved: usize,
+    /// Whether a grid was added for the nodes of the finest one.
+    pub added_for_nodes: bool,
+    /// Whether the leaf moved far from its start, and to no equilibrium on two grids.
+    pub unconfirmed: bool,
+    /// How the leaf came to where it is, if that is known.
+    pub path: Option<Path>,
+    /// How it came to rest on its grids.
+    pub history: History,
+    /// The work for it.
+    pub work: Work,
+    /// The tolerance to which it is meant.
+    tolerance: f64,
+    /// Whether its grid is a requested one.
+    fixed: bool,
+}
+
+/// How a leaf came to rest on its grids so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct History {
+    /// The last saddle that it left.
+    pub saddle: Option<Saddle>,
+    /// Displacements that would follow from neglecting shear, and stretch.
+    pub effects: [Option<f64>; 2],
+    /// Largest remaining iteration error on any grid.
+    pub remaining: f64,
+    /// Convergence of Newton's method on the grids so far.
+    pub contraction: Contraction,
+    /// Number of pushes off saddles at which the iteration had converged (found by their Morse
+    /// index).
+    pub pushes: i32,
+    /// Distance of the first equilibrium from the start (lengths, radians), and the steps that
+    /// led there.
+    pub from_start: Option<(f64, usize)>,
+    /// Segments of the coarsest grid on which it rests, if there is one.
+    pub coarsest: Option<usize>,
+}
+
+/// Where a leaf was when it failed to come to rest, and why.
+pub struct Failure {
+    pub at: NestedEquilibrium,
+    pub stop: Stop,
+}
+
+/// An equilibrium, or where none was found.
+pub type Found = Result<NestedEquilibrium, Box<Failure>>;
+
+impl Failure {
+    /// On this path.
+    pub fn along(self, path: Option<Path>) -> Self {
+        let at = self.at.along(path);
+        Failure { at, ..self }
+    }
+}
+
+/// What was found on this path, or, without one, on its own.
+pub fn along(found: Found, path: Option<Path>) -> Found {
+    match found {
+        found if path.is_none() => found,
+        Ok(found) => Ok(found.along(path)),
+        Err(failure) => Err(Box::new(failure.along(path))),
+    }
+}
+
+impl NestedEquilibrium {
+    /// On no grid so far.
+    pub fn begun(problem: &Problem) -> Self {
+        NestedEquilibrium {
+            levels: Vec::new(),
+            table: Richardson::default(),
+            weights: Vec::new(),
+            unresolved: 0.0,
+            estimate: None,
+            linear: None,
+            keeps_tolerance: true,
+            index: None,
+            clearly_stable: false,
+            softening: 1.0,
+            solved: problem.leaf.rods(),
+            added_for_nodes: false,
+            unconfirmed: false,
+            path: None,
+            history: History::default(),
+            work: Work::default(),
+            tolerance: problem.tolerance,
+            fixed: problem.segments().is_some(),
+        }
+    }
+
+    /// With the next finer grid.
+    pub fn with(mut self, finest: Level) -> Self {
+        self.levels.push(finest);
+        self.tabulated()
+    }
+
+    /// On these grids in place of its own, without estimates so far.
+    pub fn on(self, levels: Vec<Level>) -> Self {
+        NestedEquilibrium { levels, ..self }.tabulated()
+    }
+
+    /// On all grids but the finest, and that one.
+    pub fn split(mut self) -> (Self, Level) {
+        let finest = self.levels.pop().expect("the leaf has settled");
+        self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
+        (self, finest)
+    }
+
+    /// With that finest grid again.
+    pub fn joined(mut self, finest: Level) -> Self {
+        self.levels.push(finest);
+        self.history.coarsest = (self.levels.first()).map(|level| level.leaf.segments());
+        self
+    }
+
+    /// With its negative eigenvalues counted.
+    pub fn counted(self, clearly_stable: bool, index: Option<usize>) -> Self {
+        NestedEquilibrium {
+            clearly_stable,
+            index,
+            ..self
+        }
+    }
+
+    /// Tabulates the positions on all grids, and discards earlier estimates.
+    fn tabulated(mut self) -> Self {
+        let segments: Vec<usize> = (self.levels.iter())
+            .map(|level| level.leaf.segments())
+            .collect();
+        let on = |level: &Level| {
+            let own = level.leaf.segments();
+            (own, positions(level, own / segments[0]))
+        };
+        self.table = self.levels.iter().map(on).collect();
+        let ordered = energies(&self.levels).ordered();
+        self.unresolved = self.table.change_beyond(ordered);
+        let first = segments.len().saturating_sub(1 + self.table.columns());
+        self.weights = vec![0.0; first];
+        self.weights
+            .extend(weights(&segments[first..], f64::INFINITY));
+        self.estimate = None;
+        if self.levels.len() < 2 {
+            self.linear = None;
+        }
+        self.history.coarsest = segments.first().copied();
+        self
+    }
+
+    /// The same leaf on the same grids, without estimates and their equations.
+    pub fn grids(&self) -> Self {
+        NestedEquilibrium {
+            levels: self.levels.clone(),
+            table: self.table.clone(),
+            weights: self.weights.clone(),
+            estimate: None,
+            linear: None,
+            softening: 1.0,
+            path: self.path.clone(),
+            ..*self
+        }
+    }
+
+    /// The same on the coarsest `count` grids alone; `None` unless each of them halves the
+    /// segments of the one before.
+    pub fn coarsest(&self, count: usize) -> Option<Self> {
+        let levels = self.levels.get(..count)?;
+        let halved = |pair: &[Level]| pair[1].leaf.segments() == 2 * pair[0].leaf.segments();
+        let nested = levels.windows(2).all(halved);
+        nested.then(|| self.grids().on(levels.to_vec()))
+    }
+
+    /// That of the whole leaf, where the problem was one of its half.
+    pub fn completed(mut self, problem: &Problem) -> Self {
+        let Some(whole) = problem.whole else {
+            return self;
+        };
+        let reduced = problem.leaf;
+        let complete = |level: &Level| complete(reduced, whole, level);
+        let levels = self.levels.iter().map(complete).collect();
+        let estimate = self.estimate.take().map(|half| completed(half, reduced));
+        // The equations are those of the reduced leaf.
+        self.linear = None;
+        NestedEquilibrium {
+            estimate,
+            ..self.on(levels)
+        }
+    }
+
+    /// With a bar that is larger by this factor.
+    pub fn softened(self, softening: f64) -> Self {
+        NestedEquilibrium { softening, ..self }
+    }
+
+    /// At the end of refinement, within the tolerance or not.
+    pub fn ended(self, keeps_tolerance: bool) -> Self {
+        NestedEquilibrium {
+            keeps_tolerance,
+            ..self
+        }
+    }
+
+    /// On this path.
+    pub fn along(self, path: Option<Path>) -> Self {
+        NestedEquilibrium { path, ..self }
+    }
+
+    /// As a result: after this work, and without the equations of its estimate.
+    pub fn after(self, work: Work) -> Self {
+        NestedEquilibrium {
+            work,
+            linear: None,
+            ..self
+        }
+    }
+
+    /// A failure here.
+    pub fn failed<T>(self, stop: Stop) -> Result<T, Box<Failure>> {
+        Err(Box::new(Failure { at: self, stop }))
+    }
+
+    /// Whether no eigenvalue is negative.
+    pub fn is_stable(&self) -> bool {
+        self.index == Some(0)
+    }
+
+    /// The next finer grid, if the limits on its size allow it and rounding leaves something
+    /// to gain.
+    pub fn finer(&self) -> Option<Grid> {
+        let leaf = &self.levels.last()?.leaf;
+        let grid = leaf.grid.refined();
+        let (rods, segments) = (leaf.rods(), grid.segments());
+        let allowed = !self.fixed
+            && segments <= FINEST
+            && rods * segments <= MAX_NODES
+            && memory::grid(rods, segments).is_ok()
+            && !self.beyond_rounding(segments);
+        allowed.then_some(grid)
+    }
+
+    /// The finest of the first `wanted` grids between whose nodes the leaf keeps the tolerance, as
+    /// far as it does at the nodes of the coarsest, with the fields and the additional error there.
+    pub fn finer_nodes(&self, wanted: usize) -> (usize, Vec<Vec<RodFields>>, f64) {
+        let error = self.error().unwrap_or(0.0);
+        let allowed = match error <= self.tolerance {
+            true => self.tolerance - error,
+            false => f64::INFINITY,
+        };
+        let columns = self.table.columns();
+        finer_nodes(&self.levels, columns, wanted, [error, allowed])
+    }
+
+    /// The levels from which the next one is predicted: those of the extrapolation, but at
+    /// least the finest two where there are two.
+    pub fn levels_for_prediction(&self) -> Vec<&Level> {
+        let count = (self.table.columns() + 1).max(2).min(self.levels.len());
+        self.levels[self.levels.len() - count..].iter().collect()
+    }
+
+    /// The extrapolated value of a quantity given by `on` on each grid.
+    pub fn best(&self, on: impl Fn(usize, &Level) -> DVec3) -> DVec3 {
+        let levels = self.levels.iter().zip(&self.weights).enumerate();
+        let known = levels.filter(|(_, (_, weight))| **weight != 0.0);
+        known
+            .map(|(k, (level, weight))| *weight * on(k, level))
+            .sum()
+    }
+
+    /// Interpolation stencils of each grid at the fraction `sigma`, of values and of their
+    /// derivatives; extrapolation beyond the ends is linear.
+    pub fn stencils(&self, sigma: f64) -> Vec<[Stencil; 2]> {
+        let on = |level: &Level| Stencil::at(&level.leaf, sigma);
+        self.levels.iter().map(on).collect()
+    }
+
+    /// The potential energy: integrated along the leaf, with an error of second order in the
+    /// defect, or extrapolated as far as it converges as that assumes; and its error, which is
+    /// unknown on a single grid.
+    pub fn energy(&self) -> (f64, Option<f64>) {
+        if let Some(estimate) = &self.estimate {
+            return (estimate.energy, Some(self.energy_error(estimate)));
+        }
+        let finest = &self.levels[self.levels.len().saturating_sub(ENERGY_GRIDS)..];
+        let (table, columns) = (energies(finest), self.table.columns());
+        let Some(best) = table.error_of_few() else {
+            return (table.column(columns)[0], None);
+        };
+        let energy = table.column(columns.min(best.columns))[0];
+        let further = (energy - table.column(best.columns)[0]).abs();
+        (energy, Some(best.error + further))
+    }
+}
+
+/// The estimate of a whole leaf from that of its half.
+fn completed(half: Estimate, reduced: &Leaf) -> Estimate {
+    let both = if reduced.in_half() { 2.0 } else { 1.0 };
+    Estimate {
+        rods: whole_fields(reduced, half.rods),
+        energy: half.energy * both,
+        energy_error: half.energy_error * both,
+        errors: whole_changes(reduced, half.errors),
+        ..half
+    }
+}
+
+/// The potential energies on all grids.
+fn energies(levels: &[Level]) -> Richardson {
+    let on = |level: &Level| (level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
+    let largest = (levels.iter()).map(|level| level.leaf.energy(&level.state).abs());
+    let noise = ENERGY_NOISE * largest.fold(1.0, larger);
+    levels
+        .iter()
+        .map(on)
+        .collect::<Richardson>()
+        .with_noise(noise)
+}
+
+/// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
+/// absolute values.
+const EXTRAPOLATED: f64 = 2.0;
+
+/// Safety factor on the error estimated from the defect of the extrapolated leaf.
+const SAFETY: f64 = 2.0;
+
+/// The same on that of the energy: the linear equations of a coarse grid tell less of what is of
+/// second order.
+const ENERGY_SAFETY: f64 = 3.0;
+
+/// The least part of the largest error between the nodes of the coarsest grid that is taken
+/// for the error at these nodes: where layers are thinner than its segments the linear
+/// equations of a coarse grid are wrong by so much.
+const LAYERS: f64 = 0.1;
+
+/// Upper bound of that estimate in units of the error estimated from the last extrapolation:
+/// the response of a neutral mode to rounding is not an error.
+const LARGEST: f64 = 10.0;
+
+/// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
+/// not computed: it would hardly be small enough.
+const OUT_OF_REACH: f64 = 3e3;
+
+/// The part of the error that each correction leaves at best.
+const CORRECTED: f64 = 1e-2;
+
+/// For leaves with more nodes than this no equations are kept while others are solved, which
+/// saves memory at the cost of another factorisation on a coarse grid.
+const MANY_NODES: usize = 50_000;
+
+/// Rounding error per segment.
+const ROUNDING: f64 = 4e-15;
+
+/// Whether the equations of a leaf need much memory.
+pub fn is_large(leaf: &DiscreteLeaf) -> bool {
+    leaf.rods() * leaf.segments() > MANY_NODES
+}
+
+impl NestedEquilibrium {
+    /// Segments of the grid whose linear equations tell the error; of the finest if none do.
+    pub fn segments_of_estimate(&self) -> Option<usize> {
+        let level = match (&self.estimate, &self.linear) {
+            (Some(_), Some(linear)) => self.levels.get(linear.grid()),
+            _ => self.levels.last(),
+        };
+        level.map(|level| level.leaf.segments())
+    }
+
+    /// Error estimate relative to the leaf's length: grids, unfinished iterations and rounding.
+    pub fn error(&self) -> Option<f64> {
+        self.error_of_linear().map(|error| self.softening * error)
+    }
+
+    /// The error estimate as the linear equations of a grid tell it.
+    fn error_of_linear(&self) -> Option<f64> {
+        let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
+        let best = self.table.best();
+        let best = best.map(|best| larger(best.error, self.unresolved));
+        let most = best.map_or(f64::INFINITY, |best| LARGEST * best);
+        let too_coarse = !self.fixed && segments[0] < COARSEST;
+        let extrapolation = match &self.estimate {
+            // The errors of unfinished iterations are corrected with the others.
+            Some(estimate) if estimate.corrections > 0 => {
+                return Some(SAFETY * estimate.largest() + ROUNDING * segments[0] as f64);
+            }
+            // If nodes are few the midpoints are stations, too.
+            Some(estimate) if too_coarse || best.is_none() => {
+                (SAFETY * estimate.largest()).min(most)
+            }
+            Some(estimate) => {
+                let at_nodes = estimate.at_nodes.max(LAYERS * estimate.between);
+                (SAFETY * at_nodes).min(most)
+            }
+            None => best?,
+        };
+        Some(extrapolation + self.unfinished(segments[1]))
+    }
+
+    /// Error by unfinished iterations and rounding on a grid of `segments` segments.
+    fn unfinished(&self, segments: usize) -> f64 {
+        EXTRAPOLATED * self.history.remaining + ROUNDING * segments as f64
+    }
+
+    /// Error of the energy of an integrated leaf: that of grids, and rounding of what is summed along
+    /// the rods.
+    pub(super) fn energy_error(&self, estimate: &Estimate) -> f64 {
+        let segments = estimate.grid.segments() * estimate.rods.len();
+        let rounding = ROUNDING * segments as f64 * larger(1.0, estimate.energy.abs());
+        self.softening * ENERGY_SAFETY * estimate.energy_error + rounding
+    }
+
+    /// The leaf integrated along its rods, with bounds on the errors of its fields, along the lab axes,
+    /// at equally many places of each rod.
+    pub fn field_errors(&self) -> Option<(&Estimate, f64)> {
+        let estimate = self.estimate.as_ref()?;
+        Some((estimate, self.softening * SAFETY))
+    }
+
+    /// Whether the error is within the tolerance; always true on a fixed grid.
+    pub fn is_accurate(&self) -> bool {
+        self.fixed || self.error().is_some_and(|error| error <= self.tolerance)
+    }
+
+    /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
+    /// corrected, and its error, if that is within the tolerance or the leaf was corrected.
+    pub fn integrated(&self) -> Option<(&Estimate, f64)> {
+        let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
+        let error = match estimate.corrections {
+            0 => SAFETY * estimate.largest() + self.unfinished(segments),
+            _ => self.error()?,
+        };
+        (error <= self.tolerance || estimate.corrections > 0).then_some((estimate, error))
+    }
+
+    /// The integrated leaf, if its error was corrected.
+    pub fn corrected(&self) -> Option<&Estimate> {
+        self.estimate
+            .as_ref()
+            .filter(|estimate| estimate.corrections > 0)
+    }
+
+    /// The same with the error of the values on its only grid or of the extrapolated values
+    /// estimated from their defect, and corrected if that makes them accurate enough. The
+    /// equations take the place of the `spare` ones.
+    pub fn estimated(
+        mut self,
+        problem: &Problem,
+        spare: &mut Option<System>,
+        work: &mut Work,
+    ) -> Self {
+        let most = problem.corrections();
+        let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
+        // A leaf that can turn is the same one of its circle on every grid: the response to a defect
+        // leaves where on the circle it is as it was, with the error of that.
+        let turns = |level: &Level| !level.leaf.turns(&level.state).is_empty();
+        // The defect is that of dead loads.
+        let columns = match self.table.best() {
+            _ if problem.leaf.in_wind() || self.levels.last().is_some_and(turns) => None,
+            Some(best) => (best.error <= farthest).then_some(best.columns),
+            // What has left a saddle may be close to another on the next grid.
+            None => (problem.may_be_alone() && self.history.pushes == 0).then_some(0),
+        };
+        let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
+        let (levels, systems) = (&self.levels, (&mut self.linear, spare));
+        self.estimate =
+            columns.and_then(|columns| defect::estimate(levels, columns, enough, systems, work));
+        if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
+            self.linear = None;
+        }
+        self
+    }
+
+    /// Whether errors by unfinished iterations and rounding alone exceed the tolerance on a
+    /// grid of `segments` segments and are already at least half of the present error:
+    /// refinement does not help then.
+    pub fn beyond_rounding(&self, segments: usize) -> bool {
+        let floor = self.unfinished(segments);
+        floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
+    }
+}
+
+/// A leaf settled on one grid.
+#[derive(Clone)]
+pub struct Level {
+    pub leaf: DiscreteLeaf,
+    pub state: State,
+}
+
+/// The level of the whole leaf from that of its half, or from its own.
+pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
+    if !reduced.in_half() {
+        return level.clone();
+    }
+    Level {
+        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        state: whole_of(reduced, &level.state),
+    }
+}
+
+/// Whether all nodes lie in the plane z = 0.
+pub fn flat(level: &Level) -> bool {
+    level.state.x.iter().all(|x| x.z == 0.0)
+}
+
+/// Positions of all rods at every `stride`-th node, dimensionless.
+pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
+    let n = level.leaf.segments();
+    let nodes = |j: usize| {
+        (0..=n)
+            .step_by(stride)
+            .map(move |i| level.state.base(j) + i)
+    };
+    let nodes = (0..level.leaf.rods()).flat_map(nodes);
+    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
+}

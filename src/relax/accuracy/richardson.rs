@@ -1,6 +1,6 @@
 //! Extrapolation over nested grids, and its error estimate.
 
-use crate::largest::{larger, largest};
+use crate::numbers::{larger, largest};
 
 /// A column of order p is extrapolated further only if its changes from grid
 /// to grid shrink by 2^p, or nearly so: at most this many times less.
@@ -23,6 +23,7 @@ const ROUNDING: f64 = 1e-13;
 /// The safety factor: its slope over the root of the ratio of the last two
 /// corrections, and its bounds.
 const SLOPE: f64 = 30.0;
+
 const SAFETY: (f64, f64) = (1.3, 10.0);
 
 /// Safety factor on the corrections of few numbers, and the part of each that those after it

@@ -18,16 +18,419 @@
 //! E W t^3/12 and twists as G W t^3/3, whatever N is, and in its plane as E t W^3/12, if shear
 //! is stiff: for veins in the middle of equal strips whatever N is; if the outermost veins are the
 //! margins, the stiffness in its plane is larger by the part 2/(N - 1) + 1/N^2.
+//!
+//! A blade as it is given, and the veins and the tissue that follow from it.
+//!
+//! Thickness and moduli of the veins of a blade.
+//!
+//! Reads the table `[blade]`.
 
-mod given;
-mod material;
-mod read;
-mod spline;
 #[cfg(test)]
 mod tests;
-mod vein;
+mod veins;
 
-pub use given::Blade;
-pub(super) use given::Parts;
-pub(super) use read::blade;
-pub use vein::{BladePart, BladeProperty};
+pub use crate::scenario::blade::veins::{BladePart, BladeProperty};
+use crate::scenario::blade::veins::{Outline, Spline, Vein};
+use crate::scenario::format::Key;
+use crate::scenario::format::entries::Entries;
+use crate::scenario::format::item::Item;
+use crate::scenario::format::source::ScenarioResult;
+use crate::scenario::section::poisson;
+use crate::scenario::{Profile, Tissue};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// Places at which the widest one is looked for.
+const WIDTH_SAMPLES: usize = 500;
+
+/// A blade, from which the veins of a leaf and the tissue between them follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blade {
+    pub(super) outline: Arc<Outline>,
+    /// Whether the outermost veins are the margins.
+    pub edges: bool,
+    /// The angle by which it rises from the x-y plane as a whole, in radians.
+    pub elevation: f64,
+    pub(super) materials: Vec<Material>,
+}
+
+impl Blade {
+    /// The length, from the base to the tip.
+    pub fn length(&self) -> f64 {
+        self.outline.length
+    }
+
+    /// The width at the fraction `x` of the length.
+    pub fn width(&self, x: f64) -> f64 {
+        self.outline.width.at(x)[0]
+    }
+
+    /// The width at the fraction `x` of the length from which stiffnesses follow: nowhere less than
+    /// a part of the largest one.
+    pub fn bearing_width(&self, x: f64) -> f64 {
+        self.outline.bearing_width(x)
+    }
+
+    /// The least bearing width as a fraction of the largest width, wherever the blade is wider.
+    pub fn least_part(&self) -> f64 {
+        self.outline.least
+    }
+
+    /// The least bearing width, if the blade is narrower somewhere.
+    pub fn least_width(&self) -> Option<f64> {
+        let Outline {
+            least,
+            largest,
+            narrows,
+            ..
+        } = &*self.outline;
+        narrows.then_some(least * largest)
+    }
+
+    /// Where it is widest: a fraction of the length.
+    pub fn widest(&self) -> f64 {
+        let places = (0..=WIDTH_SAMPLES).map(|k| k as f64 / WIDTH_SAMPLES as f64);
+        let wider = |a: f64, b: f64| if self.width(b) > self.width(a) { b } else { a };
+        places.fold(0.0, wider)
+    }
+
+    /// Where vein `j` lies: a fraction of the half width, negative to the right of the midrib.
+    pub fn place(&self, j: usize) -> f64 {
+        self.eta(j).0
+    }
+
+    /// Whether all veins meet at the tip.
+    pub fn is_pointed(&self) -> bool {
+        let (_, widths) = self.points();
+        widths.last() == Some(&0.0)
+    }
+
+    /// Where the curvature of its surface at rest is given, as fractions of the length, and its values
+    /// there; `None` if it lies flat.
+    pub(super) fn curvature(&self) -> Option<(&[f64], &[f64])> {
+        let curvature = self.outline.curvature.as_ref()?;
+        Some((curvature.knots(), curvature.values()))
+    }
+
+    /// Whether it has a mass.
+    pub fn has_mass(&self) -> bool {
+        self.materials.iter().all(|of| of.mass_density.is_some())
+    }
+
+    /// The places of the points of the outline, as fractions of the length, and the widths there.
+    pub(super) fn points(&self) -> (&[f64], &[f64]) {
+        (self.outline.width.knots(), self.outline.width.values())
+    }
+
+    /// The place of vein `j`, as a fraction of the half width, and how far neighbours are apart.
+    fn eta(&self, j: usize) -> (f64, f64) {
+        let count = self.materials.len();
+        let gaps = if self.edges { count.max(2) - 1 } else { count };
+        let eta = (2.0 * j as f64 + 1.0 - count as f64) / gaps as f64;
+        (eta, 2.0 / gaps as f64)
+    }
+
+    /// The veins and the tissue between them.
+    pub(super) fn parts(&self) -> Parts {
+        let count = self.materials.len();
+        let etas: Vec<f64> = (0..count).map(|j| self.eta(j).0).collect();
+        let (_, apart) = self.eta(0);
+        let alike = |one: usize, other: usize| self.materials[one] == self.materials[other];
+        let vein = |j: usize| {
+            let material = self.materials[j].clone();
+            Arc::new(Vein::new(&self.outline, etas[j].abs(), count, material))
+        };
+        let veins = with_images(count, alike, vein);
+        let gaps_alike = |g: usize, image: usize| alike(g, image + 1) && alike(g + 1, image);
+        let gap = |g: usize| BladePart::gap(&veins[g], &veins[g + 1], apart);
+        Parts {
+            gaps: with_images(count - 1, gaps_alike, gap),
+            parts: with_images(count, alike, |j| BladePart::vein(veins[j].clone())),
+            half_width: 0.5 * self.width(0.0),
+            veins,
+            etas,
+        }
+    }
+}
+
+/// So many values, of which one that is `alike` to its image, counted from the other end, is the
+/// same.
+fn with_images<T>(
+    count: usize,
+    alike: impl Fn(usize, usize) -> bool,
+    make: impl Fn(usize) -> Arc<T>,
+) -> Vec<Arc<T>> {
+    let mut all: Vec<Arc<T>> = Vec::with_capacity(count);
+    for j in 0..count {
+        let image = count - 1 - j;
+        let same = image < j && alike(j, image);
+        all.push(if same { all[image].clone() } else { make(j) });
+    }
+    all
+}
+
+/// What follows from a blade: its veins, and the tissue between them.
+pub(super) struct Parts {
+    /// The places of the veins, as fractions of the half width.
+    etas: Vec<f64>,
+    half_width: f64,
+    veins: Vec<Arc<Vein>>,
+    parts: Vec<Arc<BladePart>>,
+    gaps: Vec<Arc<BladePart>>,
+}
+
+impl Parts {
+    /// A property of every vein, along it.
+    pub(super) fn profiles(&self, property: BladeProperty) -> Vec<Profile> {
+        let each = self.etas.iter().zip(&self.parts);
+        each.map(|(eta, part)| part.profile(property, *eta < 0.0))
+            .collect()
+    }
+
+    /// The lengths of the veins.
+    pub(super) fn lengths(&self) -> Vec<f64> {
+        self.veins.iter().map(|vein| vein.length).collect()
+    }
+
+    /// Where the veins begin.
+    pub(super) fn bases(&self) -> Vec<[f64; 3]> {
+        let y = self.etas.iter().map(|eta| eta * self.half_width);
+        y.map(|y| [0.0, y, 0.0]).collect()
+    }
+
+    /// The angle of each vein at its base in the x-y plane, its elevation above that, and the turn
+    /// of its section about d1, if the whole blade is turned by `elevation` about -e2.
+    pub(super) fn directions(&self, elevation: f64) -> Vec<[f64; 3]> {
+        let each = self.etas.iter().zip(&self.veins);
+        each.map(|(eta, vein)| {
+            let angle = if *eta < 0.0 {
+                -vein.angle()
+            } else {
+                vein.angle()
+            };
+            tilted(angle, elevation)
+        })
+        .collect()
+    }
+
+    /// The tissue in every gap.
+    pub(super) fn tissue(&self) -> Vec<Tissue> {
+        let gap = |part: &Arc<BladePart>| {
+            let of = |which| part.profile(BladeProperty::Tissue(which), false);
+            Tissue {
+                stiffness: [of(0), of(1), of(2)],
+                fold: of(3),
+            }
+        };
+        self.gaps.iter().map(gap).collect()
+    }
+}
+
+/// A direction at `angle` in a plane that is turned about -e2 by `elevation`: its own angle and
+/// elevation, and the turn about it that brings d2 into the plane.
+fn tilted(angle: f64, elevation: f64) -> [f64; 3] {
+    if elevation == 0.0 {
+        return [angle, 0.0, 0.0];
+    }
+    let plane = DQuat::from_rotation_y(-elevation) * DQuat::from_rotation_z(angle);
+    let tangent = plane * DVec3::X;
+    let (own, up) = (tangent.y.atan2(tangent.x), tangent.z.asin());
+    let upright = DQuat::from_rotation_z(own) * DQuat::from_rotation_y(-up);
+    let across = upright.inverse() * (plane * DVec3::Y);
+    [own, up, across.z.atan2(across.y)]
+}
+
+/// Thickness and material of a vein with its tissue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    pub thickness: Profile,
+    pub young: Profile,
+    /// Left out: as along the veins.
+    pub young_across: Option<Profile>,
+    /// Left out: that of an isotropic material.
+    pub shear_modulus: Option<Profile>,
+    pub poisson: Profile,
+    /// Mass per volume.
+    pub mass_density: Option<Profile>,
+}
+
+/// Thickness and moduli at one place.
+pub struct Local {
+    pub t: f64,
+    pub young: f64,
+    pub across: f64,
+    pub shear: f64,
+}
+
+impl Material {
+    pub fn at(&self, sigma: f64) -> Local {
+        let young = self.young.at(sigma);
+        let across = self.young_across.as_ref();
+        let shear = self.shear_modulus.as_ref();
+        Local {
+            t: self.thickness.at(sigma),
+            young,
+            across: across.map_or(young, |it| it.at(sigma)),
+            shear: shear.map_or_else(
+                || young / (2.0 * (1.0 + self.poisson.at(sigma))),
+                |it| it.at(sigma),
+            ),
+        }
+    }
+
+    fn profiles(&self) -> impl Iterator<Item = &Profile> {
+        let given = [&self.thickness, &self.young, &self.poisson];
+        let others = [&self.young_across, &self.shear_modulus, &self.mass_density];
+        given.into_iter().chain(others.into_iter().flatten())
+    }
+
+    pub fn kinks(&self) -> impl Iterator<Item = f64> {
+        self.profiles().flat_map(Profile::kinks).copied()
+    }
+}
+
+/// Most points of an outline.
+const MOST_POINTS: usize = 1000;
+
+/// Where the width between points is looked at, so many times between two.
+const SAMPLES: usize = 32;
+
+/// Largest least bearing width.
+const WIDEST: f64 = 0.5;
+
+/// Least one: stiffnesses in the plane go with its third power.
+const NARROWEST: f64 = 1e-3;
+
+/// Reads `[blade]` of a leaf with so many veins; `None` if there is no such table.
+pub(super) fn blade(entries: &Entries, rods: usize) -> ScenarioResult<Option<Blade>> {
+    let mut table = Key::all().filter(|key| key.parts().0 == "blade");
+    if !table.any(|key| entries.is_given(key)) {
+        return Ok(None);
+    }
+    if let Some(item) = Key::all()
+        .filter(|key| key.follows_from_blade())
+        .find_map(|key| entries.given(key))
+    {
+        let why = "follows from [blade], which is given, too: leave one of them out";
+        return Err(item.refuse(why));
+    }
+    let quantity = |key| entries.item(key)?.quantity(rods);
+    let optional = |key| {
+        entries
+            .given(key)
+            .map(|item| item.quantity(rods))
+            .transpose()
+    };
+    let thickness = quantity(Key::BladeThickness)?;
+    let young = quantity(Key::BladeYoung)?;
+    let young_across = optional(Key::YoungAcross)?;
+    let shear_modulus = optional(Key::ShearModulus)?;
+    let poisson = poisson(entries.item(Key::BladePoisson)?, rods)?;
+    let mass_density = optional(Key::BladeMassDensity)?;
+    let pick = |all: &Option<Vec<Profile>>, rod: usize| all.as_ref().map(|all| all[rod].clone());
+    let materials = (0..rods).map(|rod| Material {
+        thickness: thickness[rod].clone(),
+        young: young[rod].clone(),
+        young_across: pick(&young_across, rod),
+        shear_modulus: pick(&shear_modulus, rod),
+        poisson: poisson[rod].clone(),
+        mass_density: pick(&mass_density, rod),
+    });
+    let elevation = entries.item(Key::Elevation)?;
+    let whole = "a blade rises as a whole: give one number";
+    elevation.ensure(!elevation.value.is_array(), whole)?;
+    Ok(Some(Blade {
+        elevation: elevation.number()?,
+        outline: Arc::new(outline(entries)?),
+        edges: entries.item(Key::Edges)?.switch()?,
+        materials: materials.collect(),
+    }))
+}
+
+fn outline(entries: &Entries) -> ScenarioResult<Outline> {
+    let item = entries.item(Key::BladeWidth)?;
+    let width = width(item)?;
+    let narrow = entries.item(Key::LeastWidth)?;
+    let least = narrow.number()?;
+    narrow.ensure(
+        (NARROWEST..=WIDEST).contains(&least),
+        format_args!("must be between {NARROWEST} and {WIDEST}: a fraction of the largest width"),
+    )?;
+    let knots = width.knots().windows(2);
+    let between = knots.flat_map(|pair| {
+        let (from, to) = (pair[0], pair[1]);
+        (0..=SAMPLES).map(move |k| (from + k as f64 / SAMPLES as f64 * (to - from), k))
+    });
+    let (mut largest, mut narrowest) = (0.0_f64, f64::INFINITY);
+    for (x, k) in between {
+        let [value, ..] = width.at(x);
+        let inside = k > 0 && k < SAMPLES;
+        item.ensure(
+            !inside || value > 0.0,
+            format_args!(
+                "the smoothest outline through these points crosses itself at {x:.3} of the length: \
+                 add points there"
+            ),
+        )?;
+        (largest, narrowest) = (largest.max(value), narrowest.min(value));
+    }
+    Ok(Outline {
+        length: entries.item(Key::BladeLength)?.number()?,
+        narrows: narrowest < least * largest,
+        width,
+        least,
+        largest,
+        curvature: curvature(entries)?,
+    })
+}
+
+/// The curvature of the surface at rest, over fractions of the length.
+fn curvature(entries: &Entries) -> ScenarioResult<Option<Spline>> {
+    let Some(item) = entries.given(Key::RestBend2) else {
+        return Ok(None);
+    };
+    item.ensure(
+        !item.value.is_array(),
+        "a blade bends as a whole: give one number, or one profile",
+    )?;
+    let (at, value) = match item.value.is_table() {
+        true => item.knots()?,
+        false => (vec![0.0, 1.0], vec![item.number()?; 2]),
+    };
+    if value.iter().all(|value| *value == 0.0) {
+        return Ok(None);
+    }
+    if let Some(twist) = entries.given(Key::RestTwist) {
+        let why = "the veins of a blade that is curved (rest.bend_2) twist as its surface does: \
+                   leave one of them out";
+        return Err(twist.refuse(why));
+    }
+    Ok(Some(Spline::through(at, value)))
+}
+
+/// The width over fractions of the length.
+fn width(item: Item) -> ScenarioResult<Spline> {
+    if !item.value.is_table() {
+        let width = item.number()?;
+        item.ensure(width > 0.0, "must be greater than 0")?;
+        return Ok(Spline::through(vec![0.0, 1.0], vec![width; 2]));
+    }
+    let (at, value) = item.knots()?;
+    let last = at.len() - 1;
+    item.ensure(
+        last < MOST_POINTS,
+        format_args!("has more than {MOST_POINTS} points: an outline is smooth with far fewer"),
+    )?;
+    let list = item.list("value").unwrap_or(item);
+    for (k, value) in value.iter().enumerate() {
+        list.entry(k).ensure(
+            *value > 0.0 || *value == 0.0 && (k == 0 || k == last),
+            "must be greater than 0, and may be 0 at the base and at the tip",
+        )?;
+    }
+    list.ensure(
+        last > 1 || value[0] + value[1] > 0.0,
+        "must be greater than 0 somewhere",
+    )?;
+    Ok(Spline::through(at, value))
+}

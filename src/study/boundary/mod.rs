@@ -1,17 +1,25 @@
 //! `trace` over two parameters: the boundary of stability as curves in their plane.
+//!
+//! Computation of a boundary.
+//!
+//! The result of a boundary.
 
-mod compare;
-mod known;
 mod map;
-mod result;
-mod run;
 
-pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside};
-pub use run::boundary;
-
-use super::trace::{TraceError, TraceRequest};
-use super::vary::Vary;
-use crate::refusal::RefusedOption;
+use crate::branch::boundary::{
+    Accuracy, AtRest, Neighbour, Plane, Seed, Solution, Special, Verified, WalkOptions, beside,
+    coarsened, refine_on_path,
+};
+use crate::branch::{End, Kind, Range, Stuck, boundary, value_between};
+use crate::run::{Instant, RefusedOption};
+use crate::scenario::Scenario;
+use crate::shape::serialize_tips;
+use crate::study::Keys;
+use crate::study::boundary::map::{Cells, remove_known};
+use crate::study::trace::{Trace, TraceError, TraceRequest, traced};
+use crate::study::vary::Vary;
+use glam::DVec3;
+use serde::ser::Serializer;
 
 /// Largest number of curves of a boundary.
 pub const MOST_CURVES: usize = 24;
@@ -55,4 +63,468 @@ impl BoundaryRequest {
         }
         Ok(())
     }
+}
+
+/// Longest step along a curve if few values are asked for.
+const LONGEST: f64 = 0.1;
+
+/// Longest step along curves that are followed for a map.
+const OF_MAP: f64 = 0.04;
+
+/// Accuracy of parameters, as parts of their ranges, that is sought, relative to that required;
+/// not for curves that are followed for a map only.
+const EXACTER: f64 = 1e-2;
+
+/// Largest number of curves with leaves on either side.
+const MOST_BESIDE: usize = 4;
+
+/// The curves on which the index of a leaf changes in the plane of two parameters, through
+/// the critical points of a trace along the first. `progress` is called for each point: with
+/// the curve (none for the trace itself), the number of points, and the values.
+///
+/// # Errors
+/// Requests that cannot be met; failures during the run are part of the result.
+pub fn boundary(
+    request: &BoundaryRequest,
+    progress: &mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
+) -> Result<Boundary, TraceError> {
+    request.check()?;
+    let clock = Instant::now();
+    let (vary, across) = (&request.trace.vary, &request.across);
+    let ends = [vary, across].map(Vary::ends);
+    let base = &request.trace.base;
+    let make = |[first, second]: [f64; 2]| -> Result<Scenario, String> {
+        let at = base.at(&[(&vary.keys, first), (&across.keys, second)]);
+        Ok(at.map_err(|refused| refused.to_string())?.scenario)
+    };
+    for second in ends[1] {
+        base.at(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;
+    }
+    let start = start(request);
+    let along = TraceRequest {
+        base: base.with(&across.keys, start)?,
+        ..request.trace.clone()
+    };
+    let begun = traced(&along, &mut |_, points, value| {
+        progress(None, points, [value, start]);
+    })?;
+    let ranges = [vary, across].map(|it| Range {
+        ends: it.ends(),
+        log: it.log,
+    });
+    let plane = Plane::plane(&make, ranges, start);
+    let plane = plane.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+    let plane = &plane.with_limit(request.trace.limit.clone());
+    let from = [0.0, ranges[1].fraction(start)];
+    let mut boundary = without_curves(request, &begun.trace, start);
+    let mut run = Run {
+        plane,
+        how: walk_options(request, begun.trace.tolerance),
+        known: Vec::new(),
+        tried: 0,
+        progress,
+    };
+    for (critical, refined) in &begun.critical {
+        let seed = Seed {
+            critical,
+            refined,
+            from,
+            direction: [1.0, 0.0],
+        };
+        run.follow_new(&seed, &mut boundary);
+    }
+    if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
+        let kinks = plane.first().kinks();
+        let first = AtRest {
+            grid: coarsened(&grid, point.state.segments(), kinks),
+            index: point.index,
+            solution: Solution {
+                state: point.state,
+                params: from,
+            },
+        };
+        let map = run.map(size, first, &mut boundary);
+        // Cells that were not reached would look like those without an equilibrium.
+        boundary.map = (!plane.limit.reached()).then_some(map);
+    }
+    add_leaves(plane, &run.known, &mut boundary);
+    if plane.limit.reached() && boundary.remark.is_none() {
+        boundary.remark = Some(Stuck::Stopped.to_string());
+    }
+    conclude(&mut boundary, begun.trace.complete);
+    boundary.wall_seconds = clock.elapsed().as_secs_f64();
+    Ok(boundary)
+}
+
+/// The second parameter at the first trace.
+fn start(request: &BoundaryRequest) -> f64 {
+    let across = &request.across;
+    let [from, to] = across.ends();
+    let present = request.trace.base.number(&across.keys);
+    let within = present.filter(|value| (from.min(to)..=from.max(to)).contains(value));
+    within.unwrap_or(from)
+}
+
+/// The result before any curve is known.
+fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Boundary {
+    let both = [&request.trace.vary, &request.across];
+    Boundary {
+        scenario: trace.scenario.clone(),
+        keys: both.map(|it| it.keys.clone()),
+        ranges: both.map(Vary::ends),
+        log: both.map(|it| it.log),
+        start,
+        rods: trace.rods,
+        joined: trace.joined,
+        tolerance: trace.tolerance,
+        complete: false,
+        remark: trace.remark.clone(),
+        doubts: trace.doubts.clone(),
+        curves: Vec::new(),
+        map: None,
+        factorizations: trace.factorizations,
+        wall_seconds: 0.0,
+    }
+}
+
+/// How curves through the critical points of the first trace are followed.
+fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
+    WalkOptions {
+        longest: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST),
+        most: request.trace.most_points,
+        accuracy: Accuracy {
+            tips: tolerance,
+            numbers: tolerance,
+            sought: EXACTER * tolerance,
+        },
+    }
+}
+
+/// Whether all curves are known as far as requested; if not, why. `traced`: whether all branches
+/// of the first trace are.
+fn conclude(boundary: &mut Boundary, traced: bool) {
+    let curves = &boundary.curves;
+    let whole = (curves.iter().flat_map(|curve| &curve.ends)).all(End::complete);
+    if curves.is_empty() && boundary.remark.is_none() {
+        let [vary, across] = &boundary.keys;
+        let at = across.text(boundary.start);
+        let why = format!("along {vary} the index changes nowhere at {across} = {at}");
+        boundary.remark = Some(why);
+    }
+    boundary.complete = whole && traced && boundary.remark.is_none();
+    if !traced && boundary.remark.is_none() {
+        boundary.remark = Some(
+            "not all branches along the first number are followed to \
+                 their ends: see a trace of it alone"
+                .into(),
+        );
+    }
+}
+
+/// The run that follows the curves.
+struct Run<'r, 'p> {
+    plane: &'r Plane<'r>,
+    how: WalkOptions,
+    known: Vec<boundary::Boundary>,
+    /// Number of critical points from which curves were started.
+    tried: usize,
+    progress: &'p mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
+}
+
+impl Run<'_, '_> {
+    /// Follows the curve through a critical point, unless it lies on a known one.
+    fn follow_new(&mut self, seed: &Seed, boundary: &mut Boundary) {
+        if self.plane.limit.reached() {
+            return;
+        }
+        if self.known.iter().any(|known| seed.is_on(known)) {
+            return;
+        }
+        if self.tried == MOST_CURVES {
+            boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
+            return;
+        }
+        self.tried += 1;
+        let (plane, progress) = (self.plane, &mut *self.progress);
+        let number = boundary.curves.len();
+        let mut report = |points, params| progress(Some(number), points, plane.values(params));
+        let grid = seed.grid(plane.first().kinks());
+        let mut curve = boundary::follow(plane, &grid, seed, &self.how, &mut report);
+        boundary.factorizations += curve.factorizations;
+        if !curve.points.is_empty() {
+            // If the index changes nowhere, the equilibria only touch the curve, of which another
+            // sheet is on both sides.
+            let bounds = |point: &Verified| point.indices[0] != point.indices[1];
+            let none = !curve.points.iter().any(bounds);
+            remove_known(&mut curve, &self.known);
+            if curve.points.is_empty() || none {
+                return;
+            }
+        }
+        (boundary.curves).push(in_units(plane, &curve));
+        self.known.push(curve);
+    }
+
+    /// The map of so many cells, continued from an equilibrium. Critical points on the paths that
+    /// lie on no known curve start new ones; sequentially, so that the result does not depend on
+    /// the number of threads, and with longer steps than those of the trace, for the map alone.
+    fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
+        let accuracy = self.how.accuracy.tips;
+        self.how.longest = self.how.longest.max(OF_MAP);
+        self.how.accuracy.sought = accuracy;
+        let mut cells = Cells::new(self.plane, size);
+        let mut next = Some(cells.begin(first, &self.known));
+        while let Some(unexplained) = next {
+            for path in &unexplained {
+                let [from, to] = path.ends;
+                let direction = [0, 1].map(|i| to[i] - from[i]);
+                for critical in &path.critical {
+                    let (plane, grid) = (self.plane, &path.grid);
+                    let refined = refine_on_path(plane, path.ends, grid, critical, accuracy);
+                    if let Ok(refined) = &refined {
+                        let seed = Seed {
+                            critical,
+                            refined,
+                            from,
+                            direction,
+                        };
+                        self.follow_new(&seed, boundary);
+                    }
+                }
+            }
+            next = cells.advance(&self.known);
+        }
+        boundary.factorizations += cells.factorizations;
+        cells.compared(&self.known)
+    }
+}
+
+fn in_units(plane: &Plane, curve: &boundary::Boundary) -> BoundaryCurve {
+    BoundaryCurve {
+        kind: curve.kind,
+        multiplicity: curve.neutral,
+        ends: curve.ends.clone(),
+        points: (curve.points.iter().enumerate())
+            .map(|(k, point)| point_in_units(plane, k + 1, point))
+            .collect(),
+        beside: Vec::new(),
+    }
+}
+
+fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoint {
+    let values = plane.values(point.params);
+    let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));
+    BoundaryPoint {
+        point: number,
+        kind: word(point.kind, point.special),
+        values,
+        errors: [0, 1].map(|i| (beyond[i] - values[i]).abs()),
+        tips: plane.tips(&point.tips),
+        error: point.error * plane.scale().length,
+        index_before: point.indices[0],
+        index_behind: point.indices[1],
+        stations: point.stations.clone(),
+        curves: plane.curves(&point.state),
+    }
+}
+
+/// Finds leaves on either side of a few curves: of those that bound stable leaves or, if there
+/// are none, of those with the smallest index next to them.
+fn add_leaves(plane: &Plane, known: &[boundary::Boundary], boundary: &mut Boundary) {
+    let index = |point: &Verified| point.indices[0].min(point.indices[1]);
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    for (number, curve) in known.iter().enumerate() {
+        let least = curve.points.iter().map(index).min();
+        order.extend(least.map(|least| (least, number)));
+    }
+    order.sort_unstable();
+    let smallest = order.first().map(|first| first.0);
+    order.retain(|curve| Some(curve.0) == smallest);
+    let found = order.into_iter().filter_map(|(least, number)| {
+        let points = &known[number].points;
+        // Midway between ends and special points.
+        let special = |&k: &usize| points[k].special.is_some();
+        let special: Vec<usize> = (0..points.len()).filter(special).collect();
+        let off = |&k: &usize| {
+            let off = special.iter().map(|other| other.abs_diff(k));
+            off.fold(k.min(points.len() - 1 - k), usize::min)
+        };
+        let same = (0..points.len()).filter(|&k| index(&points[k]) == least);
+        let at = same.max_by_key(off)?;
+        let before = &points[at.saturating_sub(1)];
+        let after = points.get(at + 1).unwrap_or(&points[at]);
+        let along = [0, 1].map(|i| after.params[i] - before.params[i]);
+        Some((number, beside(plane, &points[at], along)?))
+    });
+    for (number, pair) in found.take(MOST_BESIDE) {
+        let leaves = pair.map(|leaf| beside_in_units(plane, leaf));
+        boundary.curves[number].beside = leaves.into();
+    }
+}
+
+fn beside_in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
+    let state = &leaf.solution.state;
+    let tips: Vec<DVec3> = state.tips().collect();
+    LeafBeside {
+        values: plane.values(leaf.solution.params),
+        index: leaf.index,
+        tips: plane.tips(&tips),
+        curves: plane.curves(state),
+        fallen_from: leaf.fallen_from.as_ref().map(|state| plane.curves(state)),
+    }
+}
+
+/// The boundary of stability in the plane of two parameters of a scenario: the curves on
+/// which the Morse index of a leaf changes. As JSON it is `boundary.json`.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Boundary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The parameters.
+    #[serde(rename = "vary")]
+    pub keys: [Keys; 2],
+    /// Their values at the ends of their ranges.
+    pub ranges: [[f64; 2]; 2],
+    /// Whether their logarithms are spaced evenly.
+    #[serde(skip)]
+    pub log: [bool; 2],
+    /// The second parameter at the first trace, at whose critical points curves begin; others
+    /// begin at those of the map's rows.
+    pub start: f64,
+    /// Number of rods.
+    pub rods: usize,
+    /// Whether the tips share one point.
+    #[serde(skip)]
+    pub joined: bool,
+    /// Required accuracy of the tips, relative to the longest rod.
+    pub tolerance: f64,
+    /// Whether there are curves, and all are known as far as requested.
+    pub complete: bool,
+    /// Why there is no curve, or fewer than there may be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+    /// What in the scenario is probably not what was intended.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
+    /// The curves.
+    pub curves: Vec<BoundaryCurve>,
+    /// The map under them, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<BoundaryMap>,
+    /// Matrices factorised to follow and verify the curves, without those of softened leaves,
+    /// and to follow the first trace and the paths between the cells of the map.
+    pub factorizations: usize,
+    /// Total time, in seconds.
+    pub wall_seconds: f64,
+}
+
+/// One curve.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryCurve {
+    /// What happens to a branch along the first parameter: a fold, or a crossing.
+    #[serde(serialize_with = "serialize_kind")]
+    pub kind: Kind,
+    /// How many modes become neutral.
+    pub multiplicity: usize,
+    /// How it ended: before its first point, and after its last.
+    pub ends: [End; 2],
+    /// Its points, ordered so that the second parameter increases from the first point or, where
+    /// that is also the last, has increased.
+    pub points: Vec<BoundaryPoint>,
+    /// Leaves on either side, for pictures: of a few curves, those that bound stable leaves if
+    /// there are any.
+    #[serde(skip)]
+    pub beside: Vec<LeafBeside>,
+}
+
+/// A leaf next to a curve, in the scenario's units, without an error estimate.
+#[derive(Clone, Debug)]
+pub struct LeafBeside {
+    /// Both parameters.
+    pub values: [f64; 2],
+    /// Morse index.
+    pub index: usize,
+    /// The shared tip alone, or every tip.
+    pub tips: Vec<DVec3>,
+    /// Centerlines, one per rod.
+    pub curves: Vec<Vec<DVec3>>,
+    /// If the stable leaf of the other side relaxes to it, the initial centerlines of that fall: of
+    /// the equilibrium at the same parameters or, at a fold, on the curve.
+    pub fallen_from: Option<Vec<Vec<DVec3>>>,
+}
+
+/// A point of a curve, in the scenario's units.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryPoint {
+    /// Its number on the curve, from 1.
+    pub point: usize,
+    /// `fold`, `branch-point`, `cusp` or `crossing`.
+    pub kind: &'static str,
+    /// Both parameters.
+    pub values: [f64; 2],
+    /// Bounds on their errors; zero for a given one.
+    pub errors: [f64; 2],
+    /// The shared tip alone, or every tip.
+    #[serde(flatten, serialize_with = "serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Bound on the error of the tips.
+    pub error: f64,
+    /// Morse index before the point and after it, along the first parameter; at a fold,
+    /// the lower and the higher one of the two branches that meet there.
+    pub index_before: usize,
+    /// See above.
+    pub index_behind: usize,
+    /// Fractions of the length of the nodes of the finest grid.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
+    /// Centerlines on the finest grid, one per rod.
+    #[serde(skip)]
+    pub curves: Vec<Vec<DVec3>>,
+}
+
+/// Cells of the plane of two parameters, of equal size on the scales of the axes.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryMap {
+    /// Values of the first parameter at the centres of the cells.
+    pub first: Vec<f64>,
+    /// Those of the second.
+    pub second: Vec<f64>,
+    /// Morse index of equilibria continued from cell to cell, beginning with that at
+    /// the start of the first parameter's range; row by row of the second; none where branches
+    /// turn back before, or could not be followed.
+    pub index: Vec<Vec<Option<usize>>>,
+    /// Cells for which the curves imply another index: column and row, from 1.
+    pub disagreeing: Vec<[usize; 2]>,
+}
+
+impl Boundary {
+    /// Edges of equal cells along one of the two parameters, from one end of its range to the
+    /// other: one more than there are cells.
+    pub fn edges(&self, which: usize, cells: usize) -> Vec<f64> {
+        let part = |k: usize| k as f64 / cells as f64;
+        (0..=cells)
+            .map(|k| value_between(self.ranges[which], self.log[which], part(k)))
+            .collect()
+    }
+}
+
+impl BoundaryMap {
+    /// Number of cells with an index.
+    pub fn known(&self) -> usize {
+        self.index.iter().flatten().flatten().count()
+    }
+}
+
+/// The word for the kind of a point.
+pub(super) fn word(kind: Kind, special: Option<Special>) -> &'static str {
+    match (special, kind) {
+        (Some(Special::Cusp), _) => "cusp",
+        (Some(Special::Crossing), _) => "crossing",
+        (None, Kind::Fold) => "fold",
+        (None, Kind::Branching) => "branch-point",
+    }
+}
+
+fn serialize_kind<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(word(*kind, None))
 }

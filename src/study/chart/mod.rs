@@ -1,29 +1,31 @@
 //! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
 //! measured together against one reference.
+//!
+//! The contents of a chart: contenders and their accuracy settings.
+//!
+//! The runs of one contender with one setting on a leaf.
+//!
+//! Fair timing: all settings take turns, so that a varying load of the machine affects
+//! them equally.
+//!
+//! The Pareto front of speed and accuracy.
+//!
+//! Cost against the number of veins, at a fixed accuracy.
 
-mod front;
-mod peers;
-mod plan;
-mod reference;
 mod result;
-mod rows;
-mod run;
-mod scaling;
-mod timing;
 
-use crate::refusal::RefusedOption;
-use run::Runs;
-use thiserror::Error;
-
-pub use peers::{Peer, PeerRow};
-pub use plan::{Contender, Setting};
-pub use reference::Reference;
-pub use result::{Chart, Decade, Ending, Row};
-pub use scaling::{Scaling, ScalingRow, scaling};
-pub use timing::{Spread, Turn};
-
-use crate::relax::{RelaxError, without_wind};
+use crate::relax::{
+    MAX_NODES, Method, Options, Outcome, RelaxError, SHOOTING_START, check_tolerance, without_wind,
+};
+use crate::run::RefusedOption;
 use crate::scenario::{Scenario, longest};
+use crate::shooting::Reason;
+pub use crate::study::chart::result::{Chart, Decade, Ending, Peer, PeerRow, Reference, Row};
+use crate::study::judge::{Answer, timed};
+use crate::{read_and_write, shooting};
+use serde::{Serialize, Serializer};
+use std::fmt;
+use thiserror::Error;
 
 /// Options of a chart.
 #[derive(Clone, Debug)]
@@ -77,15 +79,15 @@ pub fn chart(
     };
     let mut all: Vec<Runs> = options.contenders.iter().flat_map(each).collect();
     let (reference, rows, rounds) = on_one_thread(options.seconds, || {
-        let rounds = timing::measure(&mut all, options.seconds, progress);
-        let found = reference::find(scenario, rows::stations(&all))?;
+        let rounds = measure(&mut all, options.seconds, progress);
+        let found = result::find(scenario, result::stations(&all))?;
         let (reference, answer) = found.unzip();
-        Ok((reference, rows::rows(&all, answer.as_ref()), rounds))
+        Ok((reference, result::rows(&all, answer.as_ref()), rounds))
     })?;
     let rods = scenario.rods.len();
     let longest = longest(&scenario.rods);
-    let (peers, others) = peers::about(&options.peers, &scenario.name, rods, longest);
-    let mut remarks = rows::remarks(&rows, &options.contenders, reference.as_ref());
+    let (peers, others) = result::about(&options.peers, &scenario.name, rods, longest);
+    let mut remarks = result::remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {
         scenario: scenario.name.clone(),
@@ -114,4 +116,585 @@ fn on_one_thread<R: Send>(
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(work)?)
+}
+
+/// A method for an equilibrium, with one setting for its accuracy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Contender {
+    /// The method; the setting depends on whether it is used on one grid.
+    pub method: Method,
+    /// Whether it is used on one grid, with the number of segments as its setting, and not on
+    /// nested grids with extrapolation.
+    pub one_grid: bool,
+}
+
+/// The setting of a contender's accuracy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setting {
+    /// Required accuracy, relative to the longest rod.
+    Tolerance(f64),
+    /// Segments per rod.
+    Segments(usize),
+}
+
+/// Tolerances from coarse to fine.
+const TOLERANCES: [f64; 11] = [
+    1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11,
+];
+
+/// Single grids from coarse to fine.
+pub(super) const SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+
+impl Contender {
+    /// All of them; the first is the default.
+    pub const ALL: [Contender; 7] = {
+        const fn of(method: usize, one_grid: bool) -> Contender {
+            Contender {
+                method: Method::ALL[method],
+                one_grid,
+            }
+        }
+        [
+            of(0, false),
+            of(0, true),
+            of(1, false),
+            of(1, true),
+            of(2, false),
+            of(3, false),
+            of(4, false),
+        ]
+    };
+
+    /// The word used on the command line and in files.
+    pub fn word(self) -> &'static str {
+        match (self.method, self.one_grid) {
+            (Method::SemiImplicit(_), true) => "semi-implicit-grid",
+            (Method::Explicit { .. }, true) => "explicit-grid",
+            (method, _) => method.word(),
+        }
+    }
+
+    /// Whether it is the default of [`crate::relax::relax`].
+    pub fn is_default(self) -> bool {
+        self == Contender::ALL[0]
+    }
+
+    /// The settings that are charted, from coarse to fine.
+    pub fn knobs(self) -> Vec<Setting> {
+        match self.one_grid {
+            true => SEGMENTS.map(Setting::Segments).to_vec(),
+            false => TOLERANCES.map(Setting::Tolerance).to_vec(),
+        }
+    }
+}
+
+read_and_write!(Contender);
+
+impl Serialize for Setting {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// As in files: `tolerance=1e-6`, `segments=64`.
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Setting::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
+            Setting::Segments(segments) => write!(f, "segments={segments}"),
+        }
+    }
+}
+
+/// A leaf, a contender and its setting, with the results of its runs so far.
+pub struct Runs<'s> {
+    pub scenario: &'s Scenario,
+    pub contender: Contender,
+    pub knob: Setting,
+    /// The result of the first run. `None`: it was not run, since a coarser one of
+    /// its contender took too long.
+    pub found: Option<Result<Answer, RelaxError>>,
+    /// Seconds of each run; ascending once all are made.
+    pub seconds: Vec<f64>,
+}
+
+impl<'s> Runs<'s> {
+    /// Before the first run.
+    pub fn new(scenario: &'s Scenario, contender: Contender, knob: Setting) -> Self {
+        Runs {
+            scenario,
+            contender,
+            knob,
+            found: None,
+            seconds: Vec::new(),
+        }
+    }
+
+    /// The answer, unless the run was refused or not made.
+    pub fn answer(&self) -> Option<&Answer> {
+        self.found.as_ref()?.as_ref().ok()
+    }
+
+    /// The answer, if the leaf is at rest.
+    pub fn at_rest(&self) -> Option<&Answer> {
+        self.answer().filter(|run| run.at_rest())
+    }
+
+    /// The distance of the leaf at rest from the reference, relative to the longest rod.
+    pub fn error(&self, reference: Option<&Answer>) -> Option<f64> {
+        let distance = self.at_rest()?.distance(reference?)?;
+        Some(distance / longest(&self.scenario.rods))
+    }
+
+    /// Runs once; also returns the time from the checked scenario to the result, in seconds.
+    pub fn once(&self) -> Result<(Answer, f64), RelaxError> {
+        let (tolerance, segments) = match self.knob {
+            Setting::Tolerance(tolerance) => (Some(tolerance), None),
+            Setting::Segments(segments) => (None, Some(segments)),
+        };
+        if let Method::ShootingFromRest { .. } = self.contender.method {
+            let accuracy = tolerance.unwrap_or(self.scenario.tolerance);
+            return shoot_from_rest(self.scenario, accuracy);
+        }
+        let options = Options {
+            method: self.contender.method.on_grid(segments),
+            tolerance,
+            ..Options::default()
+        };
+        let (answer, seconds) = timed(|| Answer::relaxed(self.scenario, &options));
+        Ok((answer?, seconds))
+    }
+}
+
+/// Shooting from a coarsely relaxed leaf. The work of both is added, and no time is
+/// spent on counting eigenvalues.
+fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), RelaxError> {
+    shooting::check_models(scenario, true)?;
+    let options = Options {
+        tolerance: Some(SHOOTING_START),
+        ..Options::default()
+    };
+    let (found, seconds) = timed(|| {
+        let rest = Answer::relaxed(scenario, &options)?;
+        let precision = shooting::Precision::Error(accuracy);
+        let asked = shooting::Options::new(rest.as_start(), &rest.stations, precision);
+        let shot = rest
+            .at_rest()
+            .then(|| shooting::solve(scenario, &asked, &mut |_| {}));
+        Ok::<_, RelaxError>((rest, shot))
+    });
+    let (rest, shot) = found?;
+    let answer = match shot {
+        None => rest,
+        Some(Ok(solution)) => {
+            let shot = Answer::of_solution(scenario, solution, accuracy);
+            Answer {
+                outcome: match (shot.outcome, rest.outcome) {
+                    // The coarse relaxation only provides the start.
+                    (Outcome::Converged, Outcome::ToleranceNotReached) => Outcome::Converged,
+                    (Outcome::Converged, outcome) => outcome,
+                    (outcome, _) => outcome,
+                },
+                work: rest.work + shot.work,
+                ..shot
+            }
+        }
+        Some(Err(failure)) => Answer {
+            outcome: match failure.reason {
+                Reason::Singular(_) => Outcome::Singular,
+                _ => Outcome::NotAtRest,
+            },
+            remark: Some(failure.reason.to_string()),
+            error_estimate: None,
+            work: rest.work + failure.work.into(),
+            ..rest
+        },
+    };
+    Ok((answer, seconds))
+}
+
+/// Runs that take longer, in seconds, are slow: they are not repeated.
+const SLOW: f64 = 1.0;
+
+/// Shorter runs, in seconds, follow one that is not measured: those of the others have
+/// displaced their code and data from the processor's caches.
+const SHORT: f64 = 0.01;
+
+/// Least and largest number of runs of the others.
+const FEWEST: usize = 3;
+
+const MOST: usize = 101;
+
+/// Progress of the measurement.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn {
+    /// Veins of the leaf that is run next.
+    pub rods: usize,
+    /// The contender.
+    pub contender: Contender,
+    /// Its setting.
+    pub knob: Setting,
+    /// Present round.
+    pub round: usize,
+    /// Number of rounds, as far as known.
+    pub rounds: usize,
+}
+
+/// The spread of repeated measurements, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median.
+    #[serde(rename = "seconds")]
+    pub median: f64,
+    /// Shortest.
+    #[serde(rename = "seconds_min")]
+    pub min: f64,
+    /// First quartile.
+    #[serde(rename = "seconds_q1")]
+    pub q1: f64,
+    /// Third quartile.
+    #[serde(rename = "seconds_q3")]
+    pub q3: f64,
+    /// Number of measurements.
+    pub runs: usize,
+}
+
+impl Spread {
+    /// Of measurements in ascending order; `None` without any.
+    pub fn of(sorted: &[f64]) -> Option<Self> {
+        let last = sorted.len().checked_sub(1)?;
+        let at = |part: f64| {
+            let position = part * last as f64;
+            let below = position.floor() as usize;
+            let above = (below + 1).min(last);
+            let rest = position - below as f64;
+            (1.0 - rest) * sorted[below] + rest * sorted[above]
+        };
+        Some(Spread {
+            min: sorted[0],
+            q1: at(0.25),
+            median: at(0.5),
+            q3: at(0.75),
+            runs: sorted.len(),
+        })
+    }
+}
+
+/// The same keys without a measurement: all null, and no run.
+pub fn serialize_spread<S: Serializer>(
+    spread: &Option<Spread>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Default, Serialize)]
+    struct Nothing {
+        seconds: (),
+        seconds_min: (),
+        seconds_q1: (),
+        seconds_q3: (),
+        runs: usize,
+    }
+    match spread {
+        Some(spread) => spread.serialize(serializer),
+        None => Nothing::default().serialize(serializer),
+    }
+}
+
+/// Runs all settings once, in order, and those that are not slow [`FEWEST`] times;
+/// then repeatedly for about `budget` seconds in all, each for about the same time.
+/// Settings of one contender are ordered by cost: if one takes longer than
+/// the budget (or [`SLOW`]), those after it are not run. Returns the number of rounds.
+pub fn measure(all: &mut [Runs], budget: f64, progress: &mut (dyn FnMut(&Turn) + Send)) -> usize {
+    let mut run = |runs: &Runs, round: usize, rounds: usize| {
+        progress(&Turn {
+            rods: runs.scenario.rods.len(),
+            contender: runs.contender,
+            knob: runs.knob,
+            round,
+            rounds,
+        });
+        runs.once()
+    };
+    let longest = budget.max(SLOW);
+    let mut too_slow = Vec::new();
+    for runs in all.iter_mut() {
+        if too_slow.contains(&runs.contender) {
+            continue;
+        }
+        runs.found = Some(run(runs, 1, FEWEST).map(|(answer, time)| {
+            runs.seconds.push(time);
+            if time > longest {
+                too_slow.push(runs.contender);
+            }
+            answer
+        }));
+    }
+    let mut run_again = |runs: &mut Runs, round: usize, rounds: usize| {
+        if runs.seconds[0] < SHORT {
+            let _ = run(runs, round, rounds);
+        }
+        // It succeeded before, and does so again.
+        if let Ok((_, time)) = run(runs, round, rounds) {
+            runs.seconds.push(time);
+        }
+    };
+    let is_fast = |runs: &Runs| runs.seconds.first().is_some_and(|&time| time < SLOW);
+    for round in 1..FEWEST {
+        for runs in all.iter_mut().filter(|runs| is_fast(runs)) {
+            run_again(runs, round + 1, FEWEST);
+        }
+    }
+    let share = budget / all.iter().filter(|runs| is_fast(runs)).count().max(1) as f64;
+    let repeats: Vec<usize> = (all.iter())
+        .map(|runs| repeats(&runs.seconds, share))
+        .collect();
+    let rest = repeats.iter().copied().max().unwrap_or(0);
+    for round in 0..rest {
+        for (runs, repeats) in all.iter_mut().zip(&repeats) {
+            if runs_in(round, *repeats, rest) {
+                run_again(runs, FEWEST + round + 1, FEWEST + rest);
+            }
+        }
+    }
+    for runs in all {
+        runs.seconds.sort_by(f64::total_cmp);
+    }
+    FEWEST + rest
+}
+
+/// Number of further runs after the first few, within a `share` of the time: none for a slow
+/// one. The first run may be disturbed; the fastest one is used.
+fn repeats(seconds: &[f64], share: f64) -> usize {
+    let shortest = seconds.iter().copied().reduce(f64::min);
+    match shortest {
+        Some(time) if seconds.len() >= FEWEST => {
+            let all = if time < SHORT { 2.0 * time } else { time };
+            ((share / all) as usize).clamp(FEWEST, MOST) - FEWEST
+        }
+        _ => 0,
+    }
+}
+
+/// Whether a setting with so many `repeats` runs in this round: they are spread evenly over all
+/// `rounds`.
+fn runs_in(round: usize, repeats: usize, rounds: usize) -> bool {
+    (round + 1) * repeats / rounds > round * repeats / rounds
+}
+
+/// Which points (seconds, error) are on the Pareto front: no other is at least
+/// as fast and as accurate. Errors below `floor` count as equal; of equal points the
+/// first is on the front.
+pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
+    let error = |i: usize| points[i].1.max(floor);
+    let beats = |j: usize, i: usize| {
+        let (a, b) = (points[j].0, points[i].0);
+        a <= b && error(j) <= error(i) && (a < b || error(j) < error(i) || j < i)
+    };
+    (0..points.len())
+        .map(|i| (0..points.len()).all(|j| !beats(j, i)))
+        .collect()
+}
+
+/// Cost against the number of veins.
+#[derive(Clone, Debug, Serialize)]
+pub struct Scaling {
+    /// Name of the scenario.
+    #[serde(skip)]
+    pub scenario: String,
+    /// Required accuracy, relative to the longest rod.
+    pub tolerance: f64,
+    /// Numbers of veins whose reference is not confirmed.
+    pub unconfirmed: Vec<usize>,
+    /// One row for each leaf and contender.
+    #[serde(rename = "runs")]
+    pub rows: Vec<ScalingRow>,
+}
+
+/// One contender on one leaf.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingRow {
+    /// Number of veins.
+    pub rods: usize,
+    /// The measurement.
+    #[serde(flatten)]
+    pub row: Row,
+}
+
+/// Measures all contenders on these leaves, from few veins to many, at one
+/// tolerance. A contender on one grid gets the coarsest that is accurate
+/// enough.
+pub fn scaling(
+    leaves: &[Scenario],
+    tolerance: f64,
+    options: &ChartOptions,
+    progress: &mut (dyn FnMut(&Turn) + Send),
+) -> Result<Scaling, ChartError> {
+    check_tolerance(tolerance)?;
+    let mut leaves: Vec<&Scenario> = leaves.iter().collect();
+    leaves.sort_by_key(|leaf| leaf.rods.len());
+    leaves.dedup_by_key(|leaf| leaf.rods.len());
+    let (rows, unconfirmed) = on_one_thread(options.seconds, || {
+        measure_scaling(&leaves, tolerance, options, progress)
+    })?;
+    let first = leaves.first();
+    Ok(Scaling {
+        scenario: first.map_or(String::new(), |leaf| leaf.name.clone()),
+        tolerance,
+        unconfirmed,
+        rows,
+    })
+}
+
+type Found = (Vec<ScalingRow>, Vec<usize>);
+
+/// A leaf, its reference, and the coarsest grid that is accurate enough for it.
+struct Leaf<'s> {
+    scenario: &'s Scenario,
+    reference: Option<Answer>,
+    grid: Option<usize>,
+}
+
+fn measure_scaling(
+    leaves: &[&Scenario],
+    tolerance: f64,
+    options: &ChartOptions,
+    progress: &mut (dyn FnMut(&Turn) + Send),
+) -> Result<Found, RelaxError> {
+    let mut contenders = options.contenders.iter();
+    let any_grid = contenders.any(|contender| contender.one_grid);
+    let mut unconfirmed = Vec::new();
+    let leaves = leaves.iter().map(|&scenario| {
+        let (found, reference) = result::find(scenario, Vec::new())?.unzip();
+        if !found.is_some_and(|found| found.confirmed) {
+            unconfirmed.push(scenario.rods.len());
+        }
+        let grid = match &reference {
+            Some(reference) if any_grid => accurate_grid(scenario, reference, tolerance),
+            _ => None,
+        };
+        Ok(Leaf {
+            scenario,
+            reference,
+            grid,
+        })
+    });
+    let leaves: Vec<Leaf> = leaves.collect::<Result<_, RelaxError>>()?;
+    // From few veins to many: if a contender takes too long for one leaf,
+    // it is not tried on larger ones.
+    let (mut all, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    for &contender in &options.contenders {
+        for leaf in &leaves {
+            let knob = match (contender.one_grid, leaf.grid) {
+                (false, _) => Setting::Tolerance(tolerance),
+                (true, Some(segments)) => Setting::Segments(segments),
+                (true, None) => {
+                    rows.push(no_grid(leaf.scenario, contender));
+                    continue;
+                }
+            };
+            all.push(Runs::new(leaf.scenario, contender, knob));
+            of_leaf.push(leaf);
+        }
+    }
+    measure(&mut all, options.seconds, progress);
+    for (runs, leaf) in all.into_iter().zip(of_leaf) {
+        let rods = leaf.scenario.rods.len();
+        let row = result::rows(&[runs], leaf.reference.as_ref());
+        rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
+    }
+    let order = |contender| Contender::ALL.iter().position(|other| *other == contender);
+    rows.sort_by_key(|found| (order(found.row.contender), found.rods));
+    Ok((rows, unconfirmed))
+}
+
+/// The coarsest single grid whose error is within the tolerance.
+fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Option<usize> {
+    let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
+    let grids = Contender {
+        method: Method::default(),
+        one_grid: true,
+    };
+    let accurate = |&segments: &usize| {
+        let mut run = Runs::new(scenario, grids, Setting::Segments(segments));
+        run.found = Some(run.once().map(|(answer, _)| answer));
+        let error = run.error(Some(reference));
+        error.is_some_and(|error| error <= tolerance)
+    };
+    SEGMENTS.into_iter().take_while(fits).find(accurate)
+}
+
+fn no_grid(scenario: &Scenario, contender: Contender) -> ScalingRow {
+    let finest = SEGMENTS[SEGMENTS.len() - 1];
+    let ending = Ending::Ended(Outcome::ToleranceNotReached);
+    let why = format!("no grid of up to {finest} segments is accurate enough");
+    ScalingRow {
+        rods: scenario.rods.len(),
+        row: Row {
+            remark: Some(why),
+            ..Row::without_result(contender, Setting::Segments(finest), ending)
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn knobs_are_written_as_they_are_typed() {
+        assert_eq!(Setting::Tolerance(1e-11).to_string(), "tolerance=1e-11");
+        assert_eq!(Setting::Tolerance(1e-2).to_string(), "tolerance=1e-2");
+        assert_eq!(Setting::Segments(64).to_string(), "segments=64");
+    }
+
+    #[test]
+    fn every_contender_has_its_own_word() {
+        for contender in Contender::ALL {
+            assert_eq!(contender.word().parse(), Ok(contender));
+        }
+    }
+}
+
+#[cfg(test)]
+mod timing_tests {
+    use super::*;
+
+    #[test]
+    fn repeats_are_as_many_as_wanted_and_spread() {
+        for repeats in [0, 1, 2, 7, 100] {
+            let rounds: Vec<usize> = (0..100).filter(|&r| runs_in(r, repeats, 100)).collect();
+            assert_eq!(rounds.len(), repeats);
+            let gaps = rounds.windows(2).map(|pair| pair[1] - pair[0]);
+            assert!(gaps.max().unwrap_or(0) <= 100_usize.div_ceil(repeats.max(1)));
+        }
+    }
+
+    #[test]
+    fn fast_runs_are_repeated_often_and_slow_ones_not() {
+        assert_eq!(repeats(&[1e-6; 3], 0.1), MOST - FEWEST);
+        assert_eq!(repeats(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST);
+        assert_eq!(repeats(&[2.0], 0.1), 0);
+    }
+
+    #[test]
+    fn quartiles() {
+        let spread = Spread::of(&[1.0, 2.0, 3.0, 4.0, 10.0]).unwrap();
+        let found = [spread.min, spread.q1, spread.median, spread.q3];
+        assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
+        let spread = Spread::of(&[1.0, 2.0]).unwrap();
+        assert_eq!((spread.q1, spread.median), (1.25, 1.5));
+        assert_eq!(Spread::of(&[]), None);
+    }
+}
+
+#[cfg(test)]
+mod front_tests {
+    use super::*;
+
+    #[test]
+    fn of_equal_points_one_is_on_the_front_and_small_errors_are_equal() {
+        assert_eq!(front(&[(1.0, 1e-3); 3], 0.0), [true, false, false]);
+        let points = [(1.0, 1e-13), (2.0, 1e-15), (3.0, 0.0)];
+        assert_eq!(front(&points, 1e-12), [true, false, false]);
+        assert_eq!(front(&points, 0.0), [true, true, true]);
+    }
 }

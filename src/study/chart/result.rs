@@ -1,14 +1,19 @@
 //! The result of a chart: `chart.json`.
+//!
+//! Rows of a chart from the results of runs: true errors, and runs that ended in another
+//! equilibrium.
+//!
+//! The solution against which all others are measured.
+//!
+//! Measurements of other programs, next to ours.
 
+use crate::relax::{Method, Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
+use crate::scenario::{Scenario, longest};
+use crate::shooting;
+use crate::shooting::Start;
+use crate::study::chart::{Contender, Runs, Scaling, Setting, Spread, front, serialize_spread};
+use crate::study::judge::{Answer, common, union};
 use serde::{Serialize, Serializer};
-
-use super::front::front;
-use super::peers::Peer;
-use super::plan::{Contender, Setting};
-use super::reference::Reference;
-use super::scaling::Scaling;
-use super::timing::{Spread, serialize_spread};
-use crate::relax::Outcome;
 
 /// Outcome of a run in a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -230,5 +235,623 @@ impl Chart {
         for (peer, on_front) in self.peers.iter_mut().zip(marks) {
             peer.pareto = on_front && peer.point().is_some();
         }
+    }
+}
+
+/// Errors above this are not due to discretisation if the run's own estimate is
+/// less than half as large: it is another equilibrium.
+const ELSEWHERE: f64 = 1e-2;
+
+const MUCH_LESS: f64 = 0.5;
+
+/// Stations required of the reference: those of all runs, so that
+/// nothing has to be interpolated. The stations of runs on one grid are usually among those of
+/// the others; only those that are not are added.
+pub fn stations(all: &[Runs]) -> Vec<f64> {
+    let runs = || all.iter().filter_map(Runs::answer);
+    let Some(fewest) = runs().min_by_key(|run| run.stations.len()) else {
+        return Vec::new();
+    };
+    let mut wanted = fewest.stations.clone();
+    for run in runs() {
+        if common(&run.stations, &fewest.stations).len() < fewest.stations.len() {
+            wanted.extend(&run.stations);
+        }
+    }
+    wanted
+}
+
+/// The rows of one leaf.
+pub fn rows(all: &[Runs], reference: Option<&Answer>) -> Vec<Row> {
+    let errors: Vec<Option<f64>> = all.iter().map(|runs| runs.error(reference)).collect();
+    let row = |i: usize| row(&all[i], errors[i], is_elsewhere(i, all, &errors));
+    (0..all.len()).map(row).collect()
+}
+
+/// Whether the error of a run is due to another equilibrium.
+fn is_elsewhere(i: usize, all: &[Runs], errors: &[Option<f64>]) -> bool {
+    let this = &all[i];
+    let (Some(answer), Some(error)) = (this.at_rest(), errors[i]) else {
+        return false;
+    };
+    if error <= ELSEWHERE {
+        return false;
+    }
+    let unit = longest(&this.scenario.rods);
+    if !this.contender.one_grid {
+        let estimate = answer.error_estimate.map(|estimate| estimate / unit);
+        return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
+    }
+    // On one grid, without an error estimate: if a coarser grid is much more accurate,
+    // or the next grid has nearly the same shape.
+    let alike = |other: &usize| all[*other].contender == this.contender;
+    let mut coarser = (0..i).filter(alike);
+    if coarser.any(|it| errors[it].is_some_and(|there| there < MUCH_LESS * error)) {
+        return true;
+    }
+    let at_rest = |other: usize| all[other].at_rest();
+    let finer = (i + 1..all.len()).find(alike).and_then(at_rest);
+    let next = finer.or_else(|| (0..i).rfind(alike).and_then(at_rest));
+    let apart = next.and_then(|next| answer.distance(next));
+    apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
+}
+
+fn row(runs: &Runs, error: Option<f64>, elsewhere: bool) -> Row {
+    let blank = Row {
+        seconds: Spread::of(&runs.seconds),
+        ..Row::without_result(runs.contender, runs.knob, Ending::NotRun)
+    };
+    let run = match &runs.found {
+        None => return blank,
+        Some(Err(refusal)) => {
+            return Row {
+                ending: Ending::Refused,
+                remark: Some(refusal.to_string()),
+                ..blank
+            };
+        }
+        Some(Ok(run)) => run,
+    };
+    let ending = match run.outcome {
+        Outcome::Saddle => Ending::Ended(Outcome::Saddle),
+        _ if elsewhere => Ending::OtherEquilibrium,
+        outcome => Ending::Ended(outcome),
+    };
+    let unit = longest(&runs.scenario.rods);
+    Row {
+        steps: Some(run.work.steps),
+        factorizations: Some(run.work.factorizations),
+        force_evaluations: Some(run.work.force_evaluations),
+        true_error: error,
+        error_estimate: run.error_estimate.map(|estimate| estimate / unit),
+        ending,
+        // An unknown number of negative eigenvalues is not a failure.
+        remark: run.remark.clone().filter(|_| !ending.is_success()),
+        ..blank
+    }
+}
+
+/// Remarks on these rows and their reference.
+pub fn remarks(
+    rows: &[Row],
+    contenders: &[Contender],
+    reference: Option<&Reference>,
+) -> Vec<String> {
+    let floor = reference.map_or(0.0, |found| found.known_within);
+    let neutral = reference.and_then(|found| found.neutral.as_ref());
+    let mut remarks = Vec::new();
+    let mut methods = contenders.iter().map(|contender| contender.method);
+    if methods.any(|method| matches!(method, Method::Explicit { .. })) {
+        let step = "it takes the longest stable one";
+        remarks.push(format!(
+            "explicit relaxation has no knob for its time step: {step}"
+        ));
+    }
+    if let Some(neutral) = neutral {
+        remarks.push(format!(
+            "errors tell little: {neutral}, and runs come to rest in different places"
+        ));
+    }
+    for &contender in contenders {
+        remarks.extend(remarks_on(contender, rows, floor, neutral.is_some()));
+    }
+    remarks
+}
+
+fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let of_it = || rows.iter().filter(|row| row.contender == contender);
+    let word = contender.word();
+    if of_it().all(|row| row.ending == Ending::Refused)
+        && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
+    {
+        remarks.push(format!("{word} is not charted: {why}"));
+    }
+    if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
+        let why = "the run before took too long; allow more seconds";
+        remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
+    }
+    // Estimates that are smaller than the true error are reported here.
+    let too_small = |row: &&Row| {
+        let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
+        row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
+    };
+    let knobs = of_it().filter(too_small).map(|row| row.knob.to_string());
+    let knobs: Vec<String> = knobs.collect();
+    if !knobs.is_empty() && !neutral {
+        let knobs = knobs.join(", ");
+        remarks.push(format!("{word} underestimates its error at {knobs}"));
+    }
+    remarks
+}
+
+/// Tolerances of the relaxation: first one that most leaves reach, then the
+/// best one, or else one that requires fewer grids.
+const FIRST: f64 = 1e-10;
+
+const LARGER: f64 = 1e-4;
+
+/// The reference and its reliability. Lengths are relative to the longest rod.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reference {
+    /// Whether relaxation and shooting agree within their error estimates.
+    pub confirmed: bool,
+    /// A sentence: which solution it is, and why it is not confirmed.
+    pub told: String,
+    /// Accuracy of the reference: the smaller of both error estimates, or the difference
+    /// of both solutions if that is larger and they agree. Smaller errors cannot be
+    /// distinguished from zero.
+    pub known_within: f64,
+    /// Error estimate of the relaxation, if the leaf came to rest.
+    pub relaxation_estimate: Option<f64>,
+    /// Error estimate of the shooting, if it found a solution.
+    pub shooting_estimate: Option<f64>,
+    /// Largest distance between both.
+    pub difference: Option<f64>,
+    /// How the leaf can move without resistance, if it can: errors then include the
+    /// position at which a run came to rest along that neutral direction.
+    pub neutral: Option<String>,
+}
+
+/// Finds the reference of a scenario, at the `wanted` stations if shooting
+/// succeeds. `None` if neither method finds an equilibrium.
+///
+/// # Errors
+/// If the leaf cannot be relaxed at all.
+pub fn find(
+    scenario: &Scenario,
+    wanted: Vec<f64>,
+) -> Result<Option<(Reference, Answer)>, RelaxError> {
+    let relaxed = best_relaxed(scenario)?;
+    let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
+    let ends = [0.0, 1.0].into_iter();
+    let stations = union(ends.chain(wanted).chain(known.copied()).collect());
+    let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
+    let precision = shooting::Precision::Error(SMALLEST_TOLERANCE);
+    let options = shooting::Options::new(start, &stations, precision);
+    let solved = shooting::solve(scenario, &options, &mut |_| {});
+    let neutral = match &solved {
+        Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
+        Err(_) => None,
+    };
+    let shot = solved.map(|solution| Answer::of_solution(scenario, solution, SMALLEST_TOLERANCE));
+    let unit = longest(&scenario.rods);
+    let estimate = |answer: &Answer| answer.error() / unit;
+    let mut reference = Reference {
+        confirmed: false,
+        told: String::new(),
+        known_within: 0.0,
+        relaxation_estimate: relaxed.as_ref().map(estimate),
+        shooting_estimate: shot.as_ref().ok().map(estimate),
+        difference: None,
+        neutral,
+    };
+    let (told, answer) = match (relaxed, shot) {
+        (Some(leaf), Ok(shot)) => {
+            let distance = leaf.distance(&shot);
+            reference.difference = distance.map(|distance| distance / unit);
+            reference.confirmed = distance.is_some_and(|apart| leaf.confirms(&shot, apart));
+            choose(leaf, shot, reference.confirmed)
+        }
+        (Some(leaf), Err(failure)) => {
+            let why = &failure.reason;
+            let told = format!("the relaxed leaf: shooting does not confirm it, {why}");
+            (told, leaf)
+        }
+        (None, Ok(shot)) => (
+            "the boundary-value solution from arcs: the relaxation does not come to rest".into(),
+            shot,
+        ),
+        (None, Err(_)) => return Ok(None),
+    };
+    let estimates = [reference.relaxation_estimate, reference.shooting_estimate];
+    let better = (estimates.into_iter().flatten()).fold(f64::INFINITY, f64::min);
+    reference.told = told;
+    reference.known_within = match reference.difference {
+        Some(difference) if reference.confirmed => better.max(difference),
+        _ => better,
+    };
+    Ok(Some((reference, answer)))
+}
+
+/// The most accurate relaxation that comes to rest.
+fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
+    let at = |tolerance: f64| {
+        let options = Options {
+            tolerance: Some(tolerance),
+            ..Options::default()
+        };
+        Ok(Some(Answer::relaxed(scenario, &options)?).filter(Answer::at_rest))
+    };
+    let Some(first) = at(FIRST)? else {
+        return at(LARGER);
+    };
+    if first.outcome == Outcome::ToleranceNotReached {
+        return Ok(Some(first));
+    }
+    let better = at(SMALLEST_TOLERANCE)?;
+    Ok(better
+        .filter(|leaf| leaf.error_estimate <= first.error_estimate)
+        .or(Some(first)))
+}
+
+/// The boundary-value solution, which is known at all stations, if both agree;
+/// otherwise the one with the smaller error estimate.
+fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
+    let leaf_is_better = leaf.error() < shot.error();
+    let told = match (confirmed, leaf_is_better) {
+        (true, _) => "relaxation and shooting agree within their error estimates",
+        (false, true) => "the relaxed leaf: shooting finds another shape",
+        (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
+    };
+    let takes_leaf = !confirmed && leaf_is_better;
+    (told.into(), if takes_leaf { leaf } else { shot })
+}
+
+/// First words of outcomes that are equilibria.
+const AT_REST: [&str; 2] = ["converged", "at-rest"];
+
+/// First word of the outcome of a measurement that is not a search for an equilibrium.
+const COMPLETED: &str = "completed";
+
+/// One measurement of another program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeerRow {
+    /// The program.
+    pub program: String,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Veins of the leaf.
+    pub rods: usize,
+    /// The setting for its accuracy; other settings follow after a blank.
+    pub knob: String,
+    /// The time it took.
+    pub seconds: f64,
+    /// Largest distance of its positions from the solution, in units of length.
+    pub error: Option<f64>,
+    /// How it ended.
+    pub outcome: String,
+}
+
+/// A peer's measurements at one setting.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Peer {
+    /// The program, with its other settings.
+    #[serde(rename = "program")]
+    pub name: String,
+    /// The value of its accuracy setting.
+    pub knob: String,
+    /// Times of all rows with these settings.
+    #[serde(flatten)]
+    pub seconds: Spread,
+    /// The largest error of these rows, relative to the longest rod; `None`
+    /// if it did not come to rest.
+    pub true_error: Option<f64>,
+    /// How it ended.
+    pub outcome: String,
+    /// Whether it is on the Pareto front.
+    pub pareto: bool,
+    /// Its time over that of the default contender at an error at most as large.
+    pub ratio: Option<f64>,
+}
+
+impl Peer {
+    /// Seconds and error, if it came to rest.
+    pub fn point(&self) -> Option<(f64, f64)> {
+        Some((self.seconds.median, self.true_error?))
+    }
+}
+
+/// The rows for a leaf, rows with equal settings combined, and remarks on
+/// the others. Errors become relative to the longest rod.
+pub fn about(
+    rows: &[PeerRow],
+    scenario: &str,
+    rods: usize,
+    longest: f64,
+) -> (Vec<Peer>, Vec<String>) {
+    let mut peers: Vec<Peer> = Vec::new();
+    let mut times: Vec<Vec<f64>> = Vec::new();
+    let (mut other, mut silent) = (0, 0);
+    for row in rows {
+        if row.scenario != scenario || row.rods != rods {
+            other += 1;
+            continue;
+        }
+        let word = row.outcome.split_whitespace().next().unwrap_or_default();
+        let at_rest = AT_REST.contains(&word);
+        if row.error.is_none() && (at_rest || word == COMPLETED) {
+            silent += 1;
+            continue;
+        }
+        let true_error = row.error.filter(|_| at_rest).map(|error| error / longest);
+        let (knob, settings) = row.knob.split_once(' ').unwrap_or((&row.knob, ""));
+        let name = format!("{} {settings}", row.program).trim_end().to_string();
+        let same =
+            |peer: &Peer| peer.name == name && peer.knob == knob && peer.outcome == row.outcome;
+        let same = peers.iter().position(same);
+        let same = same.unwrap_or_else(|| {
+            peers.push(Peer {
+                name,
+                knob: knob.into(),
+                seconds: Spread::default(),
+                true_error,
+                outcome: row.outcome.clone(),
+                pareto: false,
+                ratio: None,
+            });
+            times.push(Vec::new());
+            times.len() - 1
+        });
+        times[same].push(row.seconds);
+        if true_error > peers[same].true_error {
+            peers[same].true_error = true_error;
+        }
+    }
+    for (peer, seconds) in peers.iter_mut().zip(&mut times) {
+        seconds.sort_by(f64::total_cmp);
+        peer.seconds = Spread::of(seconds).unwrap_or_default();
+    }
+    let rows = |count: usize| match count {
+        1 => "1 row of --peers is".to_string(),
+        count => format!("{count} rows of --peers are"),
+    };
+    let mut remarks = Vec::new();
+    if other > 0 {
+        remarks.push(format!("{} about another leaf, and left out", rows(other)));
+    }
+    if silent > 0 {
+        let what = "without the error of a leaf at rest, and left out";
+        remarks.push(format!("{} {what}", rows(silent)));
+    }
+    (peers, remarks)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scenario::Scenario;
+    use crate::study::judge::tests::rod;
+
+    const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
+
+    fn scenario() -> Scenario {
+        let leaf = r#"
+            name = "cantilever"
+            leaf = { rods = 1, length = 2.0, fan = [0.0] }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+        "#;
+        Scenario::from_toml(leaf).unwrap()
+    }
+
+    /// Straight but for a shift of its tip; the estimate is relative to the length
+    /// of 2.
+    fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Answer {
+        Answer {
+            outcome,
+            remark: Some("why".into()),
+            error_estimate: estimate.map(|estimate| 2.0 * estimate),
+            ..rod(&STATIONS, 2.0, |sigma| {
+                DVec3::new(2.0 * sigma, 0.0, shift * sigma)
+            })
+        }
+    }
+
+    type Found = Option<Result<Answer, crate::relax::RelaxError>>;
+
+    fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Found {
+        Some(Ok(answer(outcome, shift, estimate)))
+    }
+
+    /// The runs of a contender with these results at its first settings.
+    fn runs(scenario: &Scenario, contender: Contender, found: Vec<Found>) -> Vec<Runs<'_>> {
+        let runs = contender.knobs().into_iter().zip(found);
+        runs.map(|(knob, found)| Runs {
+            found,
+            seconds: vec![1.0],
+            ..Runs::new(scenario, contender, knob)
+        })
+        .collect()
+    }
+
+    /// Their rows, and those of its other settings, which are not run.
+    fn judged(contender: &str, found: Vec<Found>) -> Vec<Row> {
+        let (scenario, contender) = (scenario(), contender.parse::<Contender>().unwrap());
+        let mut runs = runs(&scenario, contender, found);
+        let rest = contender.knobs().into_iter().skip(runs.len());
+        runs.extend(rest.map(|knob| Runs::new(&scenario, contender, knob)));
+        rows(&runs, Some(&answer(Outcome::Converged, 0.0, None)))
+    }
+
+    fn words(rows: &[Row]) -> Vec<&'static str> {
+        rows.iter().map(|row| row.ending.word()).collect()
+    }
+
+    #[test]
+    fn errors_are_relative_and_what_ends_elsewhere_is_no_success() {
+        let rows = judged(
+            "shooting",
+            vec![
+                found(Outcome::Converged, 2e-4, Some(3e-4)),
+                found(Outcome::Converged, 0.5, Some(1e-3)),
+                found(Outcome::Saddle, 0.5, Some(1e-3)),
+                found(Outcome::NotAtRest, 0.5, None),
+                found(Outcome::Converged, 0.03, Some(1e-2)),
+            ],
+        );
+        let wanted = ["converged", "other-equilibrium", "saddle", "not-at-rest"];
+        assert_eq!(words(&rows)[..4], wanted);
+        assert_eq!(words(&rows)[4..6], ["converged", "not-run"]);
+        assert_eq!(rows[0].point(), Some((1.0, 1e-4)));
+        assert_eq!(rows[0].error_estimate, Some(3e-4));
+        assert_eq!((rows[1].true_error, rows[3].true_error), (Some(0.25), None));
+        // Remarks are for failures.
+        assert_eq!(rows[0].remark, None);
+        assert_eq!(rows[3].remark.as_deref(), Some("why"));
+    }
+
+    /// A coarse grid may have a large error because it is coarse, unless the next grid has
+    /// the same one.
+    #[test]
+    fn a_coarse_grid_is_not_called_another_equilibrium() {
+        let elsewhere = |shifts: &[f64]| -> Vec<bool> {
+            let at = |shift: &f64| found(Outcome::Converged, *shift, None);
+            let rows = judged("semi-implicit-grid", shifts.iter().map(at).collect());
+            let rows = rows.iter().take(shifts.len());
+            rows.map(|row| row.ending == Ending::OtherEquilibrium)
+                .collect()
+        };
+        assert_eq!(elsewhere(&[1.6, 0.4, 0.1, 0.025]), [false; 4]);
+        assert_eq!(elsewhere(&[0.52, 0.51, 0.505]), [true; 3]);
+        let astray = elsewhere(&[0.4, 0.1, 0.5, 6e-3]);
+        assert_eq!(astray, [false, false, true, false]);
+    }
+
+    #[test]
+    fn underestimates_are_told() {
+        let told = [(2e-4, 1e-5), (2e-12, 1e-15)];
+        let told = told.map(|(shift, told)| found(Outcome::Converged, shift, Some(told)));
+        let rows = judged("semi-implicit", told.into());
+        let mut reference = Reference {
+            confirmed: true,
+            told: String::new(),
+            known_within: 1e-11,
+            relaxation_estimate: None,
+            shooting_estimate: None,
+            difference: None,
+            neutral: None,
+        };
+        let contenders = [Contender::ALL[0]];
+        let told = remarks(&rows, &contenders, Some(&reference));
+        assert!(told[0].starts_with("semi-implicit is not run from tolerance=1e-3 on"));
+        let wrong = "semi-implicit underestimates its error at tolerance=1e-1";
+        assert_eq!(told[1..], [wrong]);
+        // Along a neutral direction no estimate can be wrong.
+        reference.neutral = Some("the leaf can move".into());
+        let told = remarks(&rows, &contenders, Some(&reference));
+        assert!(told[0].starts_with("errors tell little: the leaf can move"));
+        assert_eq!(told.len(), 2, "{told:?}");
+    }
+
+    #[test]
+    fn the_reference_is_wanted_where_a_run_has_stations_of_its_own() {
+        let scenario = scenario();
+        let with = |stations: &[f64]| {
+            let run = Answer {
+                stations: stations.to_vec(),
+                ..answer(Outcome::Converged, 0.0, None)
+            };
+            let contender = Contender::ALL[0];
+            Runs {
+                found: Some(Ok(run)),
+                ..Runs::new(&scenario, contender, contender.knobs()[0])
+            }
+        };
+        let nested = [with(&[0.0, 0.25, 0.5, 0.75, 1.0]), with(&STATIONS)];
+        assert_eq!(stations(&nested), STATIONS);
+        let other = [with(&[0.0, 0.3, 0.6, 1.0]), with(&STATIONS)];
+        assert_eq!(stations(&other), [0.0, 0.5, 1.0, 0.0, 0.3, 0.6, 1.0]);
+        assert!(stations(&[]).is_empty());
+    }
+}
+
+#[cfg(test)]
+mod reference_tests {
+    use super::*;
+
+    #[test]
+    fn another_shape_does_not_confirm_and_the_better_is_taken() {
+        let leaf = r#"
+            name = "fan"
+            leaf = { rods = 2, length = 2.0, fan = "symmetric" }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+            load = { gravity = [0.0, 0.0, -0.1] }
+        "#;
+        let scenario = Scenario::from_toml(leaf).unwrap();
+        let relaxed = best_relaxed(&scenario).unwrap().unwrap();
+        let (_, mut elsewhere) = find(&scenario, Vec::new()).unwrap().unwrap();
+        for node in elsewhere.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+            node.position.z += 1e-6;
+        }
+        for (error, is_taken) in [(1e-16, true), (1e-7, false)] {
+            elsewhere.error_estimate = Some(error);
+            let apart = relaxed.distance(&elsewhere).unwrap();
+            assert!(!relaxed.confirms(&elsewhere, apart));
+            let (_, taken) = choose(relaxed.clone(), elsewhere.clone(), false);
+            assert_eq!(taken.rods == elsewhere.rods, is_taken);
+        }
+        // An estimate as large as the difference confirms little, but validly.
+        elsewhere.error_estimate = Some(3e-6);
+        assert!(relaxed.confirms(&elsewhere, 1e-6));
+    }
+}
+
+#[cfg(test)]
+mod peers_tests {
+    use super::*;
+
+    /// program, scenario, rods, knob, seconds, error, outcome.
+    fn row(text: &str) -> PeerRow {
+        let cell: Vec<&str> = text.split(',').collect();
+        PeerRow {
+            program: cell[0].into(),
+            scenario: cell[1].into(),
+            rods: cell[2].parse().unwrap(),
+            knob: cell[3].into(),
+            seconds: cell[4].parse().unwrap(),
+            error: cell[5].parse().ok(),
+            outcome: cell[6].into(),
+        }
+    }
+
+    #[test]
+    fn equal_rows_are_taken_together_and_others_counted() {
+        let rows = [
+            "a,leaf,5,n=10,3,4e-3,converged",
+            "a,leaf,5,n=10,1,4e-3,converged",
+            "a,leaf,5,n=10,2,4e-3,converged",
+            "a,leaf,5,n=10 own-law,2,6e-3,at-rest",
+            "a,leaf,5,n=20,2,,not-converged newton",
+            "a,leaf,5,n=30,2,,converged",
+            "a,leaf,5,n=30 steps=9,2,,completed",
+            "a,leaf,7,n=10,2,1e-3,converged",
+            "a,tree,5,n=10,2,1e-3,converged",
+            "a,tree,5,n=20,2,1e-3,converged",
+        ]
+        .map(row);
+        let (peers, remarks) = about(&rows, "leaf", 5, 2.0);
+        let names = peers.iter().map(|peer| (&peer.name[..], &peer.knob[..]));
+        let names: Vec<(&str, &str)> = names.collect();
+        assert_eq!(names, [("a", "n=10"), ("a own-law", "n=10"), ("a", "n=20")]);
+        assert_eq!((peers[0].seconds.median, peers[0].seconds.runs), (2.0, 3));
+        assert_eq!(peers[0].true_error, Some(2e-3));
+        assert_eq!(peers[2].true_error, None);
+        let wanted = [
+            "3 rows of --peers are about another leaf, and left out",
+            "2 rows of --peers are without the error of a leaf at rest, and left out",
+        ];
+        assert_eq!(remarks, wanted);
     }
 }

@@ -1,13 +1,22 @@
 //! Measured data, as read from CSV: experiments and traced veins.
+//!
+//! Which columns of a file are which quantities, and how a file is thinned.
+//!
+//! Experiments with the points traced on their veins; those under the same conditions share a
+//! leaf.
+//!
+//! Quantities that can be measured on a leaf.
+//!
+//! What a traced point tells of the place where it is: coordinates in space, or in a photograph.
 
-use std::collections::BTreeMap;
-
-use super::FitError;
-use super::columns::{MeasuredColumn, NAME, Reading, TRACED};
-use super::quantity::Quantity;
-use super::table::{Table, refuse};
-use super::view::{COORDINATES, IN_PHOTO, Seen};
+use crate::scenario::{Photo, PhotoRate};
 use crate::study::Keys;
+use crate::study::fit::FitError;
+use crate::study::fit::table::{Table, refuse};
+use glam::DVec3;
+use std::collections::{BTreeMap, HashMap};
+use std::num::NonZeroUsize;
+use std::str::FromStr;
 
 /// Origin of a number: a file and a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -382,4 +391,478 @@ fn experiments(
         found.push(experiment);
     }
     Ok(found)
+}
+
+/// The column of the names of experiments.
+pub(super) const NAME: &str = "experiment";
+
+/// Columns of points on veins.
+pub(super) const TRACED: [&str; 9] = [
+    "rod", "x", "y", "z", "pixel_x", "pixel_y", "sigma", "sd", NAME,
+];
+
+/// Whether this is the name of a column that a fit uses.
+pub(super) fn is_known(name: &str) -> bool {
+    let quantity = name.strip_prefix("sd_").unwrap_or(name);
+    TRACED.contains(&name) || quantity.parse::<Quantity>().is_ok() || name.parse::<Keys>().is_ok()
+}
+
+/// A column of a file by the name that it has there, and what it is here:
+/// `NAME=QUANTITY[:FACTOR][+OFFSET]`. The quantity is the factor times the number in the file,
+/// plus the offset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredColumn {
+    /// Its name in the file.
+    pub name: String,
+    /// Its name here: a key of the scenario, a result, or another column of the data.
+    pub quantity: String,
+    /// Factor, such as of a unit.
+    pub factor: f64,
+    /// Offset, in the unit of the scenario.
+    pub offset: f64,
+}
+
+/// The two numbers in FACTOR, FACTOR+OFFSET and FACTOR-OFFSET.
+fn factor_and_offset(text: &str) -> Option<(f64, f64)> {
+    let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
+    let sign = text.char_indices().skip(1).find(|(at, character)| {
+        matches!(character, '+' | '-') && !text[..*at].ends_with(['e', 'E'])
+    });
+    let (factor, offset) = text.split_at(sign.map_or(text.len(), |(at, _)| at));
+    let offset = if offset.is_empty() {
+        Some(0.0)
+    } else {
+        finite(offset)
+    };
+    Some((finite(factor).filter(|factor| *factor != 0.0)?, offset?))
+}
+
+impl FromStr for MeasuredColumn {
+    type Err = FitError;
+
+    fn from_str(text: &str) -> Result<Self, FitError> {
+        let refuse = |why: &str| Err(FitError::Data(format!("column {text}: {why}")));
+        // The name may have the characters = and :, and the quantity has none behind its key.
+        let Some((name, rest)) = text.rsplit_once('=') else {
+            return refuse(
+                "write NAME=QUANTITY, the name in the file and what it is, such as Force=load.tip_force[0]",
+            );
+        };
+        let (name, rest) = (name.trim(), rest.trim());
+        if name.is_empty() {
+            return refuse("write the name that it has in the file before =");
+        }
+        let (quantity, [factor, offset]) = match rest.rsplit_once(':') {
+            _ if is_known(rest) => (rest, [1.0, 0.0]),
+            None => (rest, [1.0, 0.0]),
+            Some((quantity, numbers)) => match factor_and_offset(numbers.trim()) {
+                Some((factor, offset)) => (quantity.trim(), [factor, offset]),
+                None => {
+                    return refuse(
+                        "behind : stands a factor, which is not 0, and an offset if there is one, such as 1e-3 or 1e-3+0.12",
+                    );
+                }
+            },
+        };
+        if !is_known(quantity) {
+            return refuse(&format!(
+                "{quantity} is no quantity: {}",
+                match quantity.parse::<Keys>() {
+                    Err(refused) if quantity.contains('.') => refused.to_string(),
+                    _ => format!(
+                        "keys of the scenario, results ({}), their standard deviations (sd_tip_x), and {} are",
+                        Quantity::ALL,
+                        TRACED.join(", ")
+                    ),
+                }
+            ));
+        }
+        if quantity == NAME && [factor, offset] != [1.0, 0.0] {
+            return refuse("a name has no factor and no offset: leave them out");
+        }
+        Ok(MeasuredColumn {
+            name: name.into(),
+            quantity: quantity.into(),
+            factor,
+            offset,
+        })
+    }
+}
+
+/// How the number in a column compares with a given one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comparison {
+    /// `<`
+    Less,
+    /// `<=`
+    AtMost,
+    /// `>`
+    Greater,
+    /// `>=`
+    AtLeast,
+    /// `=`
+    Equal,
+}
+
+/// Longer signs come before those that they begin with.
+const COMPARISONS: [(&str, Comparison); 5] = [
+    ("<=", Comparison::AtMost),
+    (">=", Comparison::AtLeast),
+    ("<", Comparison::Less),
+    (">", Comparison::Greater),
+    ("=", Comparison::Equal),
+];
+
+/// A condition on the rows of a table: `COLUMN>VALUE`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowCondition {
+    /// The column by its name here: a key, a result, or another column of the data.
+    pub column: String,
+    /// How its number compares with the value.
+    pub comparison: Comparison,
+    /// The value, in the units of the scenario.
+    pub value: f64,
+}
+
+impl RowCondition {
+    /// Whether a row with this number is read.
+    pub(super) fn admits(&self, number: f64) -> bool {
+        match self.comparison {
+            Comparison::Less => number < self.value,
+            Comparison::AtMost => number <= self.value,
+            Comparison::Greater => number > self.value,
+            Comparison::AtLeast => number >= self.value,
+            Comparison::Equal => number == self.value,
+        }
+    }
+}
+
+/// Conditions on rows, all of which are met: `COLUMN>VALUE`, joined by `and`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowChoice {
+    /// The conditions.
+    pub conditions: Vec<RowCondition>,
+}
+
+impl FromStr for RowChoice {
+    type Err = FitError;
+
+    fn from_str(text: &str) -> Result<Self, FitError> {
+        let refuse = |why: String| FitError::Data(format!("rows {text}: {why}"));
+        let condition = |text: &str| {
+            let found = COMPARISONS.iter().filter_map(|(sign, comparison)| {
+                let at = text.find(sign)?;
+                Some((at, *sign, *comparison))
+            });
+            // The first sign; of two at one place the longer one, which comes first.
+            let (at, sign, comparison) = found.min_by_key(|(at, ..)| *at).ok_or_else(|| {
+                refuse("write COLUMN>VALUE, or <, >=, <=, =, as in load.tip_force[0]>0.5".into())
+            })?;
+            let column = text[..at].trim();
+            let value = text[at + sign.len()..].trim();
+            let number = value.parse().ok().filter(|number: &f64| number.is_finite());
+            let value = number.ok_or_else(|| refuse(format!("{value} is not a finite number")))?;
+            if !is_known(column) || column == NAME {
+                return Err(refuse(format!(
+                    "{column} is no column of numbers: keys of the scenario, results ({}) and columns of points \
+                     on veins are",
+                    Quantity::ALL
+                )));
+            }
+            Ok(RowCondition {
+                column: column.into(),
+                comparison,
+                value,
+            })
+        };
+        let conditions = text.split(" and ").map(condition);
+        let conditions = conditions.collect::<Result<_, _>>()?;
+        Ok(RowChoice { conditions })
+    }
+}
+
+/// How files of data are read.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Columns that have other names in the files.
+    pub columns: Vec<MeasuredColumn>,
+    /// The first row is read, and then each that is so many further.
+    pub every: NonZeroUsize,
+    /// Conditions that rows meet, in tables with their columns.
+    pub rows: Vec<RowChoice>,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Reading {
+            columns: Vec::new(),
+            every: NonZeroUsize::MIN,
+            rows: Vec::new(),
+        }
+    }
+}
+
+/// An experiment with the points traced on its veins.
+pub(super) struct Observed {
+    /// Its position in the data.
+    pub number: usize,
+    pub experiment: Experiment,
+    pub traced: Vec<Traced>,
+}
+
+/// One experiment or several under the same conditions.
+pub(super) struct Case {
+    /// At least one.
+    pub observed: Vec<Observed>,
+    /// Whether it differs from the other cases by loads only: it then has the same
+    /// derivatives with respect to the free numbers.
+    pub loaded_only: bool,
+}
+
+impl Case {
+    fn new(first: Observed) -> Case {
+        let settings = first.experiment.settings.iter();
+        let mut targets = settings.flat_map(|it| it.0.targets());
+        let loaded_only = targets.all(|target| {
+            let key = target.key();
+            key.is_some_and(|key| key.path().starts_with("load."))
+        });
+        Case {
+            observed: vec![first],
+            loaded_only,
+        }
+    }
+
+    fn first(&self) -> &Experiment {
+        &self.observed[0].experiment
+    }
+
+    /// Numbers of the scenario under its conditions.
+    pub fn settings(&self) -> &[(Keys, f64)] {
+        &self.first().settings
+    }
+
+    pub fn measured(&self) -> impl Iterator<Item = &Measured> + Clone {
+        self.observed.iter().flat_map(|it| &it.experiment.measured)
+    }
+
+    pub fn traced(&self) -> impl Iterator<Item = &Traced> + Clone {
+        self.observed.iter().flat_map(|it| &it.traced)
+    }
+
+    /// The name of its first experiment.
+    pub fn name(&self) -> &str {
+        &self.first().name
+    }
+
+    /// The position of its first experiment in the data as the beginning of a message, if it
+    /// has one.
+    pub fn place(&self) -> String {
+        let origin = self.first().origin.as_ref();
+        origin.map_or_else(String::new, |origin| format!("{origin}: "))
+    }
+}
+
+/// The conditions under which there are data. A leaf is relaxed for each of these, however many
+/// experiments there are.
+pub(super) fn cases(data: Data) -> Result<Vec<Case>, FitError> {
+    let mut cases: Vec<Case> = Vec::new();
+    let mut known = HashMap::new();
+    for observed in observed(data)? {
+        let bits = observed.experiment.settings.iter().map(|(keys, value)| {
+            // Names identify keys.
+            (keys.to_string(), value.to_bits())
+        });
+        let case = *known.entry(bits.collect::<Vec<_>>()).or_insert(cases.len());
+        match cases.get_mut(case) {
+            Some(case) => case.observed.push(observed),
+            None => cases.push(Case::new(observed)),
+        }
+    }
+    Ok(cases)
+}
+
+/// The experiments with data.
+fn observed(data: Data) -> Result<Vec<Observed>, FitError> {
+    let observed = |experiment: Experiment| Observed {
+        number: 0,
+        experiment,
+        traced: Vec::new(),
+    };
+    let mut all: Vec<_> = data.experiments.into_iter().map(observed).collect();
+    let mut named: HashMap<String, usize> = HashMap::new();
+    for (place, observed) in all.iter().enumerate() {
+        let experiment = &observed.experiment;
+        let first = *named.entry(experiment.name.clone()).or_insert(place);
+        check_alike(&all[first].experiment, experiment)?;
+    }
+    let mut plain = None;
+    for traced in data.traced {
+        let place = match &traced.experiment {
+            Some(name) => *named.get(name).ok_or_else(|| {
+                let origin = &traced.origin;
+                FitError::Data(format!(
+                    "{origin}: experiment {name}: no row of an experiments file has that name"
+                ))
+            })?,
+            None => *plain.get_or_insert_with(|| {
+                all.push(observed(Experiment {
+                    name: "as it is".into(),
+                    settings: Vec::new(),
+                    measured: Vec::new(),
+                    origin: None,
+                }));
+                all.len() - 1
+            }),
+        };
+        all[place].traced.push(traced);
+    }
+    for (number, observed) in all.iter_mut().enumerate() {
+        observed.number = number;
+    }
+    all.retain(|it| !it.experiment.measured.is_empty() || !it.traced.is_empty());
+    Ok(all)
+}
+
+/// Checks that two experiments of one name have the same settings: points on veins could
+/// belong to either.
+fn check_alike(one: &Experiment, other: &Experiment) -> Result<(), FitError> {
+    let settings = |of: &Experiment| {
+        let settings = of.settings.iter();
+        let named = settings.map(|(keys, value)| (keys.to_string(), *value));
+        named.collect::<BTreeMap<_, _>>()
+    };
+    if settings(one) == settings(other) {
+        return Ok(());
+    }
+    let place = |of: &Experiment| of.origin.as_ref().map(Origin::to_string);
+    let [first, second] = [one, other].map(|of| place(of).unwrap_or_default());
+    Err(FitError::Data(format!(
+        "{second}: experiment {}: has that name from {first}, which has other settings: give each a \
+         name of its own",
+        other.name
+    )))
+}
+
+/// A quantity that can be measured on a leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// A coordinate of the shared tip, or of the only rod's: 0, 1, 2.
+    Tip(usize),
+    /// A component of the reaction at a held tip: 0, 1, 2.
+    Reaction(usize),
+    /// A component of the force on a grip, which is counted from 0: 0, 1, 2.
+    Grip(usize, usize),
+    /// The frequency of a mode in cycles per time; modes are numbered from 1.
+    Frequency(usize),
+}
+
+impl Quantity {
+    /// The quantities as words that can be followed by a plural.
+    pub(super) const ALL: &str = "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, grip_1_x, ..., frequency_1, \
+         frequency_2, ...";
+
+    pub(super) fn kind(self) -> Kind {
+        match self {
+            Quantity::Tip(_) => Kind::Length,
+            Quantity::Reaction(_) | Quantity::Grip(..) => Kind::Force,
+            Quantity::Frequency(_) => Kind::Frequency,
+        }
+    }
+}
+
+/// Kinds of data, which can only be weighted relative to each other by their deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Length,
+    /// Of photographs.
+    Pixel,
+    Force,
+    Frequency,
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl FromStr for Quantity {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        let axis = |axis: &str| AXES.iter().position(|name| *name == axis).ok_or(());
+        match text.split_once('_') {
+            Some(("tip", at)) => Ok(Quantity::Tip(axis(at)?)),
+            Some(("reaction", at)) => Ok(Quantity::Reaction(axis(at)?)),
+            Some(("grip", rest)) => {
+                let (number, at) = rest.split_once('_').ok_or(())?;
+                let number: usize = number.parse().map_err(|_| ())?;
+                Ok(Quantity::Grip(number.checked_sub(1).ok_or(())?, axis(at)?))
+            }
+            Some(("frequency", mode)) => match mode.parse() {
+                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(Quantity::Frequency(mode)),
+                _ => Err(()),
+            },
+            _ => Err(()),
+        }
+    }
+}
+
+impl std::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Quantity::Tip(axis) => write!(f, "tip_{}", AXES[*axis]),
+            Quantity::Reaction(axis) => write!(f, "reaction_{}", AXES[*axis]),
+            Quantity::Grip(grip, axis) => write!(f, "grip_{}_{}", grip + 1, AXES[*axis]),
+            Quantity::Frequency(mode) => write!(f, "frequency_{mode}"),
+        }
+    }
+}
+
+/// The coordinates that a point may have, by the names of their columns.
+pub(super) const COORDINATES: [&str; 5] = ["x", "y", "z", "pixel_x", "pixel_y"];
+
+/// The first of those in a photograph.
+pub(super) const IN_PHOTO: usize = 3;
+
+/// The coordinates of a traced point, as far as they were seen.
+pub(super) type Seen = [Option<f64>; COORDINATES.len()];
+
+/// How coordinates follow from positions: each is a . x + b.
+pub(super) struct View<'p> {
+    photo: Option<&'p Photo>,
+    rows: [(DVec3, f64); COORDINATES.len()],
+}
+
+impl<'p> View<'p> {
+    pub fn new(photo: Option<&'p Photo>) -> Self {
+        let nowhere = [(DVec3::ZERO, f64::NAN); 2];
+        let [x, y] = photo.map_or(nowhere, Photo::projection);
+        let rows = [(DVec3::X, 0.0), (DVec3::Y, 0.0), (DVec3::Z, 0.0), x, y];
+        View { photo, rows }
+    }
+
+    /// A coordinate of a point.
+    pub fn of(&self, coordinate: usize, point: DVec3) -> f64 {
+        let (row, offset) = self.rows[coordinate];
+        row.dot(point) + offset
+    }
+
+    /// The change of a coordinate as the point moves.
+    pub fn along(&self, coordinate: usize, change: DVec3) -> f64 {
+        self.rows[coordinate].0.dot(change)
+    }
+
+    /// The change of a coordinate of a point as its photograph changes.
+    pub fn rate(&self, coordinate: usize, point: DVec3, by: &PhotoRate) -> f64 {
+        match (self.photo, coordinate.checked_sub(IN_PHOTO)) {
+            (Some(photo), Some(axis)) => photo.rate(point, by)[axis],
+            _ => 0.0,
+        }
+    }
+
+    /// Where a traced point is in space, as far as that is known.
+    pub fn place(&self, seen: &Seen) -> [Option<f64>; 3] {
+        match (self.photo, seen[IN_PHOTO], seen[IN_PHOTO + 1]) {
+            (Some(photo), Some(x), Some(y)) => photo.place([x, y]),
+            _ => [seen[0], seen[1], seen[2]],
+        }
+    }
 }

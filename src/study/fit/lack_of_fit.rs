@@ -5,15 +5,16 @@
 //! what the free numbers could explain of them: the sum of squares along these over that of all other
 //! residuals has Fisher's distribution if errors are independent and normal (Neill and Johnson 1984, Testing
 //! for lack of fit in regression, a review). All series together have one level.
+//!
+//! Whether the data contradict the model at a minimum.
 
-use std::collections::BTreeMap;
-
+use crate::scenario::longest;
+use crate::study::fit::data::{Kind, Quantity};
+use crate::study::fit::model::{Compared, Component};
+use crate::study::fit::statistics::Statistics;
+use crate::study::fit::{FitParameter, FitSystematic, FreeNumber};
 use nalgebra::DVector;
-
-use super::case::Compared;
-use super::free::FreeNumber;
-use super::result::{FitParameter, FitSystematic};
-use super::statistics::Statistics;
+use std::collections::BTreeMap;
 
 /// The level of the test: so often residuals of a true model are called systematic.
 const LEVEL: f64 = 5e-3;
@@ -264,6 +265,45 @@ fn log_gamma(z: f64) -> f64 {
     let inverse = 1.0 / (z * z);
     let series = 1.0 / 12.0 - inverse * (1.0 / 360.0 - inverse * (1.0 / 1260.0 - inverse / 1680.0));
     shift + (z - 0.5) * z.ln() - z + 0.5 * std::f64::consts::TAU.ln() + series / z
+}
+
+/// Coordinates this far from the fitted leaf, in lengths of the longest rod, are hardly those of
+/// this leaf under these loads; and this far from the base, not of any leaf of this length.
+const MISSED: f64 = 0.5;
+
+pub(super) const BEYOND: f64 = 3.0;
+
+/// Data that are far from the model: coordinates by a part of the leaf's length, and frequencies by
+/// that part of the larger one.
+pub(super) fn misses<'s>(stats: &'s Statistics) -> impl Iterator<Item = &'s Component> {
+    let longest = longest(&stats.model.base.scenario().rods);
+    let pixel = stats.model.pixel();
+    stats.point.components().filter(move |component| {
+        let (data, model) = (component.observed.abs(), component.model.abs());
+        let size = match component.what {
+            Compared::Vein { .. } if component.what.kind() == Kind::Pixel => longest / pixel,
+            Compared::Vein { .. } | Compared::Result(Quantity::Tip(_)) => longest,
+            Compared::Result(Quantity::Frequency(_)) => data.max(model),
+            Compared::Result(Quantity::Reaction(_) | Quantity::Grip(..)) => f64::INFINITY,
+        };
+        let beyond = component.what.kind() == Kind::Length && data > BEYOND * longest;
+        beyond || (component.observed - component.model).abs() > MISSED * size
+    })
+}
+
+/// Whether the residuals are those of a model that does not describe the data: beyond what their
+/// standard deviations allow, or, without these, as large as the leaf.
+pub(super) fn contradicts(stats: &Statistics) -> bool {
+    let robust = stats.weighting.robust;
+    if stats.known && !robust {
+        return stats.suspicious();
+    }
+    // A robust fit has outliers.
+    let permitted = match robust {
+        true => stats.residuals.len() / 2,
+        false => 0,
+    };
+    misses(stats).count() > permitted
 }
 
 #[cfg(test)]

@@ -4,24 +4,32 @@
 //! Convergence is tested with the longest admissible step, not with the one within the present
 //! trust region: that may be small because of another direction, and then gains little even if
 //! the point is not a minimum in a weakly determined direction.
+//!
+//! The search for a minimum near a start.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::directions::{NULL, singular};
-use super::free::LONGEST_STEP;
-use super::model::{Model, Point};
 use crate::relax::{Grids, Lost};
+use crate::study::fit::data::Experiment;
+use crate::study::fit::intervals::BETTER;
+use crate::study::fit::minima::{misfit, sum};
+use crate::study::fit::model::{Model, Point};
+use crate::study::fit::statistics::{NULL, Statistics, singular};
+use crate::study::fit::{
+    Fit, FitError, FitStep, FitWork, LONGEST_STEP, found, intervals, lack_of_fit,
+};
+use nalgebra::{DMatrix, DVector};
 
 /// Largest number of steps of an iteration.
 const MOST_STEPS: usize = 100;
 
 /// The initial radius of the trust region, in logarithms or units, and the least one.
 const FIRST_STEP: f64 = 0.7;
+
 const LEAST_STEP: f64 = 1e-12;
 
 /// A smaller step ends the iteration; and a point from which the longest step is
 /// expected to gain no more than this part of one datum's variance.
 const STEP: f64 = 1e-9;
+
 const GAIN: f64 = 1e-7;
 
 /// Gains below this part of the variance may be errors of the equilibria: two in
@@ -34,6 +42,7 @@ const WORTHWHILE: f64 = 0.1;
 /// The part of the way to a sum that the longest step must be expected to lead, and that of the
 /// way back to a known minimum that it may lead.
 const PROMISING: f64 = 0.5;
+
 const RETURNING: f64 = 0.5;
 
 /// Bisections for the damping that shortens a step.
@@ -403,4 +412,174 @@ impl Linear {
             .map(|(k, part)| -part * (2.0 * self.slopes[k] + self.values[k].powi(2) * part))
             .sum()
     }
+}
+
+/// Largest number of minima abandoned for better ones.
+const MOST_MINIMA: usize = 4;
+
+/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
+const MOST_JUMPS: usize = 3;
+
+/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
+/// that of the search to it: a larger one is due to coarse grids.
+const SAME_SPREAD: f64 = 1.05;
+
+/// Remark if a leaf did not stay on its branch.
+const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to which it \
+    relaxes from the start: compare with a fit that starts from the values found";
+
+/// A minimum, or where the search for it ended.
+pub(super) struct Minimum {
+    pub fit: Fit,
+    pub theta: Vec<f64>,
+    /// The sum of squares, the variance of a datum, and the excess at the ends of intervals.
+    pub sum: f64,
+    pub variance: f64,
+    pub significant: f64,
+    pub converged: bool,
+    /// Root mean square of the residuals, relative to the size of the data.
+    pub misfit: f64,
+    /// Whether the sum still falls where a number without given bounds is as far from its initial
+    /// value as it may be.
+    pub beyond_window: bool,
+}
+
+impl Minimum {
+    /// Whether this is the better answer. A minimum is not left for values that are none.
+    pub fn is_preferred_to(&self, other: &Minimum) -> bool {
+        match self.converged == other.converged {
+            true => self.sum < other.sum,
+            false => self.converged,
+        }
+    }
+
+    /// This minimum as one besides which another is searched from these values.
+    pub fn besides(&self, theta: &[f64]) -> Besides<'_> {
+        let change = theta.iter().zip(&self.theta).map(|(to, from)| to - from);
+        Besides {
+            theta: &self.theta,
+            most: self.sum + self.significant,
+            distance: change.map(|it| it.powi(2)).sum::<f64>().sqrt(),
+        }
+    }
+}
+
+/// The search for a minimum near a start.
+pub(super) struct Search<'m, 'a> {
+    pub model: &'m Model<'a>,
+    pub weighting: Weighting,
+    /// Whether the standard deviations of the data are known.
+    pub known: bool,
+    pub candidates: &'m [Experiment],
+    /// Largest number of steps to a minimum.
+    pub most_steps: usize,
+}
+
+impl<'m, 'a> Search<'m, 'a> {
+    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
+    /// there.
+    pub fn run(
+        &self,
+        first: &Point,
+        progress: &mut dyn FnMut(&FitStep),
+    ) -> Result<Minimum, FitError> {
+        let (model, weighting) = (self.model, self.weighting);
+        let (mut coarse, mut point) = model.coarse(first, weighting)?;
+        let mut work = FitWork::default();
+        let mut attempts = 0;
+        let mut jumps = 0;
+        let mut found = loop {
+            // The search on coarse grids; the last steps use all.
+            let mut searching = |step, sum| {
+                let known = None;
+                progress(&FitStep {
+                    step,
+                    sum,
+                    known,
+                    budget: None,
+                });
+            };
+            let mut search = Iteration::new(&coarse, weighting, &mut searching);
+            search.most_steps = search.most_steps.min(self.most_steps);
+            let (near, searched, more) = search.run(point);
+            work.evaluations += more;
+            attempts += 1;
+            let there = model.follow(&near, &near.theta);
+            let there = there.or_else(|_| model.find(&near.theta))?;
+            let mut last = Iteration::new(model, weighting, &mut searching);
+            last.lean = true;
+            last.most_steps = last.most_steps.min(self.most_steps);
+            let (mut least, end, more) = last.run(there);
+            work.evaluations += 1 + more;
+            work.accurate += 1 + more;
+            let is_lost = end == End::Stuck(Some(Lost::Elsewhere));
+            if is_lost
+                && jumps < MOST_JUMPS
+                && let Some(there) = model.beyond(&last.jumps, &least, weighting)
+            {
+                jumps += 1;
+                attempts -= 1;
+                (coarse, point) = model.coarse(&there, weighting)?;
+                continue;
+            }
+            let of_search = Statistics::new(&coarse, weighting, self.known, &near);
+            let spread = self.statistics(&least).spread;
+            let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
+            if !same && end == End::Converged {
+                // Its neighbourhood is computed with its own leaves.
+                let differentiated = model.differentiate(&mut least);
+                differentiated.map_err(|lost| model.no_equilibrium(&near.theta, 0, &lost))?;
+            }
+            let stats = self.statistics(&least);
+            let shape = if same { &of_search } else { &stats };
+            let contradicted = lack_of_fit::contradicts(&stats);
+            let parameters = match end {
+                End::Converged if !contradicted => intervals::intervals(&stats, shape, progress),
+                _ => Ok(intervals::without_intervals(&stats)),
+            };
+            let (end, parameters) = match parameters {
+                Ok(parameters) => (end, parameters),
+                Err(better) if attempts < MOST_MINIMA => {
+                    point = better;
+                    continue;
+                }
+                Err(_) => (End::MostSteps, intervals::without_intervals(&stats)),
+            };
+            break Minimum {
+                fit: found::fit(&stats, &end, parameters, work, self.candidates),
+                sum: sum(weighting, stats.point),
+                variance: stats.spread.powi(2),
+                significant: (stats.quantile * stats.spread).powi(2),
+                converged: end == End::Converged,
+                misfit: misfit(model, stats.point),
+                beyond_window: falls_beyond_window(&stats),
+                theta: stats.point.theta.clone(),
+            };
+        };
+        if jumps > 0 {
+            found.fit.remarks.push(JUMPED.into());
+        }
+        Ok(found)
+    }
+
+    fn statistics<'p>(&'p self, point: &'p Point) -> Statistics<'p, 'a> {
+        Statistics::new(self.model, self.weighting, self.known, point)
+    }
+}
+
+/// Whether a step beyond a bound that was not given is expected to reduce the sum of squares by more
+/// than chance.
+fn falls_beyond_window(stats: &Statistics) -> bool {
+    let weighed = stats.weighting.roots(&stats.residuals);
+    let slopes = (stats.jacobian).tr_mul(&stats.residuals.component_mul(&weighed));
+    let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
+    coordinates.enumerate().any(|(k, (free, theta))| {
+        let [low, high] = free.bounds;
+        let slope = slopes[k];
+        let outwards = *theta <= low && slope > 0.0 || *theta >= high && slope < 0.0;
+        let bend = stats.jacobian.column(k).norm_squared();
+        let step = (slope.abs() / bend).min(LONGEST_STEP);
+        let gain = step * (2.0 * slope.abs() - bend * step);
+        !free.bounded && outwards && gain > BETTER * stats.spread.powi(2)
+    })
 }

@@ -4,57 +4,41 @@
 //! The leaves of all experiments are followed from equilibrium to equilibrium, with
 //! derivatives from their linearised equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
+//!
+//! The result of a fit.
+//!
+//! The free numbers of a fit.
 
-mod candidates;
-mod case;
-mod coarse;
-mod columns;
-mod contradiction;
 mod data;
-mod derivatives;
-mod directions;
-mod end;
-mod experiments;
 mod found;
-mod free;
-mod interval;
+mod intervals;
 mod lack_of_fit;
 mod least_squares;
 mod minima;
 mod model;
-mod neighbourhood;
-mod profile;
-mod quantity;
 mod responses;
-mod result;
-mod search;
-mod starts;
 mod statistics;
 mod table;
-mod vein;
-mod view;
-mod words;
 
-pub use columns::{Comparison, MeasuredColumn, Reading, RowChoice, RowCondition};
-pub use data::{Data, DataFile, Experiment, Measured, Origin, Traced};
-pub use free::{Free, FreeNumber, OffsetColumn};
-pub use quantity::Quantity as MeasuredQuantity;
-pub use result::{
-    Fit, FitAlternative, FitBudget, FitCandidate, FitExperiment, FitLeaf, FitOutcome, FitParameter,
-    FitResidual, FitStep, FitSystematic, FitWork,
-};
-
-use crate::clock::Instant;
-use std::cell::Cell;
-
-use super::{Base, VaryError};
-use crate::limit::Limit;
+use crate::newton::Work;
 use crate::relax::{Options, RelaxError, check_tolerance, without_wind};
-use free::Coordinate;
-use least_squares::{ASSUMED, Weighting};
-use minima::{Beginning, Minima};
-use model::{Budget, Model};
-use quantity::Quantity;
+use crate::run::{Instant, Limit};
+use crate::scenario::format::units::LENGTH;
+use crate::study::fit::data::Quantity;
+pub use crate::study::fit::data::{
+    Comparison, Data, DataFile, Experiment, Measured, MeasuredColumn, Origin,
+    Quantity as MeasuredQuantity, Reading, RowChoice, RowCondition, Traced,
+};
+use crate::study::fit::least_squares::{ASSUMED, Weighting};
+use crate::study::fit::minima::{Beginning, Minima};
+use crate::study::fit::model::{Budget, Model};
+use crate::study::{Base, Keys, Target, VaryError};
+use crate::words;
+use serde::Serialize;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
 
 /// Why nothing can be fitted.
 #[derive(Debug, thiserror::Error)]
@@ -249,4 +233,514 @@ fn expanded(request: &FitRequest) -> Result<Vec<Free>, FitError> {
         }));
     }
     Ok(all)
+}
+
+words! {
+    /// How a fit ended.
+    pub enum FitOutcome {
+        /// At a minimum, and the data determine every free number.
+        Converged = "converged",
+        /// Not at a minimum.
+        NotConverged = "not-converged",
+        /// At a minimum, but some number or combination of numbers is not determined.
+        Undetermined = "undetermined",
+        /// At a minimum, but the residuals are systematic there: the model lacks something.
+        Systematic = "systematic",
+        /// At a minimum, but the data contradict the model there.
+        Contradicted = "contradicted",
+    }
+}
+
+/// A free number.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitParameter {
+    /// Its key.
+    pub key: String,
+    /// Its value at the minimum: if it is not determined, one of many.
+    pub value: f64,
+    /// Lower end of the 95 % interval; `None` if there is none.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// Standard deviation of the value, to first order; `None` if the data are insensitive to it.
+    pub standard_error: Option<f64>,
+    /// Whether the data determine it within a factor of ten.
+    pub determined: bool,
+    /// Whether the interval is that of the profile likelihood, since the quadratic approximation at
+    /// the minimum is inaccurate.
+    pub profiled: bool,
+    /// Values below and above beyond which the other numbers could not be fitted, so that an end
+    /// there is not known.
+    #[serde(skip)]
+    pub lost: [Option<f64>; 2],
+}
+
+/// Residuals that are smooth along series of data, not scattered.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitSystematic {
+    /// The probability that independent errors are as smooth.
+    pub p_value: f64,
+    /// The columns whose residuals are.
+    pub along: Vec<String>,
+    /// By how much intervals are longer than those of independent errors.
+    pub widened: f64,
+}
+
+/// An experiment with data.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitExperiment {
+    /// Its name.
+    pub experiment: String,
+    /// What was set, by keys.
+    pub settings: BTreeMap<String, f64>,
+}
+
+/// One scalar datum.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitResidual {
+    /// The experiment.
+    pub experiment: String,
+    /// Its position in the data, from 1.
+    #[serde(skip)]
+    pub number: usize,
+    /// `tip_x`, `frequency_1`, ..., or `x`, `y`, `z` of a point on a vein.
+    pub what: String,
+    /// The rod, counted from 1, and the fraction of its length, of a point on a vein.
+    pub rod: Option<usize>,
+    /// See `rod`.
+    pub sigma: Option<f64>,
+    /// The datum.
+    pub data: f64,
+    /// The prediction of the model.
+    pub model: f64,
+    /// Half the width of the model's 95 % band, due to the uncertainty of the determined
+    /// combinations.
+    pub band: f64,
+    /// Standard deviation of the datum: as given, or as estimated from all residuals.
+    pub sd: f64,
+    /// (data - model)/sd.
+    pub residual: f64,
+}
+
+/// A candidate experiment.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitCandidate {
+    /// Its name.
+    pub experiment: String,
+    /// The information it would add on the free numbers, in bits: the number of halvings of
+    /// their uncertainty, limited to a factor of ten up and down.
+    pub bits: f64,
+    /// The uncertainty of the least determined combination with it, relative to that without it.
+    pub shrinks: f64,
+    /// Why it cannot be judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+}
+
+/// Other values of the free numbers that fit the data as well.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitAlternative {
+    /// The value of each number.
+    pub values: BTreeMap<String, f64>,
+    /// Sum of the squares of residuals there, as that of the fit.
+    pub chi_squared: f64,
+}
+
+/// Progress of a fit.
+#[derive(Clone, Copy, Debug)]
+pub struct FitStep {
+    /// Number of steps towards the present minimum.
+    pub step: usize,
+    /// The sum of squares there.
+    pub sum: f64,
+    /// Once the minimum is found: the number of known intervals, and that of all numbers.
+    pub known: Option<(usize, usize)>,
+    /// Before the first step: what the fit takes at most.
+    pub budget: Option<FitBudget>,
+}
+
+/// What a fit takes at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitBudget {
+    /// Number of times that the leaves of all experiments are relaxed or followed.
+    pub evaluations: usize,
+    /// Number of these leaves.
+    pub leaves: usize,
+    /// The time that this takes if each takes as long as the first, in seconds.
+    pub seconds: f64,
+}
+
+/// Work of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FitWork {
+    /// Number of times the leaves of all experiments were relaxed.
+    pub evaluations: usize,
+    /// How many of these had the required accuracy; the others were those of the
+    /// search, on the coarsest grids that do not affect the fit.
+    pub accurate: usize,
+    /// Work for the leaves at the minimum.
+    #[serde(flatten)]
+    pub last: Work,
+}
+
+/// A fit. As JSON it is `fit.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Fit {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// How it ended.
+    pub outcome: FitOutcome,
+    /// Why it did not converge; other remarks.
+    pub remarks: Vec<String>,
+    /// The free numbers.
+    pub parameters: Vec<FitParameter>,
+    /// Correlations of their coordinates (logarithms of positive numbers); null if
+    /// one is not determined.
+    pub correlations: Vec<Vec<Option<f64>>>,
+    /// Combinations to which the data are insensitive: for each, exponents of
+    /// positive numbers and coefficients of others.
+    pub undetermined: Vec<BTreeMap<String, f64>>,
+    /// Other values that fit the data as well, if such were found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<FitAlternative>,
+    /// Which other values were tried to find out whether they fit as well, if any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tried: Vec<String>,
+    /// The systematic part of the residuals, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic: Option<FitSystematic>,
+    /// The results in words.
+    pub says: Vec<String>,
+    /// Sum of the squares of residuals over their standard deviations.
+    pub chi_squared: f64,
+    /// Degrees of freedom: data minus determined combinations.
+    pub degrees_of_freedom: usize,
+    /// Half the width of a 95 % interval in standard errors: of the normal distribution, or of
+    /// Student's if the deviations of the data are estimated.
+    pub coverage_factor: f64,
+    /// Standard deviation of all data, if none was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_deviation: Option<f64>,
+    /// The files of data.
+    #[serde(skip)]
+    pub files: Vec<DataFile>,
+    /// The experiments in the order of the data.
+    pub experiments: Vec<FitExperiment>,
+    /// Data, model and residuals.
+    pub residuals: Vec<FitResidual>,
+    /// Candidate experiments, the most informative first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<FitCandidate>,
+    /// Work.
+    pub work: FitWork,
+    /// Total time, in seconds.
+    pub wall_seconds: f64,
+    /// The scenario with the fitted values, as TOML.
+    #[serde(skip)]
+    pub fitted: String,
+    /// The leaf of every experiment at the minimum, with its name.
+    #[serde(skip)]
+    pub leaves: Vec<(String, FitLeaf)>,
+}
+
+/// A leaf at the minimum, for drawing.
+#[derive(Clone, Debug)]
+pub struct FitLeaf {
+    /// The position of its experiment in the data, from 1.
+    pub number: usize,
+    /// Numbers of the scenario during that experiment.
+    pub settings: Vec<(Keys, f64)>,
+    /// Centerlines, one per rod.
+    pub curves: Vec<Vec<glam::DVec3>>,
+    /// Traced points: rod, counted from 0, and coordinates seen.
+    pub traced: Vec<(usize, [Option<f64>; 3])>,
+}
+
+impl Fit {
+    /// Whether the requested numbers are determined (exit status 0).
+    pub fn is_success(&self) -> bool {
+        self.outcome == FitOutcome::Converged
+    }
+}
+
+/// Longest step of a logarithm, or of another number in its unit.
+pub(super) const LONGEST_STEP: f64 = 1.5;
+
+/// Largest distance of a number without bounds from its initial value, in logarithms (a
+/// factor of a thousand) or units: numbers that the data drive beyond this
+/// are not determined by them.
+const FARTHEST: f64 = 6.907_755_278_982_137;
+
+/// A column of the data whose zero may be unknown.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OffsetColumn {
+    /// Of what was set in experiments.
+    Setting(Keys),
+    /// Of what was measured in experiments.
+    Result(Quantity),
+}
+
+/// Numbers that a fit varies.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FreeNumber {
+    /// Numbers of the scenario that take the same value: `KEY`.
+    Entry(Keys),
+    /// What is added to the numbers in a column of the data, in the unit of that column:
+    /// `offset:COLUMN`.
+    Offset(OffsetColumn),
+}
+
+/// How the name of an offset begins.
+const OFFSET: &str = "offset:";
+
+impl FreeNumber {
+    /// The keys of the scenario that it stands for, if it does.
+    pub(super) fn keys(&self) -> Option<&Keys> {
+        match self {
+            FreeNumber::Entry(keys) => Some(keys),
+            FreeNumber::Offset(_) => None,
+        }
+    }
+
+    /// Whether it is the offset of a setting of experiments by these keys.
+    pub(super) fn is_offset_of(&self, setting: &Keys) -> bool {
+        matches!(self, FreeNumber::Offset(OffsetColumn::Setting(keys)) if keys == setting)
+    }
+
+    /// Whether they have a number in common.
+    pub(super) fn overlaps(&self, other: &FreeNumber) -> bool {
+        match (self, other) {
+            (FreeNumber::Entry(one), FreeNumber::Entry(two)) => one.overlaps(two),
+            _ => self == other,
+        }
+    }
+}
+
+impl FromStr for FreeNumber {
+    type Err = FitError;
+
+    fn from_str(text: &str) -> Result<Self, FitError> {
+        let keys = |text: &str| text.parse::<Keys>();
+        let Some(column) = text.trim().strip_prefix(OFFSET) else {
+            let keys = keys(text).map_err(|refused| FitError::Free(refused.to_string()))?;
+            return Ok(FreeNumber::Entry(keys));
+        };
+        let column = column.trim();
+        if let Ok(quantity) = column.parse() {
+            return Ok(FreeNumber::Offset(OffsetColumn::Result(quantity)));
+        }
+        let refuse = |refused: VaryError| {
+            FitError::Free(format!(
+                "{text}: offsets are those of columns of experiments, keys of the scenario and results ({}): {refused}",
+                Quantity::ALL
+            ))
+        };
+        let keys = keys(column).map_err(refuse)?;
+        Ok(FreeNumber::Offset(OffsetColumn::Setting(keys)))
+    }
+}
+
+impl fmt::Display for FreeNumber {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            FreeNumber::Entry(keys) => keys.fmt(f),
+            FreeNumber::Offset(OffsetColumn::Setting(keys)) => write!(f, "{OFFSET}{keys}"),
+            FreeNumber::Offset(OffsetColumn::Result(quantity)) => write!(f, "{OFFSET}{quantity}"),
+        }
+    }
+}
+
+/// Numbers that a fit varies together: `KEY` or `offset:COLUMN`, or with bounds `KEY=LOW..HIGH`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Free {
+    /// What is free.
+    pub number: FreeNumber,
+    /// Bounds, if given.
+    pub bounds: Option<[f64; 2]>,
+}
+
+impl FromStr for Free {
+    type Err = FitError;
+
+    fn from_str(text: &str) -> Result<Self, FitError> {
+        let (number, bounds) = match text.split_once('=') {
+            Some((number, bounds)) => (number, Some(bounds)),
+            None => (text, None),
+        };
+        let number = number.parse()?;
+        let Some(given) = bounds else {
+            let bounds = None;
+            return Ok(Free { number, bounds });
+        };
+        let numbers = given
+            .split_once("..")
+            .and_then(|(low, high)| Some([low.trim().parse().ok()?, high.trim().parse().ok()?]));
+        match numbers {
+            Some([low, high]) if low < high => Ok(Free {
+                number,
+                bounds: Some([low, high]),
+            }),
+            _ => {
+                let why = "bounds are LOW..HIGH, two numbers, as in stiffness.axial=1..1e4";
+                Err(FitError::Free(format!("{text}: {why}")))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Free {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}", self.number)?;
+        match self.bounds {
+            Some([low, high]) => write!(f, "={low}..{high}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A free number as a coordinate of the least squares: its logarithm, or the number in a
+/// suitable unit.
+#[derive(Clone, Debug)]
+pub(super) struct Coordinate {
+    pub number: FreeNumber,
+    pub log: bool,
+    pub unit: f64,
+    /// Bounds of the coordinate, and whether they were given.
+    pub bounds: [f64; 2],
+    pub bounded: bool,
+    pub start: f64,
+}
+
+impl Coordinate {
+    pub fn new(base: &Base, data: &Data, free: &Free) -> Result<Coordinate, FitError> {
+        let number = free.number.clone();
+        let (value, log, unit) = match &number {
+            FreeNumber::Entry(keys) => {
+                let value = base.value(keys);
+                let value = value.map_err(|refused| FitError::Free(refused.to_string()))?;
+                match keys.is_positive() && value > 0.0 {
+                    true => (value, true, 1.0),
+                    false => (value, false, value.abs().max(keys.unit(base.scenario()))),
+                }
+            }
+            FreeNumber::Offset(column) => (0.0, false, unit_of_offset(column, data)?),
+        };
+        let mut coordinate = Coordinate {
+            number,
+            log,
+            unit,
+            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            bounded: free.bounds.is_some(),
+            start: 0.0,
+        };
+        if let Some([low, high]) = free.bounds {
+            if !(low..=high).contains(&value) {
+                let why = match &free.number {
+                    FreeNumber::Entry(_) => {
+                        format!("the scenario has {value}, which is not between the bounds")
+                    }
+                    FreeNumber::Offset(_) => {
+                        "an offset begins at 0, which is not between the bounds".into()
+                    }
+                };
+                return Err(FitError::Free(format!("{free}: {why}")));
+            }
+            if log && low <= 0.0 {
+                let why = "the number is positive, and so must be its bounds";
+                return Err(FitError::Free(format!("{free}: {why}")));
+            }
+            coordinate.bounds = [low, high].map(|bound| coordinate.of(bound));
+        }
+        coordinate.start = coordinate.of(value);
+        if free.bounds.is_none() {
+            let farthest = if log { FARTHEST } else { FARTHEST.exp() };
+            coordinate.bounds = [-farthest, farthest].map(|far| coordinate.start + far);
+        }
+        Ok(coordinate)
+    }
+
+    /// Whether its order of magnitude may be unknown: that of stiffnesses and other positive numbers, but
+    /// not of lengths, which are measured.
+    pub fn is_searched_in_decades(&self) -> bool {
+        let mut keys = self.number.keys().into_iter().flat_map(Keys::targets);
+        let is_length = |target: &Target| target.key().is_some_and(|it| it.dimension() == LENGTH);
+        self.log && !keys.any(is_length)
+    }
+
+    /// The same coordinate with another initial value. Bounds that were not given move with it.
+    pub fn starting_at(&self, start: f64) -> Coordinate {
+        let moved = start - self.start;
+        let bounds = match self.bounded {
+            true => self.bounds,
+            false => self.bounds.map(|bound| bound + moved),
+        };
+        Coordinate {
+            start,
+            bounds,
+            ..self.clone()
+        }
+    }
+
+    pub fn of(&self, value: f64) -> f64 {
+        match self.log {
+            true => value.ln(),
+            false => value / self.unit,
+        }
+    }
+
+    pub fn value(&self, coordinate: f64) -> f64 {
+        match self.log {
+            true => coordinate.exp(),
+            false => coordinate * self.unit,
+        }
+    }
+
+    /// The bound at which the coordinate stands.
+    pub fn at_bound(&self, coordinate: f64) -> Option<f64> {
+        let [low, high] = self.bounds;
+        [low, high].into_iter().find(|bound| *bound == coordinate)
+    }
+
+    /// So far on the way from the initial value to another, by orders of magnitude.
+    pub fn on_the_way(&self, to: f64, part: f64) -> f64 {
+        let way = to - self.start;
+        let far = match self.log {
+            true => part * way.abs(),
+            false => (1.0 + way.abs()).powf(part) - 1.0,
+        };
+        self.start + far * way.signum()
+    }
+
+    /// d value/d coordinate.
+    pub fn slope(&self, coordinate: f64) -> f64 {
+        match self.log {
+            true => coordinate.exp(),
+            false => self.unit,
+        }
+    }
+}
+
+/// The range of the numbers in a column, or their size where there is one: how far its zero may be off.
+fn unit_of_offset(column: &OffsetColumn, data: &Data) -> Result<f64, FitError> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for experiment in &data.experiments {
+        let set = experiment.settings.iter().filter_map(|(keys, value)| {
+            matches!(column, OffsetColumn::Setting(of) if of == keys).then_some(*value)
+        });
+        let measured = experiment.measured.iter().filter_map(|measured| {
+            let is_it = matches!(column, OffsetColumn::Result(of) if *of == measured.quantity);
+            measured.value.filter(|_| is_it)
+        });
+        for value in set.chain(measured) {
+            (low, high) = (low.min(value), high.max(value));
+        }
+    }
+    if low > high {
+        let name = FreeNumber::Offset(column.clone());
+        let why = "no file of experiments has that column";
+        return Err(FitError::Free(format!("{name}: {why}")));
+    }
+    let range = high - low;
+    let size = if range > 0.0 { range } else { high.abs() };
+    Ok(if size > 0.0 { size } else { 1.0 })
 }

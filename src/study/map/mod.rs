@@ -5,22 +5,27 @@
 //! leaf, and the solution of the boundary-value problem that starts from it,
 //! both at a hundredth of the tolerance. If they agree within their estimates the
 //! reference is confirmed. All answers are measured against it.
+//!
+//! Requests for maps, and their validation.
+//!
+//! The result of one method in one cell: a closed set of words, and numbers.
 
 mod cell;
-mod jumps;
-mod motion;
-mod request;
-mod row;
 
-pub use jumps::MapJump;
-pub use request::{CELL_SECONDS, MapRefused, MapRequest};
-pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow};
-
+use crate::memory::TooMuch;
+use crate::relax::{Method, RelaxError, check_tolerance, without_wind};
+use crate::run::{Limit, RefusedOption};
+use crate::study::judge::Answer;
+pub use crate::study::map::cell::MapJump;
+use crate::study::map::cell::{Cell, one_line};
+use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
+use crate::{memory, read_and_write, words};
+use serde::{Serialize, Serializer};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
-
-use serde::{Serialize, Serializer};
+use std::time::Duration;
 
 /// A map, complete or partial.
 #[derive(Clone, Debug)]
@@ -135,4 +140,401 @@ pub fn map(
             });
         }
     });
+}
+
+/// Largest number of cells of a map.
+const MOST_CELLS: usize = 1_000_000;
+
+/// Default seconds allowed for each method in each cell.
+pub const CELL_SECONDS: f64 = 20.0;
+
+/// A request for a map.
+#[derive(Clone, Debug)]
+pub struct MapRequest {
+    /// The scenario.
+    pub base: Base,
+    /// One or two axes.
+    pub axes: Vec<Vary>,
+    /// The methods, in the order of [`MapMethod::ALL`].
+    pub methods: Vec<MapMethod>,
+    /// Replaces the scenario's tolerance.
+    pub tolerance: Option<f64>,
+    /// Seconds allowed for each method in each cell.
+    pub cell_seconds: f64,
+    /// Time limit for unfinished cells, if set.
+    pub limit: Limit,
+}
+
+/// Why a map cannot be made, as a sentence.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MapRefused {
+    /// An option has a value that it cannot have.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
+    /// Its rows would take too much memory.
+    #[error("{0}")]
+    Memory(#[from] TooMuch),
+    /// A number cannot vary.
+    #[error("{0}")]
+    Vary(#[from] VaryError),
+    /// The leaf has what no method of a map takes into account.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
+    /// The axes or the methods do not make a map, or one that is too large.
+    #[error("{0}")]
+    Map(String),
+}
+
+impl MapRequest {
+    /// Validates the request. Default `methods`: all, explicit motion only if
+    /// its time step is set or varies.
+    pub fn new(
+        base: Base,
+        axes: Vec<Vary>,
+        methods: Option<Vec<MapMethod>>,
+        tolerance: Option<f64>,
+        cell_seconds: f64,
+    ) -> Result<Self, MapRefused> {
+        without_wind(base.scenario(), "a map")?;
+        let refuse = |why: String| Err(MapRefused::Map(why));
+        if !(1..=2).contains(&axes.len()) {
+            return refuse(format!("{} axes: a map has one or two axes", axes.len()));
+        }
+        let targets: Vec<_> = axes.iter().flat_map(|axis| axis.keys.targets()).collect();
+        for (i, target) in targets.iter().enumerate() {
+            if targets[..i].contains(target) {
+                return refuse(format!("{target}: varies twice"));
+            }
+        }
+        let found: usize = axes.iter().map(|axis| axis.values.len()).product();
+        if found > MOST_CELLS {
+            let allowed = format!("at most {MOST_CELLS} are allowed; lower the counts of the axes");
+            return refuse(format!("{found} cells: {allowed}"));
+        }
+        if !(cell_seconds > 0.0 && cell_seconds <= 1e6) {
+            let allowed = "must be greater than 0 and at most 1e6";
+            return Err(RefusedOption::new("cell_seconds", cell_seconds, allowed).into());
+        }
+        if let Some(tolerance) = tolerance {
+            check_tolerance(tolerance)?;
+        }
+        let steps = base.knobs().step.is_some() || axes.iter().any(|a| a.keys.sets(Knob::Step));
+        let methods = match methods {
+            Some(mut methods) => {
+                if methods.contains(&MapMethod::ExplicitMotion) && !steps {
+                    let needs = "needs a time step: set or vary method.step";
+                    return refuse(format!("explicit-motion: {needs}"));
+                }
+                methods.sort();
+                methods.dedup();
+                methods
+            }
+            None => (MapMethod::ALL.into_iter())
+                .filter(|&method| method != MapMethod::ExplicitMotion || steps)
+                .collect(),
+        };
+        if methods.is_empty() {
+            return refuse("no methods: name one at least".into());
+        }
+        memory::map(found, methods.len())?;
+        let request = MapRequest {
+            base,
+            axes,
+            methods,
+            tolerance,
+            cell_seconds,
+            limit: Limit::default(),
+        };
+        request.check_entries()?;
+        Ok(request)
+    }
+
+    /// A value that no cell accepts is a mistake in the request, not a failure of methods.
+    fn check_entries(&self) -> Result<(), MapRefused> {
+        let first = self.base.at(&self.values(0));
+        let last = self.base.at(&self.values(self.cells() - 1));
+        match (first, last) {
+            (Err(why), Err(other)) if !why.depends_on_value() && !other.depends_on_value() => {
+                Err(why.into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.axes.iter().map(|axis| axis.values.len()).product()
+    }
+
+    /// Index of a cell along each axis.
+    pub fn place(&self, cell: usize) -> Vec<usize> {
+        let mut rest = cell;
+        let mut place: Vec<usize> = (self.axes.iter().rev())
+            .map(|axis| {
+                let at = rest % axis.values.len();
+                rest /= axis.values.len();
+                at
+            })
+            .collect();
+        place.reverse();
+        place
+    }
+
+    /// The varied values of a cell.
+    pub fn values(&self, cell: usize) -> Vec<(&Keys, f64)> {
+        let axes = self.axes.iter().zip(self.place(cell));
+        axes.map(|(axis, at)| (&axis.keys, axis.values[at]))
+            .collect()
+    }
+
+    /// The same as texts, as in tables.
+    pub fn texts(&self, cell: usize) -> Vec<String> {
+        let values = self.values(cell).into_iter();
+        values.map(|(keys, value)| keys.text(value)).collect()
+    }
+
+    /// The longest time step of explicit motion known to be stable in a cell, in the scenario's
+    /// unit of time.
+    pub fn stable_step(&self, cell: usize) -> Option<f64> {
+        cell::stable_step(&self.base.at(&self.values(cell)).ok()?)
+    }
+
+    /// Solves one cell by these methods.
+    pub fn solve(&self, cell: usize, methods: &[MapMethod]) -> Vec<MapRow> {
+        let varied = match self.base.at(&self.values(cell)) {
+            Ok(varied) => varied,
+            Err(refused) => {
+                let detail = one_line(&refused.to_string());
+                let refused = |&method: &MapMethod| MapRow {
+                    detail: detail.clone(),
+                    cell,
+                    method,
+                    ..MapRow::default()
+                };
+                return methods.iter().map(refused).collect();
+            }
+        };
+        let limit = Duration::from_secs_f64(self.cell_seconds);
+        let solved = Cell::new(&varied, self.tolerance, limit, &self.limit);
+        (methods.iter().map(|&method| solved.row(cell, method))).collect()
+    }
+}
+
+/// What identifies a map. Values are texts, as in the table: they must
+/// agree to the last digit.
+impl Serialize for MapRequest {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Keys<'a> {
+            scenario_digest: String,
+            set: &'a [String],
+            vary: Vec<Axis>,
+            step: Option<String>,
+            segments: Option<usize>,
+            tolerance: Option<String>,
+            cell_seconds: String,
+        }
+        #[derive(Serialize)]
+        struct Axis {
+            keys: String,
+            log: bool,
+            values: Vec<String>,
+        }
+        let knobs = self.base.knobs();
+        let text = |value: f64| format!("{value:?}");
+        let axes = self.axes.iter().map(|axis| Axis {
+            keys: axis.keys.to_string(),
+            log: axis.log,
+            values: axis.values.iter().map(|&v| axis.keys.text(v)).collect(),
+        });
+        Keys {
+            scenario_digest: format!("{:08x}", crc32fast::hash(self.base.text().as_bytes())),
+            set: self.base.overrides(),
+            vary: axes.collect(),
+            step: knobs.step.map(text),
+            segments: knobs.segments,
+            tolerance: self.tolerance.map(text),
+            cell_seconds: text(self.cell_seconds),
+        }
+        .serialize(serializer)
+    }
+}
+
+/// The methods that are compared, in the order of the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MapMethod {
+    /// A method of relaxation or shooting. Shooting from rest starts from the result of
+    /// the default method at the same tolerance.
+    ToRest(Method),
+    /// Explicit motion with one time step for the scenario's duration.
+    ExplicitMotion,
+}
+
+impl MapMethod {
+    /// All of them.
+    pub const ALL: [MapMethod; 6] = [
+        MapMethod::ToRest(Method::ALL[0]),
+        MapMethod::ToRest(Method::ALL[1]),
+        MapMethod::ExplicitMotion,
+        MapMethod::ToRest(Method::ALL[2]),
+        MapMethod::ToRest(Method::ALL[3]),
+        MapMethod::ToRest(Method::ALL[4]),
+    ];
+
+    /// The word used on the command line and in `map.csv`.
+    pub fn word(self) -> &'static str {
+        match self {
+            MapMethod::ToRest(method) => method.word(),
+            MapMethod::ExplicitMotion => "explicit-motion",
+        }
+    }
+
+    fn rank(self) -> Option<usize> {
+        MapMethod::ALL.iter().position(|method| *method == self)
+    }
+}
+
+impl Default for MapMethod {
+    fn default() -> Self {
+        MapMethod::ALL[0]
+    }
+}
+
+impl Ord for MapMethod {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.rank().cmp(&other.rank())
+    }
+}
+
+impl PartialOrd for MapMethod {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+words! {
+    /// Outcome of a method.
+    #[derive(Default, PartialOrd, Ord, Hash)]
+    pub enum MapOutcome {
+        /// At rest in the reference equilibrium, within both error estimates.
+        Right = "right",
+        /// At rest in another equilibrium, not known to be unstable.
+        OtherEquilibrium = "other-equilibrium",
+        /// At rest in an unstable equilibrium.
+        Saddle = "saddle",
+        /// In the same equilibrium, but further from the reference than both
+        /// error estimates allow.
+        Inaccurate = "inaccurate",
+        /// Not at rest, or not within the tolerance.
+        NotConverged = "not-converged",
+        /// Values grew without bound, or no step lowered the energy.
+        Diverged = "diverged",
+        /// The method or the format refuses such a leaf.
+        #[default]
+        Refused = "refused",
+        /// The time limit was exceeded.
+        OutOfTime = "out-of-time",
+    }
+}
+
+/// An answer at rest within the tolerance, or an outcome and a sentence that say why there
+/// is none.
+pub type Found = Result<Answer, (MapOutcome, String)>;
+
+words! {
+    /// Reliability of the reference.
+    #[derive(Default, PartialOrd, Ord, Hash)]
+    pub enum Confidence {
+        /// Relaxation and shooting from there agree within both error estimates,
+        /// and so do their numbers of negative eigenvalues.
+        Confirmed = "confirmed",
+        /// They do not: the reference is the shooting solution if that is a stable
+        /// equilibrium, otherwise the relaxed leaf.
+        Unconfirmed = "unconfirmed",
+        /// The relaxation did not come to rest.
+        #[default]
+        None = "none",
+    }
+
+    /// What the figure of a map shows.
+    #[derive(Default)]
+    pub enum MapShow {
+        /// The outcome of each method.
+        #[default]
+        Outcomes = "outcomes",
+        /// The number of waves along the margins of stable answers.
+        Waves = "waves",
+    }
+}
+
+read_and_write!(MapMethod);
+
+/// One method in one cell: a row of `map.csv`, in the order of its columns.
+/// Lengths except the tip's coordinates are relative to the longest rod.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct MapRow {
+    /// The number of the cell, the last axis varying fastest; the table gives its values instead.
+    #[serde(skip)]
+    pub cell: usize,
+    /// The method.
+    pub method: MapMethod,
+    /// The outcome.
+    pub outcome: MapOutcome,
+    /// Further information, on one line.
+    pub detail: String,
+    /// Negative eigenvalues of the equilibrium found.
+    pub index: Option<usize>,
+    /// The shared tip, or the first rod's.
+    #[serde(serialize_with = "number")]
+    pub tip_x: Option<f64>,
+    /// Its y.
+    #[serde(serialize_with = "number")]
+    pub tip_y: Option<f64>,
+    /// Its z.
+    #[serde(serialize_with = "number")]
+    pub tip_z: Option<f64>,
+    /// Energy of the equilibrium found.
+    #[serde(serialize_with = "number")]
+    pub energy: Option<f64>,
+    /// Largest distance from the reference.
+    #[serde(serialize_with = "number")]
+    pub error: Option<f64>,
+    /// The method's own error estimate.
+    #[serde(serialize_with = "number")]
+    pub error_estimate: Option<f64>,
+    /// Waves along the margins of the equilibrium found: a multiple of 1/2.
+    #[serde(serialize_with = "number")]
+    pub margin_waves: Option<f64>,
+    /// Their amplitude.
+    #[serde(serialize_with = "number")]
+    pub margin_amplitude: Option<f64>,
+    /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
+    #[serde(serialize_with = "number")]
+    pub twist: Option<f64>,
+    /// Time taken, by one thread.
+    #[serde(serialize_with = "microseconds")]
+    pub seconds: f64,
+    /// The reliability of the reference.
+    pub reference: Confidence,
+}
+
+/// As in Rust's notation, from which every bit can be read.
+fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    match value {
+        // Adding zero turns -0 into 0.
+        Some(value) => serializer.collect_str(&format_args!("{:?}", value + 0.0)),
+        None => serializer.serialize_none(),
+    }
+}
+
+fn microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&format_args!("{seconds:.6}"))
+}
+
+impl MapRow {
+    /// Waves along the margins of a stable equilibrium; `None` where the
+    /// method found none.
+    pub fn stable_waves(&self) -> Option<f64> {
+        self.margin_waves.filter(|_| self.index == Some(0))
+    }
 }

@@ -1,33 +1,37 @@
 //! The lowest pass from a stable leaf to another equilibrium.
 
-use rayon::prelude::*;
-
-use super::{Stable, StartPoint};
 use crate::branch::{Equations, Point, between, on_finer, prolong_field, times};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::accuracy::richardson::Richardson;
-use crate::relax::settle::settle_from::settle_from;
-use crate::relax::transfer::prolong::prolong;
+use crate::relax::accuracy::transfer::prolong;
+use crate::relax::solve_on_grid::settle_from;
 use crate::relax::{Barrier, Neighbour, Saddle};
+use crate::study::margin::{Stable, StartPoint};
+use rayon::prelude::*;
 
 /// Number of modes along which saddles are sought, in both directions.
 const MODES: usize = 3;
+
 pub(super) const MODE_CLIMBS: usize = 2 * MODES;
 
 /// Largest number of grids for the extrapolated energy of a pass, nodes of the finest,
 /// and the relative error at which it is accurate enough.
 const GRIDS: usize = 7;
+
 const MOST_NODES: usize = 20_000;
+
 const ENOUGH: f64 = 1e-7;
 
 /// The leaf has returned to its equilibrium within this distance, in lengths and as a part of
 /// the distance to the pass.
 const SAME: f64 = 1e-3;
+
 const SAME_PART: f64 = 0.1;
 
 /// Near a fold a coarse grid may have no pass, or another one: so often the grid is refined
 /// for the search, up to so many nodes.
 const HALVINGS: usize = 3;
+
 const FEW_NODES: usize = 800;
 
 /// Passes whose heights differ by less than this, relatively, are examined once.

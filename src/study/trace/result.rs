@@ -1,16 +1,12 @@
 //! The result of a trace.
 
-use glam::DVec3;
-use serde::ser::{Serialize, SerializeStruct, Serializer};
-
-use super::TraceUntil;
-use super::law::Law;
-use super::show::TraceShow;
 use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
-use crate::shape::serialize_tips;
+use crate::shape::{Undulation, serialize_tips};
 use crate::study::Keys;
-use crate::undulation::Undulation;
+use crate::study::trace::{Law, TraceShow, TraceUntil};
+use glam::DVec3;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 /// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]

@@ -1,4 +1,4 @@
-use super::*;
+use crate::study::vary::*;
 use leafdyn_testing::pairs;
 
 fn vary(given: &str) -> Vary {

@@ -1,0 +1,741 @@
+//! Two axes around a panel: grid, frame, ticks and names, with curves and markers
+//! inside. Every panel of numbers is drawn with them.
+//!
+//! An axis: maps values to fractions of its length, and places round ticks.
+//!
+//! Round numbers, for ticks and scales.
+
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::labels::{Cell, TEXT_SIZE, TICK_SIZE, title};
+use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::{
+    Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle, smooth,
+};
+use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
+use glam::DVec2;
+use std::ops::{Range, RangeInclusive};
+
+const TICK: f64 = 4.0;
+
+const DIVISION: f64 = 2.0;
+
+/// From the frame to the base line of the name of the horizontal axis.
+const NAME_BELOW: f64 = 34.0;
+
+/// From the frame to that of the vertical axis: the least distance, the gap after the
+/// labels, and the largest distance.
+const NEAREST_NAME: f64 = 42.0;
+
+const AFTER_LABELS: f64 = 13.0;
+
+const FARTHEST_NAME: f64 = 53.0;
+
+pub struct Curve {
+    pub name: &'static str,
+    pub color: Color,
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|point| point.1)
+    }
+}
+
+pub struct Axes {
+    pub cell: Cell,
+    pub across: Axis,
+    pub up: Axis,
+}
+
+impl Axes {
+    /// The position of a point on the page; `None` if it cannot be drawn.
+    pub fn at(&self, (x, y): (f64, f64)) -> Option<DVec2> {
+        let fraction = DVec2::new(self.across.fraction(x), 1.0 - self.up.fraction(y));
+        let at = self.cell.corner + self.cell.size * fraction;
+        at.is_finite().then_some(at)
+    }
+
+    /// Draws a panel of the letter and the title, with these axes.
+    pub fn titled(
+        page: &mut Drawing,
+        cell: Cell,
+        [letter, what]: [&str; 2],
+        across: Axis,
+        up: Axis,
+    ) -> Self {
+        let axes = Axes { cell, across, up };
+        title(page, cell.corner, letter, what);
+        axes.draw(page);
+        axes
+    }
+
+    /// Draws grid, frame, ticks and names.
+    pub fn draw(&self, page: &mut Drawing) {
+        let Cell { corner, size } = self.cell;
+        let end = self.cell.end();
+        let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
+            true => Stroke::new(FRAME, 0.8),
+            false => Stroke::new(GRID, 0.7),
+        };
+        for tick in self.across.ticks(size.x, Direction::Across) {
+            let top = corner.with_x(corner.x + tick.fraction * size.x);
+            page.line(top, top.with_y(end.y), stroke(&self.across, &tick));
+        }
+        for tick in self.up.ticks(size.y, Direction::Up) {
+            let left = corner.with_y(end.y - tick.fraction * size.y);
+            page.line(left, left.with_x(end.x), stroke(&self.up, &tick));
+        }
+        self.draw_frame(page);
+    }
+
+    /// Draws all but the grid.
+    pub fn draw_frame(&self, page: &mut Drawing) {
+        let Cell { corner, size } = self.cell;
+        let (middle, end) = (self.cell.middle(), self.cell.end());
+        let rim = Stroke::new(FRAME, 0.8);
+        page.stroke(rectangle(corner, size), rim);
+        let font = Font::embedded();
+        let mut widest = 0.0_f64;
+        for (axis, direction, length, out) in [
+            (&self.across, Direction::Across, size.x, DVec2::Y),
+            (&self.up, Direction::Up, size.y, DVec2::NEG_X),
+        ] {
+            let foot = |fraction: f64| match direction {
+                Direction::Across => corner + size * DVec2::new(fraction, 1.0),
+                Direction::Up => corner + size * DVec2::new(0.0, 1.0 - fraction),
+            };
+            for fraction in axis.divisions(length) {
+                let foot = foot(fraction);
+                page.line(foot, foot + DIVISION * out, rim);
+            }
+            for Tick { fraction, text, .. } in axis.ticks(length, direction) {
+                let foot = foot(fraction);
+                page.line(foot, foot + TICK * out, rim);
+                match direction {
+                    _ if !axis.labelled => (),
+                    Direction::Across => {
+                        let base = foot + DVec2::new(0.0, TICK + 1.2 * TICK_SIZE);
+                        page.label(base, &text, TICK_SIZE, Anchor::Middle, NOTE);
+                    }
+                    Direction::Up => {
+                        let end = foot - DVec2::new(TICK + 3.0, 0.0);
+                        page.centered_label(end, &text, TICK_SIZE, Anchor::End, NOTE);
+                        widest = widest.max(font.width(&text, TICK_SIZE));
+                    }
+                }
+            }
+        }
+        if self.across.labelled {
+            let base = DVec2::new(middle.x, end.y + NAME_BELOW);
+            page.label(base, &self.across.title(), TEXT_SIZE, Anchor::Middle, INK);
+        }
+        if self.up.labelled {
+            let distance = (widest + AFTER_LABELS).clamp(NEAREST_NAME, FARTHEST_NAME);
+            let base = DVec2::new(corner.x - distance, middle.y);
+            page.rotated_label(base, &self.up.title(), TEXT_SIZE, INK);
+        }
+    }
+
+    /// Draws the part of a curve through these points that is inside the frame, with
+    /// gaps where a point cannot be drawn.
+    pub fn curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
+        let columns = self.cell.size.x.ceil().max(1.0) as usize;
+        let places = thinned(points, columns).into_iter();
+        let places: Vec<Option<DVec2>> = places.map(|point| self.at(point)).collect();
+        self.line(page, &places, stroke);
+    }
+
+    /// A smooth curve through these points as straight pieces on the page: for every point but the
+    /// last those that lead to the next; none where one of both cannot be drawn.
+    pub fn smooth(&self, points: &[(f64, f64)]) -> Vec<Vec<DVec2>> {
+        let places: Vec<Option<DVec2>> = points.iter().map(|&point| self.at(point)).collect();
+        let mut pieces = Vec::with_capacity(points.len());
+        for run in places.split_inclusive(Option::is_none) {
+            let drawn: Vec<DVec2> = run.iter().flatten().copied().collect();
+            pieces.extend(smooth(&drawn));
+            pieces.resize(pieces.len() + usize::from(!drawn.is_empty()), Vec::new());
+            pieces.resize(pieces.len() + run.len() - drawn.len(), Vec::new());
+        }
+        pieces.truncate(points.len().saturating_sub(1));
+        pieces
+    }
+
+    /// Draws what is inside the frame of a line through these points on the page, with gaps where
+    /// one is missing.
+    pub fn line(&self, page: &mut Drawing, places: &[Option<DVec2>], stroke: Stroke) {
+        let mut path: Path = Vec::new();
+        let mut pen = None;
+        for pair in places.windows(2) {
+            let inside = pair[0].zip(pair[1]);
+            let Some((from, to)) = inside.and_then(|(from, to)| self.clipped(from, to)) else {
+                continue;
+            };
+            if pen != Some(from) {
+                path.push(Step::Move(from));
+            }
+            path.push(Step::Line(to));
+            pen = Some(to);
+        }
+        if !path.is_empty() {
+            page.stroke(path, stroke);
+        }
+    }
+
+    /// The part of a line that is inside the frame (Liang and Barsky).
+    fn clipped(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+        let step = to - from;
+        let (low, high) = (self.cell.corner - from, self.cell.end() - from);
+        let (mut first, mut last) = (0.0_f64, 1.0_f64);
+        for (step, low, high) in [(step.x, low.x, high.x), (step.y, low.y, high.y)] {
+            if step == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / step, high / step);
+            first = first.max(a.min(b));
+            last = last.min(a.max(b));
+        }
+        let point = |part: f64| match part {
+            0.0 => from,
+            1.0 => to,
+            part => from + part * step,
+        };
+        (first <= last).then(|| (point(first), point(last)))
+    }
+
+    /// Draws a marker at each of these points that is inside the frame.
+    pub fn markers(
+        &self,
+        page: &mut Drawing,
+        points: impl IntoIterator<Item = (f64, f64)>,
+        marker: Marker,
+        color: Color,
+    ) {
+        let (low, high) = (self.cell.corner - 0.01, self.cell.end() + 0.01);
+        for at in points.into_iter().filter_map(|point| self.at(point)) {
+            if at.cmpge(low).all() && at.cmple(high).all() {
+                marker.draw(page, at, color);
+            }
+        }
+    }
+}
+
+/// Fewer points that look the same when drawn over `columns` columns: of each
+/// the first, the last, the lowest and the highest.
+fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
+    let each = points.len().div_ceil(columns);
+    if each <= 4 {
+        return points.to_vec();
+    }
+    let mut kept = Vec::with_capacity(4 * columns);
+    for column in points.chunks(each) {
+        let by_height = |a: &usize, b: &usize| column[*a].1.total_cmp(&column[*b].1);
+        let lowest = (0..column.len()).min_by(by_height).unwrap_or(0);
+        let highest = (0..column.len()).max_by(by_height).unwrap_or(0);
+        let mut chosen = vec![0, lowest, highest, column.len() - 1];
+        chosen.sort_unstable();
+        chosen.dedup();
+        kept.extend(chosen.into_iter().map(|index| column[index]));
+    }
+    kept
+}
+
+/// Padding at both ends: as a fraction of a linear extent, and in decades.
+const PADDING: f64 = 0.06;
+
+const PADDING_DECADES: f64 = 0.12;
+
+/// Most decades of an axis: smaller values are below rounding.
+const MOST_DECADES: f64 = 18.0;
+
+/// Larger values are diverged and not drawn.
+const LARGEST: f64 = 1e290;
+
+/// Powers of ten for which a linear axis writes values without a factor.
+const PLAIN: Range<f64> = -2.0..4.0;
+
+/// Least pixels between ticks, across and up, and between their labels.
+const LINEAR: [f64; 2] = [62.0, 25.0];
+
+const LOGARITHMIC: [f64; 2] = [38.0, 22.0];
+
+const BETWEEN_LABELS: f64 = 4.0;
+
+/// A decade wider than this many pixels is subdivided.
+const DIVIDED: f64 = 60.0;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    Across,
+    Up,
+}
+
+/// Where ticks are, and how they are labelled.
+#[derive(Clone, Debug)]
+pub enum Ticks {
+    /// Round numbers; on a logarithmic axis powers of ten.
+    Round,
+    /// Powers of ten, in seconds.
+    Times,
+    /// Some of these whole numbers.
+    At(Vec<f64>),
+}
+
+#[derive(Clone, Debug)]
+pub struct Axis {
+    pub name: String,
+    /// The sign of all values of a logarithmic axis; `None`: linear.
+    pub sign: Option<f64>,
+    /// Values at both ends or, on a logarithmic axis, decades; they may decrease.
+    pub start: f64,
+    pub end: f64,
+    pub ticks: Ticks,
+    /// Least pixels between ticks, in place of the default.
+    pub tick_spacing: Option<f64>,
+    /// Whether the ticks and the axis are labelled.
+    pub labelled: bool,
+    /// Whether the grid line of zero, where most curves begin, is emphasized.
+    pub emphasizes_zero: bool,
+}
+
+#[derive(Clone, Debug)]
+pub struct Tick {
+    pub value: f64,
+    /// From 0 at the start of the axis to 1 at its end.
+    pub fraction: f64,
+    pub text: String,
+}
+
+impl Axis {
+    pub fn linear(name: &str, start: f64, end: f64) -> Self {
+        let [start, end] = [start, end].map(|value| value.clamp(-LARGEST, LARGEST));
+        let size = start.abs().max(end.abs());
+        let extent = (end - start).abs();
+        // An extent that is only rounding counts as zero.
+        let (start, end) = if extent > 1e-12 * size && extent > f64::MIN_POSITIVE {
+            (start, end)
+        } else if size > f64::MIN_POSITIVE {
+            (start - 0.5 * size, end + 0.5 * size)
+        } else {
+            (-1.0, 1.0)
+        };
+        Axis {
+            name: name.into(),
+            sign: None,
+            start,
+            end,
+            ticks: Ticks::Round,
+            tick_spacing: None,
+            labelled: true,
+            emphasizes_zero: false,
+        }
+    }
+
+    /// A linear axis that covers these values, with padding.
+    pub fn holding(name: &str, values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extent(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
+        let axis = Axis::linear(name, low, high);
+        let padding = PADDING * (axis.end - axis.start);
+        Axis {
+            start: axis.start - padding,
+            end: axis.end + padding,
+            emphasizes_zero: true,
+            ..axis
+        }
+    }
+
+    /// The same axis with at least this extent: smaller variations are rounding.
+    pub fn at_least(self, extent: f64) -> Self {
+        let lacking = extent - (self.end - self.start);
+        if lacking.is_nan() || lacking <= 0.0 {
+            return self;
+        }
+        Axis {
+            start: self.start - 0.5 * lacking,
+            end: self.end + 0.5 * lacking,
+            ..self
+        }
+    }
+
+    /// A logarithmic axis of at least `fewest` decades that covers the positive ones of
+    /// these values, with padding.
+    pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {
+        let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
+        let (start, end) = match extent(drawable.map(f64::log10)) {
+            Some((low, high)) => {
+                let low = low.max(high - MOST_DECADES);
+                let padding = (0.5 * (fewest - (high - low))).max(PADDING_DECADES);
+                (low - padding, high + padding)
+            }
+            None => (-fewest, 0.0),
+        };
+        Axis {
+            sign: Some(1.0),
+            ..Axis::linear(name, start, end)
+        }
+    }
+
+    /// An axis that covers these values: linear or, given their sign, logarithmic.
+    pub fn covering(name: &str, values: impl Iterator<Item = f64>, sign: Option<f64>) -> Self {
+        match sign {
+            None => Axis::holding(name, values),
+            Some(sign) => Axis {
+                sign: Some(sign),
+                ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
+            },
+        }
+    }
+
+    /// The name, with the power of ten by which values are multiplied.
+    pub fn title(&self) -> String {
+        match self.power() {
+            _ if self.name.is_empty() => String::new(),
+            0 => self.name.clone(),
+            power => format!("{} · 10{}", self.name, superscript(-power)),
+        }
+    }
+
+    /// The power of ten that is the unit of the tick labels.
+    pub fn power(&self) -> i32 {
+        let size = self.start.abs().max(self.end.abs()).log10();
+        match (self.sign, &self.ticks) {
+            (None, Ticks::Round) if !PLAIN.contains(&size) => 3 * (size / 3.0).floor() as i32,
+            _ => 0,
+        }
+    }
+
+    /// Where a value is, from 0 at the start to 1 at the end; not finite if it
+    /// cannot be drawn.
+    pub fn fraction(&self, value: f64) -> f64 {
+        let at = match self.sign {
+            Some(sign) => (sign * value).log10(),
+            None if value.abs() < LARGEST => value,
+            None => f64::NAN,
+        };
+        (at - self.start) / (self.end - self.start)
+    }
+
+    /// As many ticks as are readable on an axis of this length.
+    pub fn ticks(&self, length: f64, direction: Direction) -> Vec<Tick> {
+        let default = match self.ticks {
+            Ticks::Round if self.sign.is_none() => LINEAR,
+            _ => LOGARITHMIC,
+        };
+        let font = Font::embedded();
+        let size = |tick: &Tick| match direction {
+            Direction::Across => font.width(&tick.text, TICK_SIZE),
+            Direction::Up => TICK_SIZE,
+        };
+        let separate = |pair: &[Tick]| {
+            let distance = length * (pair[1].fraction - pair[0].fraction).abs();
+            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > BETWEEN_LABELS
+        };
+        let mut spacing = self.tick_spacing.unwrap_or(default[direction as usize]);
+        loop {
+            let ticks = self.ticks_spaced(spacing / length);
+            if !self.labelled || spacing > length || ticks.windows(2).all(separate) {
+                return ticks;
+            }
+            spacing *= 1.25;
+        }
+    }
+
+    /// Ticks spaced by about this fraction of the axis.
+    fn ticks_spaced(&self, spacing: f64) -> Vec<Tick> {
+        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let every = |count: usize| (count as f64 * spacing).ceil().max(1.0) as usize;
+        let ticks = match (&self.ticks, self.sign) {
+            (Ticks::At(values), _) => {
+                let kept = values.iter().step_by(every(values.len()));
+                kept.map(|&value| (value, fixed(value, 0))).collect()
+            }
+            (_, Some(sign)) => {
+                let count = (high.floor() - low.ceil() + 1.0).max(0.0) as usize;
+                self.decades(low..=high, sign, every(count) as i32, count < 2)
+            }
+            (Ticks::Round | Ticks::Times, None) => {
+                let unit = 10f64.powi(self.power());
+                let step = round_step((high - low) * spacing / unit);
+                let found = multiples(low / unit, high / unit, step).into_iter();
+                found.map(|(value, text)| (value * unit, text)).collect()
+            }
+        };
+        let tick = |(value, text): (f64, String)| Tick {
+            value,
+            fraction: self.fraction(value),
+            text,
+        };
+        // Beyond the largest number there is no power of ten.
+        let ticks = ticks.into_iter().map(tick);
+        ticks.filter(|tick| tick.fraction.is_finite()).collect()
+    }
+
+    /// Powers of ten that are multiples of `every` or, if there are few, 1, 2 and 5 times
+    /// every power.
+    fn decades(
+        &self,
+        range: RangeInclusive<f64>,
+        sign: f64,
+        every: i32,
+        few: bool,
+    ) -> Vec<(f64, String)> {
+        let (digits, every) = match few {
+            true => ([1.0, 2.0, 5.0].as_slice(), 1),
+            false => ([1.0].as_slice(), every),
+        };
+        let powers = range.start().floor() as i32..=range.end().ceil() as i32;
+        let powers = powers.filter(|power| power % every == 0);
+        let found = powers.flat_map(|power| digits.iter().map(move |&digit| (digit, power)));
+        found
+            .filter(|&(digit, power)| range.contains(&(f64::from(power) + f64::log10(digit))))
+            .map(|(digit, power)| {
+                let text = match self.ticks {
+                    Ticks::Times => time_of_decade(digit, power),
+                    _ if few => digit_of_decade(sign * digit, power),
+                    _ => decade(sign, power),
+                };
+                (sign * digit * 10f64.powi(power), text)
+            })
+            .collect()
+    }
+
+    /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
+    pub fn divisions(&self, length: f64) -> Vec<f64> {
+        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let divided = length > DIVIDED * (high - low) && !matches!(self.ticks, Ticks::At(_));
+        let Some(sign) = self.sign.filter(|_| divided) else {
+            return Vec::new();
+        };
+        let powers = low.floor() as i32..=high.floor() as i32;
+        let values =
+            powers.flat_map(|power| (2..10).map(move |n| f64::from(n) * 10f64.powi(power)));
+        let fractions = values.map(|value| self.fraction(sign * value));
+        fractions.filter(|it| (0.0..=1.0).contains(it)).collect()
+    }
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let both = values.map(|value| (value, value));
+    both.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// The smallest of 1, 2 or 5 times a power of ten that is at least `smallest`.
+pub fn round_step(smallest: f64) -> f64 {
+    let decade = 10f64.powf(smallest.log10().floor());
+    // Tolerates rounding: 0.2 must yield 0.2 and not 0.5.
+    let wanted = smallest * (1.0 - 1e-9);
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|factor| factor * decade)
+        .find(|&step| step >= wanted)
+        .unwrap_or(10.0 * decade)
+}
+
+/// Multiples of `step` from `low` to `high`, each with its text.
+pub fn multiples(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
+    let slack = 1e-9;
+    let first = (low / step - slack).ceil() as i64;
+    let last = (high / step + slack).floor() as i64;
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    (first..=last)
+        .map(|multiple| multiple as f64 * step)
+        .map(|value| (value, fixed(value, decimals)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::drawing::formats::text;
+
+    #[test]
+    fn curves_are_clipped_at_the_frame_and_have_gaps_at_invalid_points() {
+        let axes = Axes {
+            cell: Cell::new(DVec2::new(10.0, 20.0), DVec2::new(100.0, 50.0)),
+            across: Axis::linear("x", 0.0, 1.0),
+            up: Axis::linear("y", 0.0, 1.0),
+        };
+        let curve = |points: &[(f64, f64)]| {
+            let mut page = Drawing::new(200.0, "");
+            axes.curve(&mut page, points, Stroke::new(INK, 1.0));
+            text(&page)
+        };
+        let diagonal = "<path d=\"M10 70L110 20\"";
+        assert!(curve(&[(-1.0, -1.0), (3.0, 3.0)]).contains(diagonal));
+        assert!(curve(&[(0.0, 0.0), (1.0, 1.0)]).contains(diagonal));
+        assert!(!curve(&[(0.0, 1.5), (1.0, 1.2)]).contains("<path"));
+        let line = [0.0, 0.2, 0.3, 0.4, 1.0];
+        let with_gap = line.map(|x| (x, if x == 0.3 { f64::NAN } else { x }));
+        assert_eq!(curve(&with_gap).matches('M').count(), 2);
+        let heights = [0.5, f64::INFINITY, 1e300, -1e280];
+        let extreme = [0, 1, 2, 3].map(|i| (0.1 * i as f64, heights[i]));
+        assert!(!curve(&extreme).contains("<path"));
+    }
+
+    #[test]
+    fn smooth_curves_have_gaps_at_invalid_points() {
+        let axes = Axes {
+            cell: Cell::new(DVec2::ZERO, DVec2::splat(100.0)),
+            across: Axis::linear("x", 0.0, 1.0),
+            up: Axis::linear("y", 0.0, 1.0),
+        };
+        let x = [0.0, 0.1, f64::NAN, 0.3, f64::NAN, 0.5, 0.6, 0.8];
+        let points = x.map(|x| (x, x));
+        let drawn = axes.smooth(&points);
+        let there: Vec<bool> = drawn.iter().map(|piece| !piece.is_empty()).collect();
+        assert_eq!(there, [true, false, false, false, false, true, true]);
+        assert_eq!(drawn[5].first(), axes.at(points[5]).as_ref());
+        assert!(axes.smooth(&points[..1]).is_empty());
+    }
+
+    #[test]
+    fn thinning_keeps_peaks_and_ends() {
+        let peak = |i: usize| if i == 5432 { 1.0 } else { 0.0 };
+        let points: Vec<(f64, f64)> = (0..10_000).map(|i| (i as f64, peak(i))).collect();
+        let kept = thinned(&points, 100);
+        assert!(kept.len() <= 400);
+        assert!(kept.contains(&(5432.0, 1.0)));
+        assert_eq!((kept[0], kept[kept.len() - 1]), (points[0], points[9999]));
+        assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
+    }
+}
+
+#[cfg(test)]
+mod axis_tests {
+    use super::*;
+    use Direction::{Across, Up};
+
+    fn texts(axis: &Axis, length: f64) -> Vec<String> {
+        let ticks = axis.ticks(length, Across).into_iter();
+        ticks.map(|tick| tick.text).collect()
+    }
+
+    #[test]
+    fn linear_axes_have_few_digits() {
+        for (low, high, name) in [
+            (0.0, 12.0, "t"),
+            (0.0, 3e-5, "t · 10⁶"),
+            (-2e7, 1e6, "t · 10⁻⁶"),
+            (0.02, 0.5, "t"),
+        ] {
+            let axis = Axis::holding("t", [low, high].into_iter());
+            assert_eq!(axis.title(), name);
+            let ticks = axis.ticks(300.0, Up);
+            assert!((3..=12).contains(&ticks.len()), "{low} {high}: {ticks:?}");
+            for tick in ticks {
+                assert!(tick.text.chars().count() <= 6, "{tick:?}");
+                assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_and_constants_have_an_extent() {
+        for values in [
+            vec![],
+            vec![0.0, 0.0],
+            vec![3.0],
+            vec![f64::NAN, f64::INFINITY],
+            vec![1.0, 1.0 + 1e-15],
+            vec![1e-320, 0.0],
+        ] {
+            for axis in [
+                Axis::holding("t", values.iter().copied()),
+                Axis::logarithmic("t", values.iter().copied(), 1.0),
+            ] {
+                assert!(axis.end > axis.start, "{values:?}");
+                assert!(!axis.ticks(300.0, Up).is_empty(), "{values:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn logarithmic_axes_cover_their_values_with_padding() {
+        for values in [vec![1e-4, 3.0], vec![2.0, 2.1], vec![7.0], vec![1e-12, 0.0]] {
+            for fewest in [1.0, 3.0] {
+                let axis = Axis::logarithmic("", values.iter().copied(), fewest);
+                for &value in values.iter().filter(|&&value| value > 0.0) {
+                    let fraction = axis.fraction(value);
+                    assert!((0.0..=1.0).contains(&fraction), "{value} in {axis:?}");
+                }
+                assert!(axis.end - axis.start >= fewest - 1e-12);
+                assert!(!axis.fraction(0.0).is_finite());
+            }
+        }
+        // Rounding of rounding is left out.
+        let axis = Axis::logarithmic("", [1e-300, 1e-3].into_iter(), 3.0);
+        assert!(axis.fraction(1e-300) < 0.0);
+    }
+
+    #[test]
+    fn ticks_of_the_largest_numbers_are_on_the_axis() {
+        for values in [vec![1e308], vec![1e308, 1e-300], vec![-1.7e308, 1.7e308]] {
+            for axis in [
+                Axis::logarithmic("t", values.iter().copied(), 3.0),
+                Axis::holding("t", values.iter().copied()),
+                Axis::linear("t", values[0], *values.last().unwrap()),
+            ] {
+                for tick in axis.ticks(300.0, Up) {
+                    assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?} of {axis:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn labels_are_readable_and_do_not_touch() {
+        let axis = Axis::logarithmic("", [2e-3, 0.5].into_iter(), 1.0);
+        assert_eq!(texts(&axis, 400.0), ["10⁻²", "10⁻¹"]);
+        let axis = Axis {
+            ticks: Ticks::Times,
+            ..axis
+        };
+        assert_eq!(texts(&axis, 400.0), ["10 ms", "100 ms"]);
+        let axis = Axis::logarithmic("", [2.0, 5.0].into_iter(), 0.1);
+        assert_eq!(texts(&axis, 400.0), ["2", "5"]);
+        let sign = Some(-1.0);
+        let axis = Axis { sign, ..axis };
+        assert_eq!(texts(&axis, 400.0), ["\u{2212}2", "\u{2212}5"]);
+        let axis = Axis {
+            ticks: Ticks::At((1..=40).map(f64::from).collect()),
+            ..Axis::linear("", 0.5, 40.5)
+        };
+        assert_eq!(texts(&axis, 200.0).len(), 5);
+        assert_eq!(texts(&axis, 2000.0).len(), 40);
+        let axis = Axis::linear("", 1000.001, 1000.009);
+        for pair in axis.ticks(300.0, Across).windows(2) {
+            let apart = 300.0 * (pair[1].fraction - pair[0].fraction);
+            assert!(apart > 62.0, "{pair:?}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod round_tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round() {
+        let asked = [0.13, 0.2, 0.21, 0.6, 30.0];
+        for (smallest, step) in asked.into_iter().zip([0.2, 0.2, 0.5, 1.0, 50.0]) {
+            let found = round_step(smallest);
+            assert!((found - step).abs() < 1e-12 * step, "{smallest}: {found}");
+        }
+    }
+
+    #[test]
+    fn multiples_reach_both_ends_and_have_equal_decimals() {
+        let texts = |low, high, step| -> Vec<String> {
+            let found = multiples(low, high, step).into_iter();
+            found.map(|(_, text)| text).collect()
+        };
+        let even = ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"];
+        assert_eq!(texts(-0.4, 0.45, 0.2), even);
+        assert_eq!(texts(-0.1, 0.1, 0.05).len(), 5);
+        assert_eq!(texts(0.3, 19.0, 10.0), ["10"]);
+        assert_eq!(texts(0.1, 0.2, 1.0), [""; 0]);
+    }
+}

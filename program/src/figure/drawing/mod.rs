@@ -1,0 +1,439 @@
+//! Elements of a picture: shapes and labels on a page, and their colours. The unit
+//! is 1/96 inch, x points to the right and y down.
+//!
+//! Smooth curves through points on the page.
+//!
+//! Points of curves: which of them can be drawn, and where fractions of the length are.
+
+pub(super) mod axes;
+pub(crate) mod formats;
+pub(super) mod labels;
+pub(super) mod markers;
+pub(super) mod space;
+
+use glam::{DVec2, DVec3};
+
+/// A page and everything on it, in painting order.
+pub struct Drawing {
+    pub width: f64,
+    pub height: f64,
+    /// What the page shows, in words.
+    pub description: String,
+    pub marks: Vec<Mark>,
+}
+
+pub enum Mark {
+    /// Begins a named group, for editing the SVG.
+    Group(&'static str),
+    EndGroup,
+    Shape {
+        path: Path,
+        fill: Option<Color>,
+        stroke: Option<Stroke>,
+    },
+    Label(Label),
+}
+
+/// A line drawn with round caps and joins.
+#[derive(Clone, Copy)]
+pub struct Stroke {
+    pub color: Color,
+    pub width: f64,
+    pub dash: Dash,
+}
+
+impl Stroke {
+    pub const fn new(color: Color, width: f64) -> Self {
+        Stroke {
+            color,
+            width,
+            dash: Dash::Solid,
+        }
+    }
+
+    pub fn dashed(self, dashed: bool) -> Self {
+        let dash = if dashed { Dash::Dashed } else { Dash::Solid };
+        Stroke { dash, ..self }
+    }
+}
+
+/// How a line is interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dash {
+    Solid,
+    Dashed,
+    Dotted,
+    Alternating,
+}
+
+impl Dash {
+    pub const ALL: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::Alternating];
+
+    /// Lengths of dashes and of the gaps between them, in turn; none of a solid line.
+    pub fn lengths(self) -> &'static [f64] {
+        match self {
+            Dash::Solid => &[],
+            Dash::Dashed => &[5.0, 4.0],
+            Dash::Dotted => &[0.1, 4.0],
+            Dash::Alternating => &[8.0, 4.0, 0.1, 4.0],
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+pub enum Step {
+    Move(DVec2),
+    Line(DVec2),
+    Cubic(DVec2, DVec2, DVec2),
+    Close,
+}
+
+pub type Path = Vec<Step>;
+
+/// Where a label's text lies relative to its point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+pub struct Label {
+    /// On the base line, at the text's start, middle or end.
+    pub at: DVec2,
+    pub text: String,
+    pub size: f64,
+    pub anchor: Anchor,
+    pub color: Color,
+    /// Rotated to read from bottom to top.
+    pub rotated: bool,
+}
+
+/// Height of the middle of digits and capitals above the base line, in font sizes.
+const HALF_CAPITAL: f64 = 0.36;
+
+impl Drawing {
+    pub fn new(width: f64, description: &str) -> Self {
+        Drawing {
+            width,
+            height: 0.0,
+            description: description.into(),
+            marks: Vec::new(),
+        }
+    }
+
+    pub fn group(&mut self, name: &'static str, fill: impl FnOnce(&mut Self)) {
+        self.marks.push(Mark::Group(name));
+        fill(self);
+        self.marks.push(Mark::EndGroup);
+    }
+
+    pub fn stroke(&mut self, path: Path, stroke: Stroke) {
+        let (fill, stroke) = (None, Some(stroke));
+        self.marks.push(Mark::Shape { path, fill, stroke });
+    }
+
+    pub fn shape(&mut self, path: Path, fill: Color, stroke: Option<Stroke>) {
+        let fill = Some(fill);
+        self.marks.push(Mark::Shape { path, fill, stroke });
+    }
+
+    pub fn line(&mut self, from: DVec2, to: DVec2, stroke: Stroke) {
+        self.stroke(vec![Step::Move(from), Step::Line(to)], stroke);
+    }
+
+    fn add(&mut self, label: Label) {
+        if !label.text.is_empty() {
+            self.marks.push(Mark::Label(label));
+        }
+    }
+
+    /// Adds a label unless it is empty.
+    pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
+        self.add(Label {
+            at,
+            text: text.into(),
+            size,
+            anchor,
+            color,
+            rotated: false,
+        });
+    }
+
+    /// Adds a label that is vertically centred at `at`.
+    pub fn centered_label(
+        &mut self,
+        at: DVec2,
+        text: &str,
+        size: f64,
+        anchor: Anchor,
+        color: Color,
+    ) {
+        let base = at + DVec2::new(0.0, HALF_CAPITAL * size);
+        self.label(base, text, size, anchor, color);
+    }
+
+    /// Adds a label that reads from bottom to top.
+    pub fn rotated_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
+        self.add(Label {
+            at,
+            text: text.into(),
+            size,
+            anchor: Anchor::Middle,
+            color,
+            rotated: true,
+        });
+    }
+}
+
+pub fn polyline(points: &[DVec2]) -> Path {
+    let mut path: Path = points.iter().map(|&point| Step::Line(point)).collect();
+    if let Some(first) = points.first() {
+        path[0] = Step::Move(*first);
+    }
+    path
+}
+
+pub fn polygon(corners: &[DVec2]) -> Path {
+    let mut path = polyline(corners);
+    path.push(Step::Close);
+    path
+}
+
+pub fn rectangle(corner: DVec2, size: DVec2) -> Path {
+    polygon(&[
+        corner,
+        corner + DVec2::new(size.x, 0.0),
+        corner + size,
+        corner + DVec2::new(0.0, size.y),
+    ])
+}
+
+pub fn circle(center: DVec2, radius: f64) -> Path {
+    /// Control points of a quarter circle lie this far along its tangents.
+    const QUARTER: f64 = 0.552_284_749_8;
+    let point = |x: f64, y: f64| center + radius * DVec2::new(x, y);
+    let q = QUARTER;
+    vec![
+        Step::Move(point(1.0, 0.0)),
+        Step::Cubic(point(1.0, q), point(q, 1.0), point(0.0, 1.0)),
+        Step::Cubic(point(-q, 1.0), point(-1.0, q), point(-1.0, 0.0)),
+        Step::Cubic(point(-1.0, -q), point(-q, -1.0), point(0.0, -1.0)),
+        Step::Cubic(point(q, -1.0), point(1.0, -q), point(1.0, 0.0)),
+        Step::Close,
+    ]
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Color(pub u8, pub u8, pub u8);
+
+pub const WHITE: Color = Color(255, 255, 255);
+
+pub const INK: Color = Color(32, 32, 36);
+
+pub const NOTE: Color = Color(84, 84, 92);
+
+pub const FRAME: Color = Color(120, 120, 128);
+
+pub const GRID: Color = Color(226, 227, 232);
+
+/// The floor of the panel in space.
+pub const FLOOR: Color = Color(247, 247, 249);
+
+/// Shadows on that floor.
+pub const SHADOW: Color = Color(212, 213, 220);
+
+pub const DOT: Color = Color(213, 60, 30);
+
+/// Colours that the colour-blind can distinguish, too (after Okabe and Ito).
+pub const BLUE: Color = Color(0, 114, 178);
+
+pub const SKY: Color = Color(86, 170, 225);
+
+pub const GREEN: Color = Color(0, 158, 115);
+
+pub const VERMILION: Color = Color(213, 94, 0);
+
+pub const PURPLE: Color = Color(170, 90, 150);
+
+pub const ORANGE: Color = Color(230, 159, 0);
+
+const BROWN: Color = Color(120, 80, 45);
+
+pub const SLATE: Color = Color(60, 60, 66);
+
+/// Colours of the curves in one panel, in this order.
+pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
+
+/// Viridis (Smith and van der Walt, matplotlib), equally spaced.
+const VIRIDIS: [Color; 11] = [
+    Color(68, 1, 84),
+    Color(72, 36, 117),
+    Color(65, 68, 135),
+    Color(53, 95, 141),
+    Color(42, 120, 142),
+    Color(33, 145, 140),
+    Color(34, 168, 132),
+    Color(68, 191, 112),
+    Color(122, 209, 81),
+    Color(189, 223, 38),
+    Color(253, 231, 37),
+];
+
+/// The bright end of viridis is left out: thin yellow lines vanish on white.
+const BRIGHTEST: f64 = 0.88;
+
+/// The colour of a vein: `t` runs from 0 at one edge of the leaf to 1 at the other.
+pub fn vein_color(t: f64) -> Color {
+    let place = BRIGHTEST * t.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
+    let left = (place as usize).min(VIRIDIS.len() - 2);
+    let (a, b) = (VIRIDIS[left], VIRIDIS[left + 1]);
+    let mix = |a: u8, b: u8| {
+        let (a, b) = (f64::from(a), f64::from(b));
+        (a + (place - left as f64) * (b - a)).round() as u8
+    };
+    Color(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}
+
+/// The colour of one of `count` veins.
+pub fn color_of_vein(index: usize, count: usize) -> Color {
+    match count {
+        0 | 1 => vein_color(0.3),
+        _ => vein_color(index as f64 / (count - 1) as f64),
+    }
+}
+
+/// Length in pixels of the straight pieces of which a curve is drawn, and the most pieces between
+/// two of its points.
+const PIECE: f64 = 5.0;
+
+const MOST_PIECES: usize = 24;
+
+/// A curve through these points as straight pieces: for every point but the last those that lead
+/// from it to the next. Between two points it is a cubic with the tangents of parabolas through
+/// three points each, over the lengths of the chords. Where the chords turn back the curve has a
+/// corner.
+pub fn smooth(points: &[DVec2]) -> Vec<Vec<DVec2>> {
+    let chords: Vec<DVec2> = points.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let slope = |k: usize| chords[k].normalize_or_zero();
+    let length = |k: usize| chords[k].length();
+    // At both ends of chord `k`.
+    let inner = |before: usize, after: usize| {
+        let (a, b) = (length(before), length(after));
+        if a == 0.0 || b == 0.0 || slope(before).dot(slope(after)) <= 0.0 {
+            return None;
+        }
+        Some((b * slope(before) + a * slope(after)) / (a + b))
+    };
+    let tangents = |k: usize| {
+        let start = k.checked_sub(1).and_then(|before| inner(before, k));
+        let end = (k + 1 < chords.len()).then(|| inner(k, k + 1)).flatten();
+        // Of a parabola, at whose other end the tangent is known.
+        let other = |known: Option<DVec2>| known.map_or(slope(k), |it| 2.0 * slope(k) - it);
+        [start.unwrap_or(other(end)), end.unwrap_or(other(start))]
+    };
+    (0..chords.len())
+        .map(|k| {
+            let [from, to] = tangents(k).map(|tangent| length(k) * tangent);
+            let (a, b) = (points[k], points[k + 1]);
+            let count = ((length(k) / PIECE).ceil() as usize).clamp(1, MOST_PIECES);
+            let at = |i: usize| {
+                let t = i as f64 / count as f64;
+                let s = 1.0 - t;
+                // Hermite's cubics.
+                a * (s * s * (1.0 + 2.0 * t)) + b * (t * t * (1.0 + 2.0 * s)) + from * (t * s * s)
+                    - to * (t * t * s)
+            };
+            let inside = (1..count).map(at);
+            [a].into_iter().chain(inside).chain([b]).collect()
+        })
+        .collect()
+}
+
+/// Points farther away than this many lengths are diverged and not drawn.
+const FARTHEST: f64 = 1e4;
+
+/// Whether a point, in lengths, is finite and not too far away to be drawn.
+pub fn is_drawable(point: DVec3) -> bool {
+    point.is_finite() && point.abs().max_element() < FARTHEST
+}
+
+/// The points of a curve through nodes at these stations from one fraction of its length to another,
+/// or at one.
+pub fn stretch(stations: &[f64], curve: &[DVec3], [from, to]: [f64; 2]) -> Vec<DVec3> {
+    let nodes = || stations.iter().copied().zip(curve.iter().copied());
+    let at = |sigma: f64| {
+        let before = nodes().take_while(|(at, _)| *at <= sigma).last();
+        let after = nodes().find(|(at, _)| *at >= sigma);
+        match (before, after) {
+            (Some((a, x)), Some((b, y))) if b > a => Some(x.lerp(y, (sigma - a) / (b - a))),
+            (one, other) => one.or(other).map(|(_, x)| x),
+        }
+    };
+    let inside = nodes().filter(|(at, _)| from < *at && *at < to);
+    let end = if to > from { at(to) } else { None };
+    at(from)
+        .into_iter()
+        .chain(inside.map(|(_, x)| x))
+        .chain(end)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deviations of the curve through points of a circle are of the third order in their distance.
+    #[test]
+    fn a_circle_is_drawn_round() {
+        let worst = |count: usize| {
+            let angle = |k: usize| std::f64::consts::PI * k as f64 / count as f64;
+            let points: Vec<DVec2> = (0..=count)
+                .map(|k| 200.0 * DVec2::from_angle(angle(k)))
+                .collect();
+            let drawn = smooth(&points);
+            let off = drawn.iter().flatten().map(|it| (it.length() - 200.0).abs());
+            off.fold(0.0, f64::max)
+        };
+        let off = [8, 16, 32].map(worst);
+        assert!(
+            off[0] < 1.5 && off[1] < off[0] / 7.0 && off[2] < off[1] / 7.0,
+            "{off:?}"
+        );
+    }
+
+    #[test]
+    fn corners_and_repeated_points_stay() {
+        let back = [[0.0, 0.0], [10.0, 0.0], [0.0, 1.0]].map(DVec2::from_array);
+        let drawn = smooth(&back);
+        assert_eq!(drawn.len(), 2);
+        assert!(drawn[0].iter().all(|it| it.y == 0.0 && it.x <= 10.0));
+        let twice = [DVec2::X, DVec2::X, 2.0 * DVec2::X];
+        assert!(
+            smooth(&twice)
+                .iter()
+                .flatten()
+                .all(|it| it.is_finite() && it.y == 0.0)
+        );
+        assert!(smooth(&[]).is_empty() && smooth(&[DVec2::X]).is_empty());
+    }
+}
+
+#[cfg(test)]
+mod curve_tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_ends_between_nodes() {
+        let (stations, curve) = ([0.0, 0.5, 1.0], [0.0, 1.0, 3.0].map(|x| x * DVec3::X));
+        let of = |at| -> Vec<f64> {
+            let points = stretch(&stations, &curve, at).into_iter();
+            points.map(|point| point.x).collect()
+        };
+        assert_eq!(of([0.25, 0.75]), [0.5, 1.0, 2.0]);
+        assert_eq!(of([0.5, 1.0]), [1.0, 3.0]);
+        assert_eq!(of([0.75, 0.75]), [2.0]);
+        assert_eq!(of([1.0, 1.0]), [3.0]);
+        assert!(stretch(&[], &[], [0.5, 1.0]).is_empty());
+    }
+}

@@ -1,0 +1,695 @@
+//! A map: one panel per method and one colour per outcome or, if waves are shown, per
+//! number of waves of stable leaves. Results of one method along one axis are also drawn as
+//! curves below its strip: the tip and the energy or, where waves are shown, waves and twist.
+//!
+//! One panel of a map: its cells in the colours of their outcomes.
+
+use crate::figure::drawing::axes::{Axes, Axis, Ticks};
+use crate::figure::drawing::formats::Font;
+use crate::figure::drawing::labels::{
+    Cell, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE,
+    WIDTH, header,
+};
+use crate::figure::drawing::markers::Marker;
+use crate::figure::drawing::{
+    Anchor, CURVES, Color, Drawing, INK, NOTE, Stroke, WHITE, circle, rectangle, vein_color,
+};
+use crate::figure::scenario::{Quantity, with_unit};
+use crate::report::map_shows;
+use glam::DVec2;
+use leafdyn::scenario::Units;
+use leafdyn::study::{
+    Confidence, Knob, Map, MapMethod, MapOutcome, MapRequest, MapRow, MapShow, Vary,
+};
+
+const SWATCH: f64 = 12.0;
+
+/// Room below each panel for ticks and, below the last, for the name of the axis.
+const TICKS: f64 = 26.0;
+
+const NAME: f64 = 26.0;
+
+/// Between panels, for the ticks of the right one.
+const GAP: f64 = 44.0;
+
+const MOST_COLUMNS: usize = 3;
+
+const WIDEST: f64 = 470.0;
+
+/// Explains a map of waves.
+const MEANING: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
+    of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
+
+/// Width of a page with one panel.
+const NARROW: f64 = 600.0;
+
+/// Between the strip of a single method and its curves.
+const CURVES_GAP: f64 = 12.0;
+
+/// Height over width of a panel.
+const ASPECT: f64 = 0.86;
+
+/// With one axis: height of a method's strip, the gap below it, and room for its name
+/// and count.
+const STRIP: f64 = 30.0;
+
+const STRIP_GAP: f64 = 9.0;
+
+const METHOD: f64 = 130.0;
+
+const COUNT: f64 = 100.0;
+
+pub fn draw(map: &Map) -> Drawing {
+    let name = &map.request.base.scenario().name;
+    let title = format!("{name}: {}", map_shows(map.show));
+    let width = match (map.request.axes.len(), map.request.methods.len()) {
+        (2, 1) => NARROW,
+        _ => WIDTH,
+    };
+    let mut drawing = Drawing::new(width, &title);
+    let mut end = 0.0;
+    drawing.group("header", |page| {
+        header(page, LEFT, &title, &notes(map), None);
+        end = draw_key(page, map, NOTE_BASE + 20.0);
+        if map.show == MapShow::Waves {
+            end = draw_meaning(page, end);
+        }
+    });
+    let axes: Vec<Varied> = (map.request.axes.iter())
+        .map(|axis| Varied::of(axis, &map.request.base.scenario().units))
+        .collect();
+    drawing.height = match axes.split_first() {
+        Some((x, more)) => draw_panels(&mut drawing, map, x, more.first(), end),
+        None => end,
+    };
+    drawing
+}
+
+fn notes(map: &Map) -> Vec<String> {
+    let request = &map.request;
+    let (known, confirmed) = map.known_and_confirmed();
+    let mut axes = request.axes.iter();
+    let mut notes = Vec::new();
+    if !axes.any(|axis| axis.keys.to_string() == "leaf.rods") {
+        notes.push(format!("N = {}", request.base.scenario().rods.len()));
+    }
+    notes.push(match request.cells() {
+        cells if known < cells => format!("{known} of {cells} cells"),
+        _ => format!("{known} cells"),
+    });
+    notes.push(format!("reference confirmed in {confirmed}"));
+    if let Some(segments) = request.base.knobs().segments {
+        notes.push(format!("{segments} segments a vein"));
+    }
+    notes
+}
+
+/// Draws the key of the outcomes and marks that occur; returns where it ends.
+fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
+    let mut key = KeyRows::at(LEFT, base, SWATCH);
+    for outcome in MapOutcome::ALL {
+        let shown = |row: &MapRow| row.outcome == outcome && waves(map.show, row).is_none();
+        if map.rows.iter().any(shown) {
+            let name = match outcome {
+                MapOutcome::Saddle => "saddle, with its index".to_string(),
+                outcome => outcome.word().replace('-', " "),
+            };
+            key.entry(page, &name, |page, cell| fill(page, cell, outcome));
+        }
+    }
+    let counts = map.rows.iter().filter_map(|row| waves(map.show, row));
+    let mut counts: Vec<f64> = counts.collect();
+    counts.sort_by(f64::total_cmp);
+    counts.dedup();
+    for waves in counts {
+        let name = match waves {
+            0.0 => "stable, no waves".into(),
+            1.0 => "1 wave".into(),
+            waves => format!("{waves} waves"),
+        };
+        key.entry(page, &name, |page, cell| fill_waves(page, cell, waves));
+    }
+    for (reference, name) in [
+        (Confidence::Unconfirmed, "reference unconfirmed"),
+        (Confidence::None, "no reference"),
+    ] {
+        if map.rows.iter().any(|row| row.reference == reference) {
+            key.entry(page, name, |page, cell| mark(page, cell, reference));
+        }
+    }
+    if has_step_axis(map) {
+        key.entry(page, "longest step known to be stable", |page, cell| {
+            cell.line(page, BOUND);
+        });
+    }
+    key.end()
+}
+
+/// Draws the explanation of a map of waves; returns where it ends.
+fn draw_meaning(page: &mut Drawing, mut top: f64) -> f64 {
+    let room = page.width - LEFT - RIGHT;
+    for line in Font::embedded().wrapped(MEANING, TICK_SIZE, room) {
+        let base = DVec2::new(LEFT, top + TICK_SIZE);
+        page.label(base, &line, TICK_SIZE, Anchor::Start, NOTE);
+        top += 1.4 * TICK_SIZE;
+    }
+    top + 6.0
+}
+
+/// Whether explicit motion is shown over an axis of time steps.
+fn has_step_axis(map: &Map) -> bool {
+    let mut axes = map.request.axes.iter();
+    map.request.methods.contains(&MapMethod::ExplicitMotion)
+        && axes.any(|axis| axis.keys.sets(Knob::Step))
+}
+
+fn count(map: &Map, method: MapMethod) -> String {
+    let waving = |row: &&MapRow| row.method == method && row.stable_waves() > Some(0.0);
+    let (count, what) = match map.show {
+        MapShow::Waves => (map.rows.iter().filter(waving).count(), "wave"),
+        MapShow::Outcomes => (map.count(method, MapOutcome::Right), "right"),
+    };
+    format!("{count} of {} {what}", map.request.cells())
+}
+
+/// Draws a panel for every method or, with one axis, a strip. Returns the height of
+/// the page.
+fn draw_panels(
+    drawing: &mut Drawing,
+    map: &Map,
+    x: &Varied,
+    y: Option<&Varied>,
+    start: f64,
+) -> f64 {
+    let methods = &map.request.methods;
+    let columns = y.map_or(1, |_| methods.len().clamp(1, MOST_COLUMNS));
+    let (corner, size, pitch) = match y {
+        Some(_) => {
+            let left = LEFT + 18.0;
+            let room = WIDTH - RIGHT - left - (columns - 1) as f64 * GAP;
+            let width = (room / columns as f64).min(WIDEST);
+            let size = DVec2::new(width, ASPECT * width);
+            let pitch = size + DVec2::new(GAP, PANEL_TITLE + TICKS + 6.0);
+            (DVec2::new(left, start + PANEL_TITLE), size, pitch)
+        }
+        None => {
+            let left = LEFT + METHOD;
+            let size = DVec2::new(WIDTH - RIGHT - COUNT - left, STRIP);
+            let pitch = DVec2::new(0.0, STRIP + STRIP_GAP);
+            (DVec2::new(left, start + 10.0), size, pitch)
+        }
+    };
+    let mut last = Cell { corner, size };
+    for (i, &method) in methods.iter().enumerate() {
+        let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
+        let cell = Cell::new(corner + place * pitch, size);
+        // A single strip has its axis below the curves.
+        let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
+        drawing.group(method.word(), |page| {
+            draw_method(page, map, method, cell, y.is_some());
+            let panel = Panel::new(cell, x, y, labelled);
+            let rows = map.rows.iter().filter(|row| row.method == method);
+            panel.draw(page, map.show, rows);
+            if method == MapMethod::ExplicitMotion && has_step_axis(map) {
+                panel.draw_bound(page, &map.request);
+            }
+        });
+        last = cell;
+    }
+    if let (None, [_]) = (y, methods.as_slice()) {
+        return draw_curves(drawing, map, x, last, last.end().y + CURVES_GAP);
+    }
+    let end = last.end().y + TICKS;
+    let across = columns as f64 * (size.x + GAP) - GAP;
+    let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
+    drawing.label(below, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
+    if let Some(y) = y {
+        let middle = DVec2::new(24.0, 0.5 * (corner.y + last.end().y));
+        drawing.rotated_label(middle, &y.axis.title(), TEXT_SIZE, INK);
+    }
+    end + NAME
+}
+
+/// Draws a method's name and count, above a panel or to both sides of a strip.
+fn draw_method(page: &mut Drawing, map: &Map, method: MapMethod, cell: Cell, above: bool) {
+    let (name, count) = (method.word(), count(map, method));
+    if above {
+        let base = cell.corner - DVec2::new(0.0, 8.0);
+        page.label(base, name, TEXT_SIZE, Anchor::Start, INK);
+        let base = base.with_x(cell.end().x);
+        return page.label(base, &count, TICK_SIZE, Anchor::End, NOTE);
+    }
+    let [left, right] = cell.midline();
+    let gap = DVec2::new(10.0, 0.0);
+    page.centered_label(left - gap, name, TEXT_SIZE, Anchor::End, INK);
+    page.centered_label(right + gap, &count, TICK_SIZE, Anchor::Start, NOTE);
+}
+
+/// Smaller variations are rounding.
+const ROUNDING: f64 = 1e-9;
+
+const TALL: f64 = 260.0;
+
+const LOW: f64 = 150.0;
+
+/// A curve: its name, its colour, and its value in a row.
+type PanelQuantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
+
+/// The titles of the panels, the names of their axes, and their curves.
+fn panels(map: &Map) -> Vec<(&str, String, Vec<PanelQuantity<'_>>)> {
+    let units = &map.request.base.scenario().units;
+    let length = units.length.as_deref();
+    match map.show {
+        MapShow::Outcomes => vec![
+            (
+                "where the tip is",
+                with_unit("tip", length),
+                vec![
+                    ("x", CURVES[0], |row| row.tip_x),
+                    ("y", CURVES[1], |row| row.tip_y),
+                    ("z", CURVES[2], |row| row.tip_z),
+                ],
+            ),
+            (
+                "energy",
+                with_unit("energy", units.energy().as_deref()),
+                vec![("energy", CURVES[3], |row| row.energy)],
+            ),
+        ],
+        MapShow::Waves => vec![
+            (
+                "waves along the margins, of stable leaves",
+                "waves".into(),
+                vec![("waves", CURVES[0], MapRow::stable_waves)],
+            ),
+            (
+                "their amplitude",
+                with_unit("amplitude", Some("L")),
+                vec![("amplitude", CURVES[1], |row| {
+                    row.stable_waves().and(row.margin_amplitude)
+                })],
+            ),
+            (
+                "mean twist of the veins",
+                with_unit("twist", Some("rad")),
+                vec![("twist", CURVES[3], |row| row.twist)],
+            ),
+        ],
+    }
+}
+
+/// Draws the curves below `start`, as wide as the strip. Returns where they end.
+fn draw_curves(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) -> f64 {
+    let values = &map.request.axes[0].values;
+    let mut top = start;
+    for (what, name, curves) in panels(map) {
+        let height = if curves.len() > 1 { TALL } else { LOW };
+        let cell = Cell::new(
+            DVec2::new(strip.corner.x, top + PANEL_TITLE),
+            DVec2::new(strip.size.x, height),
+        );
+        let lines = curves.iter().map(|(_, _, of)| {
+            let mut line: Vec<(f64, f64)> = values.iter().map(|&x| (x, f64::NAN)).collect();
+            for row in &map.rows {
+                line[row.cell].1 = of(row).unwrap_or(f64::NAN);
+            }
+            line
+        });
+        let lines: Vec<_> = lines.collect();
+        let known = lines.iter().flatten().map(|point| point.1);
+        let up = Axis::holding(&name, known.filter(|value| value.is_finite())).at_least(ROUNDING);
+        page.group("curves", |page| {
+            let axes = Axes::titled(page, cell, ["", what], x.axis.clone(), up);
+            let mut key = Key::right_of(cell);
+            for ((name, color, _), line) in curves.iter().zip(lines) {
+                axes.curve(page, &line, Stroke::new(*color, 1.6));
+                axes.markers(page, line, Marker::Dot, *color);
+                key.marked_line(page, name, "", *color);
+            }
+        });
+        top = cell.end().y + PANEL_AXIS;
+    }
+    top
+}
+
+/// Smaller cells have no gaps between them and no marks.
+const SEPARATE: f64 = 5.0;
+
+/// Smaller cells have no numbers.
+const NUMBERED: f64 = 13.0;
+
+const NUMBER_SIZE: f64 = 8.0;
+
+/// Of stable leaves.
+pub const PALE: Color = Color(226, 236, 226);
+
+/// More waves than this have the same colour.
+const MOST_WAVES: f64 = 2.5;
+
+/// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
+/// light. Those that are alike without colours also differ in their marks.
+fn color(outcome: MapOutcome) -> Color {
+    match outcome {
+        MapOutcome::Right => Color(170, 214, 240),
+        MapOutcome::OtherEquilibrium => Color(240, 228, 66),
+        MapOutcome::Saddle => Color(213, 94, 0),
+        MapOutcome::Inaccurate => Color(204, 121, 167),
+        MapOutcome::NotConverged => Color(128, 128, 134),
+        MapOutcome::Diverged => Color(32, 32, 36),
+        MapOutcome::Refused => Color(240, 240, 242),
+        MapOutcome::OutOfTime => Color(0, 92, 158),
+    }
+}
+
+/// Waves along the margins, where these are shown and the leaf is stable.
+pub fn waves(show: MapShow, row: &MapRow) -> Option<f64> {
+    row.stable_waves().filter(|_| show == MapShow::Waves)
+}
+
+/// Fills a cell, with the mark of its outcome if it has one and is large enough.
+pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
+    page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
+    if cell.size.min_element() < SEPARATE {
+        return;
+    }
+    let inset = 0.25 * cell.size;
+    let (low, high) = (cell.corner + inset, cell.end() - inset);
+    let rising = (low.with_y(high.y), high.with_y(low.y));
+    let level = (low.with_y(cell.middle().y), high.with_y(cell.middle().y));
+    let (color, lines): (Color, &[(DVec2, DVec2)]) = match outcome {
+        MapOutcome::Refused => (NOTE, &[(low, high), rising]),
+        MapOutcome::OtherEquilibrium => (NOTE, &[(low, high)]),
+        MapOutcome::NotConverged => (WHITE, &[rising]),
+        MapOutcome::Inaccurate => (WHITE, &[level]),
+        _ => return,
+    };
+    for &(from, to) in lines {
+        page.line(from, to, Stroke::new(color, 1.0));
+    }
+}
+
+pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
+    let color = match waves {
+        0.0 => PALE,
+        waves => vein_color((waves - 1.0) / (MOST_WAVES - 1.0)),
+    };
+    page.shape(rectangle(cell.corner, cell.size), color, None);
+}
+
+/// Indices from this one on have the same colour.
+pub const DARKEST_INDEX: usize = 4;
+
+/// Fills a cell lightly by the index of its equilibrium: the more, the darker.
+pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
+    let color = match index {
+        0 => PALE,
+        1 => Color(255, 240, 222),
+        2 => Color(252, 224, 194),
+        3 => Color(246, 204, 168),
+        _ => Color(236, 182, 144),
+    };
+    page.shape(rectangle(cell.corner, cell.size), color, None);
+}
+
+/// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
+/// none.
+pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
+    let radius = (0.14 * cell.size.min_element()).clamp(1.0, 2.2);
+    let at = cell.corner.with_x(cell.end().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
+    let (color, rim) = match reference {
+        Confidence::Confirmed => return,
+        Confidence::Unconfirmed => (INK, Stroke::new(WHITE, 0.5)),
+        Confidence::None => (WHITE, Stroke::new(INK, 0.8)),
+    };
+    page.shape(circle(at, radius), color, Some(rim));
+}
+
+/// Stroke of the longest stable step.
+pub const BOUND: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
+
+pub struct Varied {
+    pub axis: Axis,
+    /// Edges of the cells, as fractions of the axis: one more than there are cells.
+    edges: Vec<f64>,
+}
+
+impl Varied {
+    /// Cells in the order given, each around its value.
+    pub fn of(vary: &Vary, units: &Units) -> Self {
+        let sign = vary.log.then(|| vary.values[0].signum());
+        let scale = |value: &f64| match sign {
+            Some(sign) => (sign * value).log10(),
+            None => *value,
+        };
+        let places: Vec<f64> = vary.values.iter().map(scale).collect();
+        let (first, last) = (places[0], places[places.len() - 1]);
+        let mut edges: Vec<f64> = places.windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
+        let (start, end) = match (edges.first(), edges.last()) {
+            (Some(low), Some(high)) => (2.0 * first - low, 2.0 * last - high),
+            _ => (first - 0.5, first + 0.5),
+        };
+        edges.insert(0, start);
+        edges.push(end);
+        let name = Quantity::of(&vary.keys.to_string(), units).axis();
+        let mut axis = Axis::linear(&name, start, end);
+        axis.sign = sign;
+        if vary.keys.is_whole() {
+            axis.ticks = Ticks::At(vary.values.clone());
+        }
+        let part = |edge: f64| (edge - start) / (end - start);
+        Varied {
+            axis,
+            edges: edges.into_iter().map(part).collect(),
+        }
+    }
+
+    fn cells(&self) -> usize {
+        self.edges.len() - 1
+    }
+}
+
+/// A panel; with one axis it is a strip.
+pub struct Panel<'a> {
+    axes: Axes,
+    x: &'a Varied,
+    y: Option<&'a Varied>,
+}
+
+impl<'a> Panel<'a> {
+    pub fn new(cell: Cell, x: &'a Varied, y: Option<&'a Varied>, labelled: bool) -> Self {
+        // Panels share the names of their axes.
+        let unnamed = |axis: &Axis| Axis {
+            name: String::new(),
+            ..axis.clone()
+        };
+        let across = Axis {
+            labelled,
+            ..unnamed(&x.axis)
+        };
+        let strip = Axis {
+            ticks: Ticks::At(Vec::new()),
+            ..Axis::linear("", 0.0, 1.0)
+        };
+        let up = y.map_or(strip, |y| unnamed(&y.axis));
+        let axes = Axes { cell, across, up };
+        Panel { axes, x, y }
+    }
+
+    /// Cells are counted along the last axis first.
+    pub fn draw<'r>(
+        &self,
+        page: &mut Drawing,
+        show: MapShow,
+        rows: impl Iterator<Item = &'r MapRow>,
+    ) {
+        for row in rows {
+            self.draw_cell(page, row, waves(show, row));
+        }
+        self.axes.draw_frame(page);
+    }
+
+    fn place(&self, i: usize) -> (usize, usize) {
+        let along_y = self.y.map_or(1, Varied::cells);
+        (i / along_y, i % along_y)
+    }
+
+    fn rectangle(&self, i: usize) -> Cell {
+        let Cell { corner, size } = self.axes.cell;
+        let (column, row) = self.place(i);
+        let (left, right) = (self.x.edges[column], self.x.edges[column + 1]);
+        let (low, high) = self
+            .y
+            .map_or((0.0, 1.0), |y| (y.edges[row], y.edges[row + 1]));
+        Cell::new(
+            corner + size * DVec2::new(left, 1.0 - high),
+            size * DVec2::new(right - left, high - low),
+        )
+    }
+
+    fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
+        let mut cell = self.rectangle(row.cell);
+        let large = cell.size.min_element() >= SEPARATE;
+        if large {
+            let inset = DVec2::splat(0.4);
+            cell.corner += inset;
+            cell.size -= 2.0 * inset;
+        }
+        match waves {
+            Some(waves) => fill_waves(page, cell, waves),
+            None => fill(page, cell, row.outcome),
+        }
+        if large {
+            mark(page, cell, row.reference);
+        }
+        let number = match (row.outcome, row.index, waves) {
+            (MapOutcome::Saddle, Some(index), _) => index.to_string(),
+            (_, _, Some(waves)) if waves > 0.0 => waves.to_string(),
+            _ => return,
+        };
+        if cell.size.min_element() >= NUMBERED {
+            page.centered_label(cell.middle(), &number, NUMBER_SIZE, Anchor::Middle, WHITE);
+        }
+    }
+
+    /// Draws the longest step known to be stable, across every row or column.
+    pub fn draw_bound(&self, page: &mut Drawing, request: &MapRequest) {
+        let along_x = request.axes[0].keys.sets(Knob::Step);
+        let inside = |fraction: &f64| (0.0..=1.0).contains(fraction);
+        for i in 0..request.cells() {
+            let (column, row) = self.place(i);
+            let (first, axis) = match along_x {
+                true => (column == 0, &self.axes.across),
+                false => (row == 0, &self.axes.up),
+            };
+            let step = request.stable_step(i).filter(|_| first);
+            let fraction = step.map(|step| axis.fraction(step));
+            let Some(fraction) = fraction.filter(inside) else {
+                continue;
+            };
+            let (tile, Cell { corner, size }) = (self.rectangle(i), self.axes.cell);
+            let place = corner + size * DVec2::new(fraction, 1.0 - fraction);
+            let (from, to) = match along_x {
+                true => (tile.corner.with_x(place.x), tile.end().with_x(place.x)),
+                false => (tile.corner.with_y(place.y), tile.end().with_y(place.y)),
+            };
+            page.line(from, to, BOUND);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::drawing::formats::text;
+    use crate::report::sample;
+
+    fn svg(map: &Map) -> String {
+        text(&draw(map))
+    }
+
+    #[test]
+    fn every_method_and_outcome_is_named() {
+        let map = sample::map();
+        let svg = svg(&map);
+        for method in MapMethod::ALL {
+            assert!(svg.contains(&format!(">{method}</text>")), "{method}");
+        }
+        for outcome in MapOutcome::ALL {
+            assert!(svg.contains(&outcome.word().replace('-', " ")), "{outcome}");
+        }
+        for axis in ["gravity along z", "bending stiffness A2"] {
+            assert!(svg.contains(axis), "{axis}");
+        }
+        assert!(svg.contains("no reference") && svg.contains("10⁻¹"));
+    }
+
+    #[test]
+    fn waves_are_shown_in_place_of_outcomes() {
+        let mut map = sample::map();
+        assert!(!svg(&map).contains("waves"));
+        map.show = MapShow::Waves;
+        let svg = svg(&map);
+        let texts = "waves along the margins|Two half-waves|>1.5 waves<|stable, no waves";
+        for text in texts.split('|') {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(!svg.contains("other equilibrium") && svg.contains("saddle"));
+    }
+
+    #[test]
+    fn one_method_along_one_axis_is_drawn_as_curves() {
+        let mut map = sample::map();
+        map.request.axes.remove(0);
+        map.request.methods.truncate(1);
+        map.rows
+            .retain(|row| row.cell < 4 && row.method == MapMethod::default());
+        let curves = |svg: &str| -> Vec<usize> {
+            let groups = svg.split("<g class=\"curves\">").skip(1);
+            let groups = groups.map(|group| group.split("</g>").next().unwrap());
+            let lines = groups.map(|group| group.matches("stroke-width=\"1.6\"").count());
+            lines.collect()
+        };
+        // The lines of the panels and those of their keys.
+        let svg = svg(&map);
+        assert_eq!(curves(&svg), [6, 2]);
+        assert!(svg.contains("where the tip is") && svg.contains(">energy<"));
+        // Not of several methods, nor over two axes.
+        assert!(curves(&self::svg(&sample::map())).is_empty());
+        map.show = MapShow::Waves;
+        let svg = self::svg(&map);
+        assert_eq!(curves(&svg), [2, 2, 2]);
+        assert!(svg.contains("mean twist"));
+    }
+
+    #[test]
+    fn one_axis_and_missing_cells_are_drawn() {
+        let mut map = sample::map();
+        map.request.axes.remove(0);
+        map.rows.retain(|row| row.cell < 3);
+        let svg = svg(&map);
+        assert!(svg.contains("3 of 4 cells"));
+        assert!(!svg.contains("bending stiffness"));
+    }
+}
+
+#[cfg(test)]
+mod panel_tests {
+    use super::*;
+    use crate::figure::drawing::axes::Direction;
+
+    fn varied(given: &str) -> Varied {
+        Varied::of(&given.parse().unwrap(), &Units::default())
+    }
+
+    #[test]
+    fn cells_fill_the_axis_in_the_order_given() {
+        for given in [
+            "stiffness.torsion=1..1e-5:6log",
+            "load.gravity[2]=-1e-3..-10:5log",
+            "rest.twist=3..-3:4",
+            "leaf.rods=1..40:6log",
+            "rest.twist=3..4:1",
+        ] {
+            let edges = varied(given).edges;
+            assert_eq!(edges[0], 0.0, "{given}");
+            assert_eq!(edges[edges.len() - 1], 1.0, "{given}");
+            assert!(edges.windows(2).all(|pair| pair[0] < pair[1]), "{given}");
+        }
+    }
+
+    #[test]
+    fn ticks_are_readable() {
+        let texts = |given: &str, length: f64| -> Vec<String> {
+            let ticks = varied(given).axis.ticks(length, Direction::Across);
+            ticks.into_iter().map(|tick| tick.text).collect()
+        };
+        let decades = texts("load.gravity[2]=-1e-3..-10:5log", 230.0);
+        assert_eq!(decades.len(), 5);
+        assert_eq!(decades[0], "\u{2212}10⁻³");
+        assert!(texts("stiffness.axial=1..1e10:11log", 230.0).len() <= 6);
+        assert_eq!(texts("stiffness.axial=2..5:4log", 230.0), ["2", "5"]);
+        let whole = texts("leaf.rods=1..5:5", 250.0);
+        assert_eq!(whole, ["1", "2", "3", "4", "5"]);
+        assert_eq!(texts("rest.twist=0..1:3", 250.0), ["0.0", "0.5", "1.0"]);
+    }
+}

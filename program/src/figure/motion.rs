@@ -1,0 +1,576 @@
+//! The energies of a moving leaf and the position of its tip over time.
+//!
+//! A moving leaf as a GIF, in the same view as the film strip.
+//!
+//! A moving leaf at several instants.
+
+use crate::figure::drawing::axes::{Axes, Axis, Curve};
+use crate::figure::drawing::formats::paint;
+use crate::figure::drawing::labels::{
+    Cell, HEADER, Key, KeyRows, LEFT, NOTE_BASE, PANEL_AXIS, PANEL_TITLE, SIDE, SmallPanels,
+    TEXT_SIZE, THINNER, letters, new_page,
+};
+use crate::figure::drawing::space::{Margins, OBLIQUE, Scene, common_box};
+use crate::figure::drawing::{
+    Anchor, CURVES, Color, DOT, Drawing, INK, NOTE, Stroke, WHITE, is_drawable, polyline,
+    vein_color,
+};
+use crate::figure::leaf::Veins;
+use crate::figure::scenario::{Setting, with_unit};
+use crate::report::numbers::{in_unit, short};
+use glam::{DVec2, DVec3};
+use leafdyn::scenario::units::TIME;
+use leafdyn::scenario::{Scenario, Units};
+use leafdyn::simulate::{Energy, Record, Still};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::io;
+use std::io::Write;
+use tiny_skia::Pixmap;
+
+const ENERGIES: f64 = 300.0;
+
+const BALANCE: f64 = 120.0;
+
+const TIP: f64 = 200.0;
+
+/// Gap above the lower panels, for the tick labels of the upper ones.
+const BETWEEN: f64 = 30.0;
+
+const BOTTOM: f64 = 4.0;
+
+/// Right of the panels, for the key.
+const KEY: f64 = 200.0;
+
+pub fn notes(record: &Record) -> Vec<String> {
+    let mut notes = vec![
+        format!("N = {}", record.rods),
+        format!("{} method", record.scheme),
+        format!("{} segments a vein", record.segments),
+    ];
+    if record.stopped.is_some() {
+        notes.push(format!("ended early: {}", record.outcome()));
+    }
+    notes
+}
+
+pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
+    let name = format!("{}: energy in time", record.scenario);
+    let upper = HEADER + PANEL_TITLE;
+    let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
+    let mut drawing = new_page(LEFT, &name, &notes(record), None);
+    let lowest = lower + BALANCE + BETWEEN + PANEL_TITLE;
+    drawing.height = lowest + TIP + PANEL_AXIS + BOTTOM;
+    let end = match record.time {
+        time if time > 0.0 => time,
+        _ => record.duration,
+    };
+    let curves = curves(record);
+    let balance = &curves[curves.len() - 1];
+    let values = curves.iter().flat_map(Curve::values);
+    let unit = scenario.units.energy();
+    let energy = with_unit("energy", unit.as_deref());
+    let across = Axis::linear("", 0.0, end);
+    let up = Axis::holding(&energy, values.chain([0.0]));
+    let cell = Cell::left_of_key(upper, ENERGIES, KEY);
+    drawing.group("energies", |page| {
+        let what = "where the energy is";
+        let axes = Axes::titled(page, cell, ["(a)", what], across.clone(), up);
+        // In reverse, so that the balance, which should be zero, is below all others.
+        for curve in curves.iter().rev() {
+            axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        }
+        let mut key = Key::right_of(cell);
+        for curve in &curves {
+            draw_key_line(page, &mut key, curve);
+        }
+    });
+    let cell = Cell::left_of_key(lower, BALANCE, KEY);
+    let name = with_unit("balance", unit.as_deref());
+    let up = Axis::holding(&name, balance.values().chain([0.0]));
+    drawing.group("balance", |page| {
+        let what =
+            "its balance, which no motion changes, magnified: all energies less the work put in";
+        let axes = Axes::titled(page, cell, ["(b)", what], across, up);
+        axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
+    });
+    let cell = Cell::left_of_key(lowest, TIP, KEY);
+    drawing.group("tip", |page| {
+        draw_tip(page, record, &scenario.units, cell, end)
+    });
+    drawing
+}
+
+/// Draws the coordinates of the joint tip, or the means of free ones.
+fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end: f64) {
+    let coordinate = |axis: usize| Curve {
+        name: ["x", "y", "z"][axis],
+        color: CURVES[axis],
+        points: (record.moments.iter())
+            .map(|moment| (moment.time, moment.tip[axis]))
+            .collect(),
+    };
+    let curves = [0, 1, 2].map(coordinate);
+    let across = match units.time.as_deref() {
+        None => "time, in the scenario's unit".into(),
+        unit => with_unit("time", unit),
+    };
+    let across = Axis::linear(&across, 0.0, end);
+    let name = with_unit("tip", units.length.as_deref());
+    let up = Axis::holding(&name, curves.iter().flat_map(Curve::values).chain([0.0]));
+    let what = match record.joined {
+        true => "where the tip is",
+        false => "where the tips are, in the mean",
+    };
+    let axes = Axes::titled(page, cell, ["(c)", what], across, up);
+    let mut key = Key::right_of(cell);
+    for curve in &curves {
+        axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        draw_key_line(page, &mut key, curve);
+    }
+}
+
+/// Draws the line of a curve in the key, with its last value.
+fn draw_key_line(page: &mut Drawing, key: &mut Key, curve: &Curve) {
+    let last = curve.points.last().map_or(0.0, |point| point.1);
+    let note = format!("at the end {}", short(last));
+    key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+}
+
+/// All energies except those that are always zero; their balance last.
+fn curves(record: &Record) -> Vec<Curve> {
+    let first = record.moments.first().map(|moment| moment.energy);
+    let first = first.unwrap_or_default();
+    let curve = |name, color, value: &dyn Fn(&Energy) -> f64| Curve {
+        name,
+        color,
+        points: (record.moments.iter())
+            .map(|moment| (moment.time, value(&moment.energy)))
+            .collect(),
+    };
+    let mut curves = vec![
+        curve("kinetic", CURVES[0], &|e| e.kinetic),
+        curve("elastic and coupling", CURVES[1], &|e| {
+            e.elastic + e.coupling
+        }),
+        curve("potential, from the start", CURVES[2], &|e| {
+            e.potential - first.potential
+        }),
+        curve("dissipated", CURVES[3], &|e| e.dissipated),
+        curve("work put in", CURVES[4], &|e| e.work),
+    ];
+    curves.retain(|curve| curve.values().any(|value| value != 0.0));
+    curves.push(curve("balance", INK, &|e| e.balance() - first.balance()));
+    curves
+}
+
+/// Duration of the film in hundredths of a second, and its most pictures.
+const DURATION: f64 = 1000.0;
+
+const MOST_PICTURES: usize = 140;
+
+/// Delays of a picture: browsers show shorter ones for longer.
+const SHORTEST: usize = 2;
+
+const LONGEST: usize = 100;
+
+/// Size of the page: half as many as it has pixels.
+const SIZE: DVec2 = DVec2::new(320.0, 240.0);
+
+const TITLE: f64 = 26.0;
+
+const MARGINS: Margins = Margins {
+    left: 46.0,
+    right: 42.0,
+    below: 42.0,
+};
+
+/// Index of a pixel that has not changed.
+const SAME: u8 = 255;
+
+/// Writes the film; a single picture where no motion is recorded.
+pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
+    let setting = &Setting::of(scenario);
+    let film = match record.film.as_slice() {
+        [] => &record.stills,
+        film => film,
+    };
+    let shown = sampled(film);
+    let shapes: Vec<Veins> = (shown.iter())
+        .map(|still| Veins::at_instant(record, still, scenario))
+        .collect();
+    let bounds = common_box(shapes.iter());
+    let times: Vec<f64> = (shown.iter())
+        .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
+        .collect();
+    let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
+        .map_init(Palette::new, |palette, (veins, time)| {
+            let text = format!("{}, t = {}", record.scenario, short(*time));
+            palette.indices(&paint(&picture(veins, bounds, setting, (&text, *time))))
+        })
+        .collect();
+    encode(&pictures, &delays(&times), out).map_err(io::Error::other)
+}
+
+/// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
+fn sampled(film: &[Still]) -> Vec<&Still> {
+    let count = film.len().min(MOST_PICTURES);
+    let last = film.len().saturating_sub(1);
+    let place = |k: usize| k * last / (count - 1).max(1);
+    (0..count).map(|k| &film[place(k)]).collect()
+}
+
+/// How long each picture is shown, in hundredths of a second: in proportion to the time
+/// until the next, the last as long as the average.
+fn delays(times: &[f64]) -> Vec<u16> {
+    let [Some(from), Some(to)] = [times.first(), times.last()] else {
+        return Vec::new();
+    };
+    let count = times.len() as f64;
+    let moving = DURATION * (count - 1.0) / count;
+    let mut elapsed = 0;
+    let ends = times[1..]
+        .iter()
+        .map(|time| moving * (time - from) / (to - from));
+    (ends.chain([DURATION]))
+        .map(|end| {
+            let end = if end.is_finite() {
+                end.round() as usize
+            } else {
+                0
+            };
+            let delay = end.saturating_sub(elapsed).clamp(SHORTEST, LONGEST);
+            elapsed += delay;
+            delay as u16
+        })
+        .collect()
+}
+
+fn picture(
+    veins: &Veins,
+    bounds: [DVec3; 2],
+    setting: &Setting,
+    (text, time): (&str, f64),
+) -> Drawing {
+    let mut page = Drawing::new(SIZE.x, text);
+    page.height = SIZE.y;
+    let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
+    let scene = Scene::new(bounds, setting, OBLIQUE, cell, MARGINS, None);
+    scene.draw_box(&mut page);
+    scene.draw_axes(&mut page, 36.0);
+    scene.draw_arrows(&mut page, true, time);
+    scene.draw_leaf(&mut page, veins, THINNER * veins.line_width());
+    let corner = DVec2::new(10.0, 17.0);
+    page.label(corner, text, TEXT_SIZE, Anchor::Start, INK);
+    page
+}
+
+/// Vein colours in several tints, greys, and the colours of markers.
+struct Palette {
+    colors: Vec<Color>,
+    /// Indices found so far.
+    known: HashMap<[u8; 3], u8>,
+}
+
+impl Palette {
+    fn new() -> Self {
+        let mut colors = vec![WHITE, INK, NOTE, DOT];
+        let mix = |Color(r, g, b): Color, part: f64| {
+            let of = |x: u8| (255.0 + part * (f64::from(x) - 255.0)).round() as u8;
+            Color(of(r), of(g), of(b))
+        };
+        for grey in 1..=42 {
+            colors.push(mix(Color(20, 20, 24), f64::from(grey) / 42.0));
+        }
+        for vein in 0..34 {
+            let color = vein_color(f64::from(vein) / 33.0);
+            colors.extend([1.0, 0.8, 0.6, 0.45, 0.3, 0.15].map(|part| mix(color, part)));
+        }
+        colors.truncate(usize::from(SAME));
+        Palette {
+            colors,
+            known: HashMap::new(),
+        }
+    }
+
+    /// The index of the nearest colour for every pixel.
+    fn indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
+        let rgb = pixels.data().chunks_exact(4);
+        rgb.map(|rgba| {
+            let rgb = [rgba[0], rgba[1], rgba[2]];
+            *self.known.entry(rgb).or_insert_with(|| {
+                let distance = |Color(r, g, b): &Color| {
+                    let squared = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
+                    squared(*r, rgb[0]) + squared(*g, rgb[1]) + squared(*b, rgb[2])
+                };
+                let colors = self.colors.iter().enumerate();
+                let nearest = colors.min_by_key(|(_, color)| distance(color));
+                nearest.map_or(0, |(index, _)| index as u8)
+            })
+        })
+        .collect()
+    }
+}
+
+/// Encodes of each picture only what differs from the one before.
+fn encode(
+    pictures: &[Vec<u8>],
+    delays: &[u16],
+    out: &mut dyn Write,
+) -> Result<(), gif::EncodingError> {
+    let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
+    let colors = Palette::new().colors.into_iter();
+    let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
+    table.resize(3 * 256, 0);
+    let mut encoder = gif::Encoder::new(out, width, height, &table)?;
+    encoder.set_repeat(gif::Repeat::Infinite)?;
+    let mut before: Option<&Vec<u8>> = None;
+    for (picture, &delay) in pictures.iter().zip(delays) {
+        let (rows, pixels) = changed(before, picture, usize::from(width));
+        encoder.write_frame(&gif::Frame {
+            delay,
+            top: rows.start as u16,
+            width,
+            height: rows.len() as u16,
+            transparent: before.map(|_| SAME),
+            dispose: gif::DisposalMethod::Keep,
+            buffer: pixels.into(),
+            ..gif::Frame::default()
+        })?;
+        before = Some(picture);
+    }
+    Ok(())
+}
+
+/// The rows in which a picture differs from the one before, at least one, and their
+/// pixels.
+fn changed(
+    before: Option<&Vec<u8>>,
+    picture: &[u8],
+    width: usize,
+) -> (std::ops::Range<usize>, Vec<u8>) {
+    let Some(before) = before else {
+        return (0..picture.len() / width, picture.to_vec());
+    };
+    let pixels = before.iter().zip(picture);
+    let pixels = pixels.map(|(a, b)| if a == b { SAME } else { *b });
+    let pixels: Vec<u8> = pixels.collect();
+    let differs = |pixel: &u8| *pixel != SAME;
+    let first = pixels.iter().position(differs).unwrap_or(0) / width;
+    let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
+    let rows = first..last + 1;
+    let changed = &pixels[rows.start * width..rows.end * width];
+    (rows, changed.to_vec())
+}
+
+/// Below the notes.
+const KEY_LINE: f64 = 20.0;
+
+/// Colour of the earlier path of the tip.
+const PALE: Color = Color(240, 190, 176);
+
+/// Most points of the tip's path that are drawn between two panels.
+const MOST_PATH_POINTS: usize = 400;
+
+pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
+    let name = format!("{}: instants of the motion", record.scenario);
+    let stills = record.stills.iter();
+    let shapes: Vec<Veins> = stills
+        .map(|it| Veins::at_instant(record, it, scenario))
+        .collect();
+    let has_path = record.tips.len() == 1 && record.stills.len() > 1;
+    let top = if has_path { HEADER + KEY_LINE } else { HEADER };
+    let panels = SmallPanels::holding(shapes.iter(), shapes.len(), &setting, top);
+    let mut notes = notes(record);
+    let first = shapes.first();
+    notes.extend(first.map_or(Vec::new(), |veins| veins.notes(&setting)));
+    let width = panels.grid_width();
+    notes.push(format!("a square of the grid is {width} wide"));
+    let mut drawing = new_page(SIDE, &name, &notes, first);
+    drawing.height = panels.end();
+    let mut since = record.stills.first().map_or(0, |still| still.moment);
+    let strokes = [DOT, PALE].map(|color| Stroke::new(color, 1.0));
+    if has_path {
+        drawing.group("key", |page| {
+            let mut key = KeyRows::at(SIDE, NOTE_BASE + KEY_LINE, 22.0);
+            for (name, stroke) in ["the tip's way since the picture before", "and before that"]
+                .into_iter()
+                .zip(strokes)
+            {
+                key.entry(page, name, |page, cell| cell.line(page, stroke));
+            }
+        });
+    }
+    let instants = shapes.iter().zip(&record.stills).enumerate();
+    for ((index, (veins, still)), letter) in instants.zip(letters().cycle()) {
+        let paths = [(since, still.moment), (0, since)];
+        let paths = paths.map(|(from, to)| tip_path(record, from, to));
+        since = still.moment;
+        drawing.group("instant", |page| {
+            let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
+            let when = format!("t = {}", in_unit(short(time), &scenario.units, TIME));
+            let caption = (letter.as_str(), when.as_str(), NOTE);
+            let scene = panels.begin(page, (index, time), OBLIQUE, caption);
+            for (path, stroke) in paths.iter().zip(strokes).rev() {
+                let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
+                if path.len() > 1 {
+                    page.stroke(polyline(&path), stroke);
+                }
+            }
+            scene.draw_leaf(page, veins, THINNER * veins.line_width());
+        });
+    }
+    drawing
+}
+
+/// The path of the tip from one moment to another, in lengths; empty for free tips.
+fn tip_path(record: &Record, from: usize, to: usize) -> Vec<DVec3> {
+    if record.tips.len() != 1 || from >= to {
+        return Vec::new();
+    }
+    let moments = record.moments.get(from..=to).unwrap_or_default();
+    let every = moments.len().div_ceil(MOST_PATH_POINTS).max(1);
+    let points = moments.iter().step_by(every).chain(moments.last());
+    points
+        .map(|moment| moment.tip / record.length)
+        .filter(|&point| is_drawable(point))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn what_is_always_zero_is_not_drawn() {
+        let mut record = sample::record(3, 4);
+        let names = |record: &Record| -> Vec<&str> {
+            let curves = curves(record).into_iter();
+            curves.map(|curve| curve.name).collect()
+        };
+        assert!(!names(&record).contains(&"work put in"));
+        record.moments[3].energy.work = 0.1;
+        assert!(names(&record).contains(&"work put in"));
+    }
+}
+
+#[cfg(test)]
+mod film_tests {
+    use super::*;
+    use crate::report::sample;
+
+    use std::collections::HashSet;
+
+    /// A decoded film: its repetition, delays, and whole pictures as RGBA.
+    fn decoded(bytes: &[u8]) -> (gif::Repeat, Vec<u16>, Vec<Vec<u8>>) {
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut decoder = options.read_info(bytes).unwrap();
+        let width = 2 * SIZE.x as usize;
+        let mut canvas = vec![0; 4 * width * 2 * SIZE.y as usize];
+        let (mut delays, mut pictures) = (Vec::new(), Vec::new());
+        while let Some(frame) = decoder.read_next_frame().unwrap() {
+            assert_eq!((frame.left, usize::from(frame.width)), (0, width));
+            let start = 4 * width * usize::from(frame.top);
+            for (to, from) in canvas[start..]
+                .chunks_exact_mut(4)
+                .zip(frame.buffer.chunks_exact(4))
+            {
+                if from[3] > 0 {
+                    to.copy_from_slice(from);
+                }
+            }
+            delays.push(frame.delay);
+            pictures.push(canvas.clone());
+        }
+        (decoder.repeat(), delays, pictures)
+    }
+
+    fn total(delays: &[u16]) -> u32 {
+        delays.iter().map(|&delay| u32::from(delay)).sum()
+    }
+
+    #[test]
+    fn a_film_lasts_ten_seconds_loops_and_shows_the_leaf() {
+        let mut record = sample::record(5, 8);
+        let (_, frames) = sample::swing(5, 8);
+        let still = |(moment, frame): (usize, &leafdyn::simulate::Frame)| Still {
+            moment,
+            curves: (0..5).map(|rod| frame.centerline(rod).to_vec()).collect(),
+        };
+        record.film = frames.iter().enumerate().map(still).collect();
+        let scenario = sample::scenario("swing", 5);
+        let setting = Setting::of(&scenario);
+        let mut bytes = Vec::new();
+        write(&record, &scenario, &mut bytes).unwrap();
+        assert!(bytes.len() < 5_000_000, "{}", bytes.len());
+        let (repeat, delays, pictures) = decoded(&bytes);
+        assert_eq!(repeat, gif::Repeat::Infinite);
+        assert_eq!(pictures.len(), 101);
+        assert_eq!(total(&delays), 1000);
+        // Every picture shows its instant, in colours that are close enough.
+        let stills = record.film.iter();
+        let shapes: Vec<Veins> = stills
+            .map(|it| Veins::at_instant(&record, it, &scenario))
+            .collect();
+        let bounds = common_box(shapes.iter());
+        for k in [0, 50, 100] {
+            let time = record.moments[k].time;
+            let text = format!("{}, t = {}", record.scenario, short(time));
+            let painted = paint(&picture(&shapes[k], bounds, &setting, (&text, time)));
+            let shown = pictures[k].chunks_exact(4);
+            let pairs = shown.zip(painted.data().chunks_exact(4));
+            let difference =
+                |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
+            let off: Vec<u8> = pairs.map(difference).collect();
+            let worst = off.iter().filter(|&&off| off > 48).count();
+            assert!(worst < off.len() / 2000, "picture {k}: {worst} are off");
+        }
+        // Five veins, five colours.
+        let pixels = pictures[0].chunks_exact(4);
+        let seen: HashSet<[u8; 3]> = pixels.map(|c| [c[0], c[1], c[2]]).collect();
+        for vein in 0..5 {
+            let Color(r, g, b) = vein_color(f64::from(vein) / 4.0);
+            let near =
+                |c: &[u8; 3]| c[0].abs_diff(r).max(c[1].abs_diff(g)).max(c[2].abs_diff(b)) < 14;
+            assert!(seen.iter().any(near), "vein {vein}");
+        }
+    }
+
+    #[test]
+    fn delays_are_proportional_to_times() {
+        assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
+        let even: Vec<f64> = (0..140).map(f64::from).collect();
+        let delays = delays(&even);
+        assert_eq!(total(&delays), 1000);
+        assert!(delays.iter().all(|delay| (7..=8).contains(delay)));
+        assert_eq!(super::delays(&[0.0]), [100]);
+        assert!(super::delays(&[]).is_empty());
+        assert_eq!(super::delays(&[1.0, 1.0]), [2, 100]);
+    }
+}
+
+#[cfg(test)]
+mod filmstrip_tests {
+    use super::*;
+    use crate::figure::drawing::formats::{hex, text};
+    use crate::report::sample;
+
+    #[test]
+    fn the_path_of_the_tip_is_drawn() {
+        let scenario = sample::scenario("swing", 5);
+        let mut record = sample::record(5, 8);
+        let paths = |record: &Record| {
+            let svg = text(&draw_filmstrip(record, &scenario));
+            [DOT, PALE].map(|color| svg.matches(&format!("stroke=\"{}\"", hex(color))).count())
+        };
+        // In all pictures but the first, or the first two, and in the key.
+        assert_eq!(paths(&record), [8, 7]);
+        record.joined = false;
+        let curves = record.stills[0].curves.iter();
+        record.tips = curves.map(|curve| curve[0]).collect();
+        assert_eq!(paths(&record), [0, 0]);
+    }
+}

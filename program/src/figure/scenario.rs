@@ -1,0 +1,607 @@
+//! What loads and holds a leaf, by veins and fractions of their lengths: figures place these marks on
+//! the shapes that they draw, and pages have them as data.
+//!
+//! Settings of figures from the scenario: units of length, gravity and wind.
+//!
+//! The numbers of a scenario in words, with their units: for pictures.
+
+use crate::report::numbers::short;
+use Entries::*;
+use glam::DVec3;
+use leafdyn::scenario::{Hold, Key, Scenario, Schedule, Units};
+use serde::Serialize;
+
+/// Length of the arrow of the largest force or moment, as a part of the leaf's largest extent, and the
+/// shortest arrow, as a part of that.
+const LONGEST: f64 = 0.16;
+
+const SHORTEST: f64 = 0.35;
+
+/// Length of the arrow of the largest force along a vein, likewise, and how many there are.
+const ALONG: f64 = 0.07;
+
+const COUNT: usize = 9;
+
+/// What acts at a point of a vein.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Action {
+    /// A dead force on a point or a tip.
+    Force,
+    /// A dead force per length.
+    Distributed,
+    /// A dead moment.
+    Moment,
+}
+
+/// A dead load at a point of a vein, which is drawn as an arrow.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoadMark {
+    pub action: Action,
+    /// The number of the vein, from 1.
+    pub vein: usize,
+    /// Fraction of its length.
+    pub at: f64,
+    /// Of length one; of a moment: its axis.
+    pub direction: DVec3,
+    /// In the scenario's units.
+    pub size: f64,
+    /// Length of the arrow of a force, as a part of the leaf's largest extent.
+    pub length: f64,
+}
+
+/// What is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    Base,
+    Tip,
+    Grip,
+}
+
+/// A point or a stretch of a vein that is held.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HoldMark {
+    pub part: Part,
+    /// The number of the vein, from 1.
+    pub vein: usize,
+    /// Fractions of its length.
+    pub at: [f64; 2],
+    #[serde(serialize_with = "word")]
+    pub held: Hold,
+}
+
+fn word<S: serde::Serializer>(held: &Hold, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(match held {
+        Hold::Clamped => "clamped",
+        Hold::Pinned => "pinned",
+    })
+}
+
+/// The dead loads on a leaf at rest, or on one in motion at this time. Gravity and wind, which act on
+/// all veins alike, are directions of the whole figure.
+pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
+    let motion = &scenario.dynamics;
+    let [tip_force, tip_moment] = match time {
+        Some(time) => [motion.tip_force.at(time), motion.tip_moment.at(time)],
+        None => [scenario.tip_force, scenario.tip_moment],
+    }
+    .map(DVec3::from_array);
+    let veins = scenario.rods.len();
+    let g = DVec3::from_array(scenario.g);
+    let points = scenario.points.iter();
+    let on_points = points.clone().map(|it| {
+        let force = DVec3::from_array(it.force) + it.mass * g;
+        (it.vein + 1, it.at, force)
+    });
+    // Tips at one point have one arrow.
+    let tips = if scenario.joined { 1 } else { veins };
+    let on_tips = (1..=tips).map(|vein| (vein, 1.0, tip_force));
+    let single: Vec<_> = on_points.chain(on_tips).collect();
+    let moments = points.map(|it| (it.vein + 1, it.at, DVec3::from_array(it.moment)));
+    let moments: Vec<_> = moments.chain([(1, 1.0, tip_moment)]).collect();
+    let along = scenario.distributed.iter().flatten().zip(1..);
+    let along: Vec<_> = along
+        .flat_map(|(force, vein)| {
+            let at = (0..COUNT).map(|k| k as f64 / (COUNT - 1) as f64);
+            let of = |s: f64| DVec3::from_array(force.each_ref().map(|profile| profile.at(s)));
+            at.map(move |s| (vein, s, of(s)))
+        })
+        .collect();
+    let kinds = [
+        (Action::Distributed, along, ALONG, 0.0),
+        (Action::Force, single, LONGEST, SHORTEST),
+        (Action::Moment, moments, LONGEST, SHORTEST),
+    ];
+    let marks = kinds
+        .into_iter()
+        .flat_map(|(action, loads, longest, shortest)| {
+            let largest = loads.iter().map(|(.., load)| load.length());
+            let largest = largest.fold(0.0, f64::max);
+            loads.into_iter().filter_map(move |(vein, at, load)| {
+                Some(LoadMark {
+                    action,
+                    vein,
+                    at,
+                    direction: load.try_normalize()?,
+                    size: load.length(),
+                    length: longest * (load.length() / largest).max(shortest),
+                })
+            })
+        });
+    marks.collect()
+}
+
+/// What holds a leaf: bases, of which those at one place are one, a tip, and grips.
+pub fn hold_marks(scenario: &Scenario) -> Vec<HoldMark> {
+    let mut bases: Vec<[f64; 3]> = Vec::new();
+    let mut marks = Vec::new();
+    for (rod, vein) in scenario.rods.iter().zip(1..) {
+        if !bases.contains(&rod.base) {
+            bases.push(rod.base);
+            marks.push(HoldMark {
+                part: Part::Base,
+                vein,
+                at: [0.0; 2],
+                held: scenario.base_held,
+            });
+        }
+    }
+    marks.extend(scenario.held_tip.iter().map(|tip| HoldMark {
+        part: Part::Tip,
+        vein: 1,
+        at: [1.0; 2],
+        held: match tip.clamps {
+            Some(_) => Hold::Clamped,
+            None => Hold::Pinned,
+        },
+    }));
+    marks.extend(scenario.grips.iter().map(|grip| HoldMark {
+        part: Part::Grip,
+        vein: grip.vein + 1,
+        at: grip.at,
+        held: grip.held,
+    }));
+    marks
+}
+
+/// Lengths are drawn in units of the longest rod L, and shown in the scenario's unit
+/// if it names one.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    units: Units,
+    /// The longest rod, in the scenario's unit.
+    length: f64,
+    /// Direction of gravity, if there is any.
+    gravity: Option<DVec3>,
+    /// Velocity of the air, if there is wind.
+    wind: Option<Schedule<[f64; 3]>>,
+}
+
+/// A direction that is drawn as an arrow with its name.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Arrow {
+    pub name: &'static str,
+    /// Of length one.
+    pub direction: DVec3,
+}
+
+/// Names of the axes as fractions of L, with what they mean.
+const FRACTIONS: [(&str, &str); 3] = [("ξ", "x/L"), ("η", "y/L"), ("ζ", "z/L")];
+
+const COORDINATES: [&str; 3] = ["x", "y", "z"];
+
+impl Setting {
+    pub fn of(scenario: &Scenario) -> Self {
+        Setting {
+            units: scenario.units.clone(),
+            length: leafdyn::scenario::longest(&scenario.rods),
+            gravity: weight(scenario).try_normalize(),
+            wind: scenario.wind.as_ref().map(|wind| wind.velocity.clone()),
+        }
+    }
+
+    /// The arrows of the first panel, or of a later one, which shows what may differ from the first:
+    /// the wind at this time.
+    pub fn arrows(&self, first: bool, time: f64) -> Vec<Arrow> {
+        let gravity = self.gravity.filter(|_| first).map(|direction| Arrow {
+            direction,
+            name: "gravity",
+        });
+        let wind = self.wind.as_ref();
+        let wind = wind.filter(|wind| first || !wind.is_constant());
+        let direction = wind.and_then(|wind| DVec3::from_array(wind.at(time)).try_normalize());
+        let wind = direction.map(|direction| Arrow {
+            direction,
+            name: "wind",
+        });
+        gravity.into_iter().chain(wind).collect()
+    }
+
+    /// The value shown for a drawn length of 1.
+    pub fn scale(&self) -> f64 {
+        match self.units.length {
+            Some(_) if self.length.is_normal() => self.length,
+            _ => 1.0,
+        }
+    }
+
+    /// The name of an axis whose values are shown.
+    pub fn axis(&self, axis: usize) -> String {
+        match (&self.units.length, FRACTIONS[axis]) {
+            (Some(unit), _) => with_unit(COORDINATES[axis], Some(unit)),
+            (None, (name, meaning)) => format!("{name} = {meaning}"),
+        }
+    }
+
+    /// A shorter name, with the unit only if values are shown.
+    pub fn brief_axis(&self, axis: usize, values: bool) -> String {
+        match (&self.units.length, values) {
+            (Some(_), true) => self.axis(axis),
+            (Some(_), false) => COORDINATES[axis].into(),
+            (None, _) => FRACTIONS[axis].0.into(),
+        }
+    }
+
+    /// The length of the longest rod, as text.
+    pub fn length(&self) -> String {
+        match &self.units.length {
+            Some(unit) => format!("{} {unit}", short(self.length)),
+            None => short(self.length),
+        }
+    }
+
+    /// A moment of this size, as text.
+    pub fn moment(&self, size: f64) -> String {
+        let unit = self.units.energy();
+        short(size) + &unit.map_or(String::new(), |unit| format!(" {unit}"))
+    }
+
+    /// The unit of the values shown.
+    pub fn unit(&self) -> &str {
+        self.units.length.as_deref().unwrap_or("L")
+    }
+}
+
+/// The direction of the weight of all veins.
+fn weight(scenario: &Scenario) -> DVec3 {
+    if scenario.g == [0.0; 3] && scenario.own_gravity.is_empty() {
+        return DVec3::from_array(scenario.gravity);
+    }
+    let of_vein = |vein: usize| {
+        let weight = scenario.weight(vein);
+        let pulled = (weight.of_mass).map_or(DVec3::ZERO, |(g, mass)| {
+            DVec3::from_array(g) * mass.integral(1.0)
+        });
+        scenario.rods[vein].length * (DVec3::from_array(weight.even) + pulled)
+    };
+    (0..scenario.rods.len()).map(of_vein).sum()
+}
+
+/// A name with its unit, if that is known.
+pub fn with_unit(name: &str, unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) if unit.contains('/') => format!("{name} / ({unit})"),
+        Some(unit) => format!("{name} / {unit}"),
+        None => name.into(),
+    }
+}
+
+/// What the entries of a list belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Entries {
+    /// Nothing that has a name.
+    Plain,
+    /// The three axes, along or about which the quantity is; before them, the veins.
+    Along,
+    About,
+    Veins,
+    /// Gaps between neighbouring veins.
+    Gaps,
+}
+
+/// Keys with their words and what the entries of their lists belong to.
+const WORDS: &[(&str, &str, Entries)] = &[
+    ("leaf.rods", "number of veins", Plain),
+    ("leaf.length", "length", Veins),
+    ("leaf.fan", "angle at the base", Veins),
+    ("leaf.base", "position of the base", Along),
+    ("leaf.elevation", "elevation at the base", Veins),
+    ("stiffness.torsion", "torsional stiffness A1", Veins),
+    ("stiffness.bending_2", "bending stiffness A2", Veins),
+    ("stiffness.bending_3", "bending stiffness A3", Veins),
+    ("stiffness.axial", "axial stiffness H1", Veins),
+    ("stiffness.shear_2", "shear stiffness H2", Veins),
+    ("stiffness.shear_3", "shear stiffness H3", Veins),
+    ("section.diameter", "diameter", Veins),
+    ("section.width", "width of the section", Veins),
+    ("section.thickness", "thickness of the section", Veins),
+    ("section.inner_diameter", "diameter of the bore", Veins),
+    ("section.wall", "thickness of the wall", Veins),
+    ("section.young", "Young's modulus", Veins),
+    ("section.poisson", "Poisson's ratio", Veins),
+    ("section.mass_density", "mass per volume", Veins),
+    ("blade.length", "length of the blade", Plain),
+    ("blade.width", "width of the blade", Plain),
+    ("blade.thickness", "thickness of the blade", Veins),
+    ("blade.young", "Young's modulus along", Veins),
+    ("blade.young_across", "Young's modulus across", Veins),
+    ("blade.shear_modulus", "shear modulus", Veins),
+    ("blade.poisson", "Poisson's ratio", Veins),
+    ("blade.mass_density", "mass per volume", Veins),
+    ("blade.least_width", "least width of the blade", Plain),
+    ("rest.twist", "twist at rest", Veins),
+    ("rest.bend_2", "curvature at rest about d2", Veins),
+    ("rest.bend_3", "curvature at rest about d3", Veins),
+    ("rest.stretch", "growth", Veins),
+    ("coupling.x", "coupling along x", Gaps),
+    ("coupling.y", "coupling along y", Gaps),
+    ("coupling.z", "coupling along z", Gaps),
+    ("tissue.along", "tissue along the veins", Gaps),
+    ("tissue.across", "tissue across the veins", Gaps),
+    ("tissue.normal", "tissue normal to the leaf", Gaps),
+    ("tissue.fold", "tissue in folds", Gaps),
+    ("load.gravity", "gravity", Along),
+    ("load.g", "acceleration of gravity", Along),
+    ("load.distributed", "force per length", Along),
+    ("load.tip_force", "force on the tip", Along),
+    ("load.tip_moment", "moment on the tip", About),
+    ("load.point.at", "place of point", Plain),
+    ("load.point.force", "force on point", Along),
+    ("load.point.moment", "moment on point", About),
+    ("load.point.mass", "mass of point", Plain),
+    ("tip.position", "position of the tip", Along),
+    ("tip.angles", "angle at the tip", Veins),
+    ("tip.twist", "twist at the tip", Veins),
+    ("grip.at", "place of grip", Plain),
+    ("grip.move", "displacement of grip", Along),
+    ("dynamics.density", "mass per length", Veins),
+    ("dynamics.rotary_inertia", "rotary inertia", Veins),
+    ("dynamics.section_radius", "radius of the section", Veins),
+    ("dynamics.external_damping", "external damping", Plain),
+    ("dynamics.internal_damping", "internal damping", Plain),
+    ("dynamics.duration", "duration", Plain),
+    ("wind.velocity", "velocity of the air", Along),
+    ("wind.density", "density of the air", Plain),
+    ("wind.drag", "drag coefficient", Plain),
+    ("wind.width", "width in the wind", Veins),
+    ("photo.scale", "length of a pixel", Plain),
+    ("photo.x", "pixel of the origin, to the right", Plain),
+    ("photo.y", "pixel of the origin, down", Plain),
+    ("photo.rotation", "rotation of the photograph", Plain),
+    ("method.step", "time step", Plain),
+    ("method.segments", "segments a vein", Plain),
+];
+
+/// Of more keys than this only the first and the last are named.
+const NAMED: usize = 3;
+
+/// A number of a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    pub words: String,
+    /// The unit, if the scenario names those of which it consists.
+    pub unit: Option<String>,
+}
+
+impl Quantity {
+    /// The number of these keys, which are joined by `+` where several have one value.
+    pub fn of(keys: &str, units: &Units) -> Quantity {
+        let parts: Vec<KeyPart> = keys.split('+').map(KeyPart::parse).collect();
+        let words = match alike_veins(&parts) {
+            Some(words) => words,
+            None => {
+                let words: Vec<String> = parts.iter().map(KeyPart::words).collect();
+                match words.as_slice() {
+                    [first, .., last] if words.len() > NAMED => format!("{first} = … = {last}"),
+                    few => few.join(" = "),
+                }
+            }
+        };
+        let unit = parts.first().and_then(|part| part.unit(units));
+        Quantity { words, unit }
+    }
+
+    /// The same as the name of an axis.
+    pub fn axis(&self) -> String {
+        with_unit(&self.words, self.unit.as_deref())
+    }
+}
+
+/// A key as it is written: `scale:load.point[0].force[2]`, `rest.bend_2.value[1]`.
+struct KeyPart<'t> {
+    text: &'t str,
+    scale: bool,
+    path: String,
+    row: Option<usize>,
+    list: Option<&'t str>,
+    indices: Vec<usize>,
+    named: Option<(&'static str, Entries)>,
+}
+
+impl<'t> KeyPart<'t> {
+    fn parse(text: &'t str) -> Self {
+        let text = text.trim();
+        let (scale, rest) = match text.strip_prefix("scale:") {
+            Some(rest) => (true, rest),
+            None => (false, text),
+        };
+        let mut pieces: Vec<(&str, Vec<usize>)> = (rest.split('.'))
+            .map(|piece| {
+                let mut parts = piece.split('[');
+                let name = parts.next().unwrap_or_default();
+                let indices = parts.filter_map(|it| it.trim_end_matches(']').parse().ok());
+                (name, indices.collect())
+            })
+            .collect();
+        let joined = |pieces: &[(&str, Vec<usize>)]| {
+            let names: Vec<&str> = pieces.iter().map(|piece| piece.0).collect();
+            names.join(".")
+        };
+        let named = |path: &str| {
+            let found = WORDS.iter().find(|row| row.0 == path);
+            found.map(|row| (row.1, row.2))
+        };
+        let last = pieces.len().saturating_sub(1);
+        let list = match named(&joined(&pieces)) {
+            None if last > 0 => Some(pieces[last].0),
+            _ => None,
+        };
+        let indices = pieces[last].1.clone();
+        pieces.truncate(if list.is_some() { last } else { last + 1 });
+        let path = joined(&pieces);
+        // The row of a repeated table is an index of its name, before that of the key.
+        let row = pieces.iter().rev().skip(1);
+        let row = row.flat_map(|piece| &piece.1).next().copied();
+        KeyPart {
+            named: named(&path).filter(|_| list.is_none_or(|it| ["value", "at"].contains(&it))),
+            text,
+            scale,
+            path,
+            row,
+            list,
+            indices,
+        }
+    }
+
+    fn words(&self) -> String {
+        let Some((words, entries)) = self.named else {
+            return self.text.into();
+        };
+        let mut words = words.to_string();
+        words.extend(self.row.map(|row| format!(" {}", row + 1)));
+        let (knot, mut indices) = match (self.list, self.indices.split_first()) {
+            (Some(_), Some((knot, rest))) => (Some(knot + 1), rest),
+            _ => (None, &self.indices[..]),
+        };
+        if let (Along | About, Some((&axis, veins))) = (entries, indices.split_last()) {
+            let by = if entries == Along { "along" } else { "about" };
+            words += &format!(" {by} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?"));
+            indices = veins;
+        }
+        match (entries, indices) {
+            (Gaps, [gap, ..]) => words += &format!(", veins {} and {}", gap + 1, gap + 2),
+            (Plain, [entry, ..]) => words += &format!(", entry {}", entry + 1),
+            (_, [vein, ..]) => words += &format!(", vein {}", vein + 1),
+            (_, []) => (),
+        }
+        match (self.list, knot) {
+            (Some("at"), Some(knot)) => words = format!("place of knot {knot}, {words}"),
+            (_, Some(knot)) => words += &format!(", knot {knot}"),
+            _ => (),
+        }
+        match self.scale {
+            true => format!("factor of {words}"),
+            false => words,
+        }
+    }
+
+    fn unit(&self, units: &Units) -> Option<String> {
+        if self.scale || self.list == Some("at") {
+            return None;
+        }
+        units.of(Key::from_path(&self.path)?.dimension())
+    }
+}
+
+/// One number of several veins, as in `bending stiffness A2, veins 1–5, 7–11`.
+fn alike_veins(parts: &[KeyPart]) -> Option<String> {
+    let first = parts.first().filter(|_| parts.len() > 1)?;
+    let (words, entries) = first.named?;
+    let alike = |part: &KeyPart| {
+        let plain = part.list.is_none() && part.indices.len() == 1;
+        plain && part.path == first.path && part.scale == first.scale
+    };
+    if entries != Veins || !parts.iter().all(alike) {
+        return None;
+    }
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for vein in parts.iter().map(|part| part.indices[0] + 1) {
+        match runs.last_mut() {
+            Some([_, last]) if *last + 1 == vein => *last = vein,
+            _ => runs.push([vein; 2]),
+        }
+    }
+    let runs = runs.into_iter().map(|[from, to]| match to - from {
+        0 => from.to_string(),
+        1 => format!("{from}, {to}"),
+        _ => format!("{from}–{to}"),
+    });
+    let factor = if first.scale { "factor of " } else { "" };
+    let runs: Vec<String> = runs.collect();
+    Some(format!("{factor}{words}, veins {}", runs.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cm() -> Units {
+        Units {
+            length: Some("cm".into()),
+            force: Some("N".into()),
+            time: None,
+        }
+    }
+
+    #[test]
+    fn every_key_with_words_is_one_of_the_format() {
+        for (path, ..) in WORDS {
+            let known = Key::from_path(path).is_some() || path.starts_with("method.");
+            assert!(known, "{path}");
+        }
+    }
+
+    #[test]
+    fn keys_are_told_in_words_and_units() {
+        for (keys, axis) in [
+            ("stiffness.bending_2", "bending stiffness A2 / N cm²"),
+            ("stiffness.axial[2]", "axial stiffness H1, vein 3 / N"),
+            ("load.gravity[2]", "gravity along z / (N/cm)"),
+            ("load.gravity[4][2]", "gravity along z, vein 5 / (N/cm)"),
+            ("load.tip_moment[1]", "moment on the tip about y / N cm"),
+            ("load.point[0].force[2]", "force on point 1 along z / N"),
+            ("grip[1].move[0]", "displacement of grip 2 along x / cm"),
+            (
+                "rest.bend_2.value[1]",
+                "curvature at rest about d2, knot 2 / (1/cm)",
+            ),
+            (
+                "rest.bend_2.at[1]",
+                "place of knot 2, curvature at rest about d2",
+            ),
+            (
+                "tissue.along[0]",
+                "tissue along the veins, veins 1 and 2 / (N/cm²)",
+            ),
+            (
+                "scale:stiffness.torsion",
+                "factor of torsional stiffness A1",
+            ),
+            ("leaf.rods", "number of veins"),
+            ("method.step", "time step"),
+            (
+                "dynamics.gravity.value[0][2]",
+                "dynamics.gravity.value[0][2] / (N/cm)",
+            ),
+        ] {
+            assert_eq!(Quantity::of(keys, &cm()).axis(), axis, "{keys}");
+        }
+        let without = Quantity::of("stiffness.bending_2", &Units::default());
+        assert_eq!(without.axis(), "bending stiffness A2");
+        // A density has a unit of time, which is not named.
+        assert_eq!(Quantity::of("dynamics.density", &cm()).unit, None);
+    }
+
+    #[test]
+    fn keys_with_one_value_share_their_words() {
+        let words = |keys: &str| Quantity::of(keys, &cm()).words;
+        let veins = [0, 1, 2, 4, 6, 7].map(|vein| format!("stiffness.bending_2[{vein}]"));
+        let told = "bending stiffness A2, veins 1–3, 5, 7, 8";
+        assert_eq!(words(&veins.join("+")), told);
+        let rigid = "axial stiffness H1 = shear stiffness H2";
+        assert_eq!(words("stiffness.axial+stiffness.shear_2"), rigid);
+        let four = "leaf.length+coupling.x+coupling.y+coupling.z";
+        assert_eq!(words(four), "length = … = coupling along z");
+    }
+}

@@ -1,0 +1,833 @@
+//! Following a branch on one grid.
+//!
+//! Following a branch on grids as fine as it needs, every point verified.
+//!
+//! The first points of branches: the equilibrium that a relaxation found, and those beside a
+//! branch point.
+
+use crate::branch::correct::Found;
+use crate::branch::critical::{Critical, Kind, crossing_at_vertex, locate};
+use crate::branch::equations::{Equations, Stuck};
+use crate::branch::family::Family;
+use crate::branch::refine::{Doubt, Refined, on_finer, refine, refine_critical};
+use crate::branch::{Direction, Point, add, between, plus};
+use crate::leaf::{DiscreteLeaf, Grid, State, System};
+use crate::numbers::larger;
+use crate::relax::accuracy::transfer::prolong;
+use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// First step and shortest step, as parts of the longest.
+const FIRST: f64 = 0.25;
+
+const SHORTEST: f64 = 1e-5;
+
+/// Growth factor of the step, if Newton's method needs at most `FEW` iterations
+/// and the cosine of the branch's turn exceeds `STRAIGHT`.
+const GROWTH: f64 = 1.5;
+
+const FEW: usize = 4;
+
+const STRAIGHT: f64 = 0.97;
+
+/// A step in which the cosine of the branch's turn is below this is rejected.
+const BENT: f64 = 0.85;
+
+/// Largest distance of a point from its prediction, as a part of the step.
+const DRIFT: f64 = 0.5;
+
+/// A chord is parallel to the mean of the tangents at its ends up to third order. If a larger
+/// part of it than this is transverse, the step has led to another branch.
+const ACROSS: f64 = 0.1;
+
+/// A step with more sign changes of eigenvalues than this is rejected, until it
+/// is as short as this part of the longest.
+const MOST_CHANGES: usize = 2;
+
+const SHORT_ENOUGH: f64 = 0.02;
+
+/// An unexplained change of the index is accepted if steps
+/// are shorter than this part of the longest.
+const UNEXPLAINED: f64 = 1e-3;
+
+/// A branch that comes to within this part of a step of its first point is
+/// tested for closure, after so many points: in at most `CLOSING` corrections to the plane
+/// through the first point normal to the branch. The two must then agree
+/// within `SAME` (radians, lengths, fractions).
+const CLOSED: f64 = 1.0;
+
+const CLOSED_AFTER: usize = 8;
+
+const CLOSING: usize = 5;
+
+const SAME: f64 = 1e-7;
+
+/// Least number of grids for a critical point.
+const CRITICAL_GRIDS: usize = 4;
+
+/// Predicate on the points so far: whether to stop.
+type Enough<'a> = dyn Fn(&[Point]) -> bool + 'a;
+
+/// How to follow a branch: step control and stopping.
+#[derive(Clone, Copy)]
+pub struct Walk<'a> {
+    /// The longest step; the range of the parameter has length one, and so has a turn of all
+    /// nodes by ten radians or a shift by one length.
+    pub longest: f64,
+    /// Largest number of points.
+    pub most: usize,
+    /// Least number of grids for a critical point.
+    pub critical_grids: usize,
+    /// Stops the branch once it returns true.
+    pub enough: Option<&'a Enough<'a>>,
+}
+
+impl Walk<'_> {
+    /// Without a stopping criterion.
+    pub fn new(longest: f64, most: usize) -> Self {
+        Walk {
+            longest,
+            most,
+            critical_grids: CRITICAL_GRIDS,
+            enough: None,
+        }
+    }
+}
+
+/// How a branch ended, or a boundary on one of its sides.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    /// At the end of the range; of a boundary, at an end of one of the ranges.
+    Reached,
+    /// Back at the start of the range.
+    Returned,
+    /// Where it began.
+    Closed,
+    /// On a boundary that was followed before.
+    Met,
+    /// After as many points as were allowed.
+    MostPoints,
+    /// Where the stopping criterion was met.
+    Enough,
+    /// Where it loses its stability, as requested.
+    Unstable,
+    /// Where the limit of the run was reached.
+    Stopped,
+    /// The step could not be made however short.
+    Stuck(Stuck),
+    /// The next point is not verified on any grid up to the finest.
+    Unverified(Doubt),
+}
+
+impl End {
+    /// That of a branch which has reached this end of the range.
+    fn at_edge(edge: f64) -> Self {
+        match edge {
+            1.0 => End::Reached,
+            _ => End::Returned,
+        }
+    }
+}
+
+/// A branch on one grid, or on finer and finer ones.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// Its points, in order.
+    pub points: Vec<Point>,
+    /// Critical points, each with the number of the point before it.
+    pub critical: Vec<(usize, Critical)>,
+    /// Changes of the index that could not be located, by the number of the point before.
+    pub missed: Vec<usize>,
+    /// Vertices of pitchforks at which no branch was found to cross, by the number of the point
+    /// before.
+    pub unmet: Vec<usize>,
+    /// How it ended, once it has.
+    pub end: Option<End>,
+    /// The first point on the present grid, if it was found there.
+    first: Option<Point>,
+    /// Length of the next step, and of all previous ones.
+    step: f64,
+    steps: Vec<f64>,
+}
+
+/// Follows a branch on one grid from its first point in the direction of its
+/// tangent, as long as the parameter is within its range. `progress` is called after
+/// each point with the number of points and the parameter.
+pub fn walk(
+    equations: &mut Equations,
+    first: Point,
+    how: &Walk,
+    progress: &mut dyn FnMut(usize, f64),
+) -> Branch {
+    let mut branch = Branch::new(first, how);
+    branch.extend_to(equations, how, how.most, progress);
+    branch
+}
+
+impl Branch {
+    /// A branch with one point.
+    pub fn new(first: Point, how: &Walk) -> Self {
+        Branch {
+            points: vec![first.clone()],
+            critical: Vec::new(),
+            missed: Vec::new(),
+            unmet: Vec::new(),
+            end: None,
+            first: Some(first),
+            step: FIRST * how.longest,
+            steps: Vec::new(),
+        }
+    }
+
+    /// Continues until there are `until` points, or the branch ends.
+    pub fn extend_to(
+        &mut self,
+        equations: &mut Equations,
+        how: &Walk,
+        until: usize,
+        progress: &mut dyn FnMut(usize, f64),
+    ) {
+        while self.end.is_none() && self.points.len() < until.min(how.most) {
+            if equations.leaves.family.limit.reached() {
+                self.end = Some(End::Stopped);
+                return;
+            }
+            if how.enough.is_some_and(|enough| enough(&self.points)) {
+                self.end = Some(End::Enough);
+                return;
+            }
+            if let Err(stuck) = self.try_step(equations, how) {
+                self.end = Some(End::Stuck(stuck));
+            }
+            let now = &self.points[self.points.len() - 1];
+            progress(self.points.len(), now.fraction);
+        }
+        if self.end.is_none() && self.points.len() >= how.most {
+            self.end = Some(End::MostPoints);
+        }
+    }
+
+    /// Discards everything after the given point, and the end; the next step is
+    /// as long as the previous one from that point, or to it.
+    pub fn truncate_at(&mut self, to: usize) {
+        let made = self.steps.get(to).or(self.steps.last());
+        self.step = *made.unwrap_or(&self.step);
+        self.points.truncate(to + 1);
+        self.steps.truncate(to);
+        self.critical.retain(|(after, _)| *after < to);
+        self.missed.retain(|after| *after < to);
+        self.unmet.retain(|after| *after < to);
+        self.end = None;
+    }
+
+    /// Whether it ended where a branch is known as far as requested.
+    pub fn is_complete(&self) -> bool {
+        self.end.as_ref().is_some_and(End::complete)
+    }
+
+    pub fn shorten(&mut self, part: f64) {
+        self.step *= part;
+    }
+
+    /// Drops a point between two others.
+    pub fn drop_point(&mut self, number: usize) {
+        self.points.remove(number);
+        self.steps[number - 1] += self.steps.remove(number);
+        let after = self.critical.iter_mut().map(|(after, _)| after);
+        for after in after.chain(&mut self.missed).chain(&mut self.unmet) {
+            *after -= usize::from(*after >= number);
+        }
+    }
+
+    /// Whether there is a critical point right before or after a point.
+    pub fn is_near_critical(&self, number: usize) -> bool {
+        let mut critical = self.critical.iter();
+        critical.any(|(after, _)| *after == number || after + 1 == number)
+    }
+
+    /// Transfers the last point to the grid with all segments halved.
+    pub fn refine(&mut self, equations: &mut Equations) -> Result<(), Stuck> {
+        let last = self.points.len() - 1;
+        let (_, finer) = on_finer(equations, &self.points[last])?;
+        let first = self.first.take();
+        self.first = match last {
+            0 => Some(finer.clone()),
+            _ => first.and_then(|first| Some(on_finer(equations, &first).ok()?.1)),
+        };
+        self.points[last] = finer;
+        Ok(())
+    }
+
+    /// Makes a step from the last point, or shortens the next attempt. Fails if that
+    /// is too short.
+    fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
+        let now = &self.points[self.points.len() - 1];
+        let step = self.step;
+        let found = Found::by_step(equations, now, step).and_then(|found| {
+            match how.accepts(equations, now, &found, step) {
+                true => Ok(found),
+                false => Err(Stuck::NotConverged),
+            }
+        });
+        let mut next = match found {
+            Ok(found) => found,
+            Err(_) if 0.5 * step >= SHORTEST * how.longest => {
+                self.step = 0.5 * step;
+                return Ok(());
+            }
+            Err(stuck) => return Err(stuck),
+        };
+        let turn = equations.inner(&now.tangent, &next.point.tangent);
+        let easy = next.point.iterations <= FEW && turn > STRAIGHT;
+        let mut end = next.stop_at_edge(equations, now, step)?.map(End::at_edge);
+        if let Some(first) = &self.first
+            && end.is_none()
+            && self.points.len() > CLOSED_AFTER
+            && distance(first, &next.point) < CLOSED * step
+            && let Some(point) = closed_at(equations, first, &next.point, step)
+        {
+            next.point = point;
+            end = Some(End::Closed);
+        }
+        let turned = now.tangent.params[0] * next.point.tangent.params[0] < 0.0;
+        if next.point.index != now.index || turned {
+            let after = self.points.len() - 1;
+            let distance = equations.inner(&chord(equations, now, &next.point), &now.tangent);
+            let found = locate(equations, now, &next.point, distance);
+            // If the branch turns back and no eigenvalue changes sign, it touches another one
+            // where that crosses: the vertex of a pitchfork.
+            let is_vertex = turned
+                && next.point.index == now.index
+                && found.as_ref().is_ok_and(|found| found.is_empty());
+            let vertex =
+                is_vertex.then(|| crossing_at_vertex(equations, now, &next.point, distance));
+            let mut found = found.unwrap_or_default();
+            let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
+            let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
+            let explained = changes == next.point.index.abs_diff(now.index)
+                && (folds.count() % 2 == 1) == turned;
+            if let Some(Ok(vertex)) = vertex {
+                let known = self.critical.last().map(|(_, last)| last);
+                let again = known.is_some_and(|known| known.is_at(&vertex));
+                found.extend((!again).then_some(vertex));
+            } else if !explained {
+                // An unexplained change of the index: the step has led to another branch
+                // nearby.
+                if next.step > UNEXPLAINED * how.longest {
+                    self.step = 0.5 * next.step;
+                    return Ok(());
+                }
+                match is_vertex {
+                    true => self.unmet.push(after),
+                    false => self.missed.push(after),
+                }
+            }
+            let all = found.into_iter();
+            self.critical.extend(all.map(|point| (after, point)));
+        }
+        self.steps.push(next.step);
+        self.points.push(next.point);
+        self.end = end;
+        if easy {
+            self.step = (GROWTH * step).min(how.longest);
+        }
+        Ok(())
+    }
+}
+
+impl Walk<'_> {
+    /// Whether a step has presumably stayed on the branch.
+    fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
+        let changes = found.point.index.abs_diff(now.index);
+        equations.inner(&now.tangent, &found.point.tangent) > BENT
+            && found.drift < DRIFT * step
+            && (changes <= MOST_CHANGES || step < SHORT_ENOUGH * self.longest)
+            && transverse_part(equations, now, &found.point) < ACROSS
+    }
+}
+
+/// The difference of two points.
+fn chord(equations: &Equations, a: &Point, b: &Point) -> Direction {
+    Direction {
+        increments: between(&a.state, &b.state, equations.first_node()),
+        params: [b.fraction - a.fraction],
+    }
+}
+
+/// The part of the chord between two points that is transverse to the mean of their
+/// tangents.
+fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
+    let mean = equations.normalised(Direction {
+        increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
+        params: [a.tangent.params[0] + b.tangent.params[0]],
+    });
+    let mut rest = chord(equations, a, b);
+    let length = equations.inner(&rest, &rest).sqrt();
+    let along = equations.inner(&rest, &mean);
+    add(&mut rest.increments, -along, &mean.increments);
+    rest.params[0] -= along * mean.params[0];
+    equations.inner(&rest, &rest).sqrt() / length
+}
+
+/// Corrects a point near the first one until both agree in parameter, shape, tangent and
+/// index; none if they do not.
+fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
+    let mut near = near.clone();
+    for _ in 0..CLOSING {
+        let same = equations.inner(&near.tangent, &first.tangent);
+        if same < BENT || near.index != first.index {
+            return None;
+        }
+        if distance(&near, first) < SAME {
+            return Some(near);
+        }
+        let shift = equations.inner(&chord(equations, &near, first), &first.tangent) / same;
+        if shift.abs() > 2.0 * step {
+            return None;
+        }
+        let moved = (equations.moved(&near.solution(), &near.tangent, shift)).ok()?;
+        near = (equations.correct(&moved.state, moved.params[0], Some(&first.tangent))).ok()?;
+    }
+    None
+}
+
+/// Distance of two points: the larger of those of shape and parameter.
+fn distance(a: &Point, b: &Point) -> f64 {
+    larger(a.state.shift_to(&b.state), (a.fraction - b.fraction).abs())
+}
+
+impl Direction {
+    /// The direction in which the parameter grows.
+    pub fn growing(self) -> Self {
+        match self.params[0] >= 0.0 {
+            true => self,
+            false => self.reversed(),
+        }
+    }
+}
+
+/// The finest grid to follow a branch on, in segments and in nodes.
+const FINEST: usize = 512;
+
+const MOST_NODES: usize = 20_000;
+
+/// Least and largest number of points computed before they are verified in parallel.
+const FEWEST: usize = 2;
+
+const MOST: usize = 16;
+
+/// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
+const TRIES: usize = 4;
+
+const SHORTER: f64 = 0.4;
+
+/// Largest number of consecutive points dropped next to a critical point: that lies elsewhere
+/// on every grid, so that a point may be before it on one grid and beyond it on another.
+const DROPPED: usize = 4;
+
+/// From the grid on which they were found to the finest, neighbouring points move alike: the
+/// difference is at most this part of their distance plus this part of the larger displacement,
+/// plus `SMALL`. The part is large, since they are sought in different planes.
+const ALIKE: f64 = 0.8;
+
+const SMALL: f64 = 1e-6;
+
+/// The equations of a family on successively refined grids, each of which halves the
+/// segments of the one before.
+pub struct Grids<'a> {
+    equations: Vec<Equations<'a>>,
+}
+
+/// A branch with only verified points.
+pub struct Followed {
+    /// The branch as found on its grids.
+    pub branch: Branch,
+    /// How it ended.
+    pub end: End,
+    /// Its points, extrapolated over grids.
+    pub points: Vec<Refined>,
+    /// Its critical points, likewise.
+    pub critical: Vec<Refined>,
+    /// What was found of critical points beyond the last point.
+    beyond: Vec<Result<Refined, Doubt>>,
+}
+
+impl<'a> Grids<'a> {
+    /// Starts with one grid.
+    pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
+        Grids {
+            equations: vec![Equations::new(family, grid)],
+        }
+    }
+
+    /// The equations on the grid of a state, which must be one of these.
+    pub fn of(&mut self, state: &State) -> &mut Equations<'a> {
+        let level = (state.segments() / self.equations[0].grid().segments()).ilog2();
+        &mut self.equations[level as usize]
+    }
+
+    /// Creates the next finer grid if needed; false if that is too fine.
+    fn refine(&mut self, state: &State) -> bool {
+        let finer = 2 * state.segments();
+        if finer > FINEST || finer * state.rods() > MOST_NODES {
+            return false;
+        }
+        let last = &self.equations[self.equations.len() - 1];
+        if last.grid().segments() < finer {
+            let refined = last.refined();
+            self.equations.push(refined);
+        }
+        true
+    }
+
+    /// Number of matrices factorised so far.
+    pub fn factorizations(&self) -> usize {
+        self.equations.iter().map(|it| it.factorizations).sum()
+    }
+
+    /// Follows a branch from its first point in the direction of its tangent. Where a
+    /// point cannot be verified, the branch is continued from the last one that was: with a shorter
+    /// step, or on a finer grid. `progress` is called after each point with the number of points
+    /// and the parameter.
+    pub fn follow(
+        &mut self,
+        first: Point,
+        how: &Walk,
+        accuracy: f64,
+        progress: &mut dyn FnMut(usize, f64),
+    ) -> Followed {
+        let mut known = Followed {
+            branch: Branch::new(first, how),
+            end: End::MostPoints,
+            points: Vec::new(),
+            critical: Vec::new(),
+            beyond: Vec::new(),
+        };
+        let (mut ahead, mut tries) = (MOST / 2, 0);
+        loop {
+            let now = &known.branch.points[known.branch.points.len() - 1];
+            let (before, now) = (known.points.len(), now.state.clone());
+            let equations = self.of(&now);
+            (known.branch).extend_to(equations, how, before + ahead, progress);
+            let leaves = &equations.leaves;
+            let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
+            if known.points.len() > before {
+                tries = 0;
+            }
+            if leaves.family.limit.reached() && !(doubt.is_none() && known.branch.is_complete()) {
+                let last = known.points.len().saturating_sub(1);
+                known.branch.truncate_at(last);
+                known.end = End::Stopped;
+                return known;
+            }
+            match (doubt, &known.branch.end) {
+                (None, None) => {
+                    ahead = (2 * ahead).min(MOST);
+                    continue;
+                }
+                (Some(_), _)
+                | (None, Some(End::Stuck(Stuck::NotConverged | Stuck::Unresolved))) => {}
+                (None, Some(end)) => {
+                    known.end = end.clone();
+                    return known;
+                }
+            }
+            let end = known.branch.end.clone();
+            ahead = FEWEST;
+            tries += 1;
+            let last = known.points.len().saturating_sub(1);
+            known.branch.truncate_at(last);
+            let here = known.branch.points[last].state.clone();
+            let refined = self.refine(&here) && known.branch.refine(self.of(&here)).is_ok();
+            known.branch.shorten(if refined { 1.0 } else { SHORTER });
+            if !refined && (tries > TRIES || known.points.is_empty() || doubt.is_none()) {
+                known.end = match (doubt, end) {
+                    (None, Some(end)) => end,
+                    (doubt, _) => End::Unverified(doubt.unwrap_or(Doubt::Unsolved)),
+                };
+                return known;
+            }
+        }
+    }
+}
+
+impl Followed {
+    /// Verifies the remaining points, all on one grid; stops at the first that
+    /// fails, and returns why.
+    fn verify(
+        &mut self,
+        family: &Family,
+        grid: &Grid,
+        (accuracy, grids): (f64, usize),
+    ) -> Option<Doubt> {
+        let mut singular = std::mem::take(&mut self.beyond);
+        let critical = &self.branch.critical[self.critical.len() + singular.len()..];
+        let points = &self.branch.points[self.points.len()..];
+        // Points and critical points in one list, to keep all threads busy.
+        let mut found: Vec<Result<Refined, Doubt>> = (0..points.len() + critical.len())
+            .into_par_iter()
+            .map(|k| match points.get(k) {
+                Some(point) => refine(family, grid, point, accuracy),
+                None => {
+                    let critical = &critical[k - points.len()].1;
+                    refine_critical(family, grid, critical, accuracy, grids)
+                }
+            })
+            .collect();
+        singular.append(&mut found.split_off(points.len()));
+        self.forget_vertices(&mut singular);
+        let mut critical = singular.into_iter();
+        let mut dropped = 0;
+        for point in found {
+            let number = self.points.len();
+            let near = number > 0 && self.branch.is_near_critical(number);
+            let near = near && matches!(point, Err(Doubt::OtherIndex));
+            if near && dropped < DROPPED {
+                if number + 1 < self.branch.points.len() {
+                    self.branch.drop_point(number);
+                    dropped += 1;
+                    continue;
+                } else if self.branch.end.is_none() {
+                    // Decided once there is a point after it.
+                    self.beyond = critical.collect();
+                    return None;
+                }
+            }
+            dropped = 0;
+            let known = self.critical.len();
+            let count = number
+                .checked_sub(1)
+                .map_or(0, |before| self.critical_after(before));
+            let singular: Result<Vec<Refined>, Doubt> = critical.by_ref().take(count).collect();
+            if let Err(doubt) = self.add(point, singular) {
+                self.points.truncate(number);
+                self.critical.truncate(known);
+                return Some(doubt);
+            }
+        }
+        None
+    }
+
+    /// Moves vertices of pitchforks that are not verified from the last critical points, and from
+    /// what is `found` of these, to those of which no crossing branch is known.
+    fn forget_vertices(&mut self, found: &mut Vec<Result<Refined, Doubt>>) {
+        let known = self.critical.len();
+        for k in (0..found.len()).rev() {
+            if found[k].is_err() && self.branch.critical[known + k].1.is_vertex() {
+                let (after, _) = self.branch.critical.remove(known + k);
+                self.branch.unmet.push(after);
+                drop(found.remove(k));
+            }
+        }
+    }
+
+    /// Number of critical points between this point and the next.
+    fn critical_after(&self, point: usize) -> usize {
+        let critical = self.branch.critical.iter();
+        critical.filter(|(after, _)| *after == point).count()
+    }
+
+    /// Adds a point with the critical points before it.
+    fn add(
+        &mut self,
+        point: Result<Refined, Doubt>,
+        critical: Result<Vec<Refined>, Doubt>,
+    ) -> Result<(), Doubt> {
+        let number = self.points.len();
+        if number > 0 && self.branch.missed.contains(&(number - 1)) {
+            return Err(Doubt::Unexplained);
+        }
+        let critical = critical?;
+        // A point next to the range's end is on the other side of it, in truth.
+        if !critical.iter().all(Refined::is_inside) {
+            return Err(Doubt::OtherIndex);
+        }
+        self.critical.extend(critical);
+        self.points.push(point?);
+        match number == 0 || self.displaced_alike(number) {
+            true => Ok(()),
+            false => Err(Doubt::OtherBranch),
+        }
+    }
+
+    /// Whether a point and its predecessor are displaced alike on the finest grids.
+    fn displaced_alike(&self, number: usize) -> bool {
+        let [before, now] = [number - 1, number].map(|k| {
+            let (coarse, fine) = (&self.branch.points[k].state, &self.points[k].state);
+            (coarse, displacements(coarse, fine))
+        });
+        let largest = |displacements: &[DVec3]| {
+            crate::numbers::largest(displacements.iter().map(|d| d.length()))
+        };
+        let differences = before.1.iter().zip(&now.1).map(|(a, b)| *b - *a);
+        let differences: Vec<DVec3> = differences.collect();
+        let distance = before.0.shift_to(now.0);
+        largest(&differences)
+            <= ALIKE * distance + ALIKE * largest(&before.1).max(largest(&now.1)) + SMALL
+    }
+}
+
+/// Displacements of the nodes of a state to those of one on the same grid or a refinement.
+fn displacements(coarse: &State, fine: &State) -> Vec<DVec3> {
+    let stride = fine.segments() / coarse.segments();
+    let node =
+        |j: usize, i: usize| fine.x[fine.base(j) + stride * i] - coarse.x[coarse.base(j) + i];
+    let rods = (0..coarse.rods()).flat_map(|j| (0..=coarse.segments()).map(move |i| (j, i)));
+    rods.map(|(j, i)| node(j, i)).collect()
+}
+
+/// The finest grid on which the first point is sought.
+const FINEST_FIRST_POINT: usize = 512;
+
+/// Largest distance between the tips of one grid and the extrapolated ones, relative to
+/// the length.
+const SAME_LEAF: f64 = 0.02;
+
+/// A relaxation on fewer segments counts as one on this many.
+const COARSEST: usize = 8;
+
+/// Distances from the branch point at which the other branch is sought, in this order.
+const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+
+/// Where the first of these distances leads out of the range of the parameter, it is shortened by
+/// this factor, fewer times than that.
+const NEARER: f64 = 0.3;
+
+const NEARER_TRIES: i32 = 8;
+
+/// Fractions of the range by which a point may be beyond an end of it, due to rounding.
+const WITHIN: f64 = 1e-12;
+
+/// The first point of a branch and its grid: the equilibrium `rest` at this `fraction`, found with
+/// these `options`; on a grid of at least `segments` segments, or, if none is given, on
+/// the first one, at least twice as fine as the stations of the relaxation, on which the index
+/// is that of `rest`.
+///
+/// # Errors
+/// The failure on the finest grid, if Newton's method converges on none.
+pub fn begin<'a>(
+    family: &'a Family<'a>,
+    (rest, fraction): (&Equilibrium, f64),
+    options: &Options,
+    segments: Option<usize>,
+) -> Result<(Grids<'a>, Point), Stuck> {
+    let coarsest = (rest.shape.stations.len() - 1).max(COARSEST);
+    let least = segments.unwrap_or(2 * coarsest);
+    let rest_at = (rest, fraction);
+    search(family, rest_at, least, segments.is_some()).or_else(|stuck| {
+        // Interpolation between the stations may be too inaccurate: relax once more, on the
+        // finest grid alone, and begin there.
+        let finest = rest.accuracy.segments.iter().max().copied();
+        let options = Options {
+            method: options.method.on_grid(finest),
+            ..options.clone()
+        };
+        let alone = relax(&family.scenario([fraction])?, &options, &mut |_| {});
+        let Ok(alone) = alone else {
+            return Err(stuck);
+        };
+        let mut tips = rest.tips.iter().zip(&alone.tips);
+        let near = SAME_LEAF * family.scale().length;
+        match tips.all(|(a, b)| a.distance(*b) < near) {
+            true => search(
+                family,
+                (&alone, fraction),
+                alone.shape.stations.len() - 1,
+                true,
+            ),
+            false => Err(stuck),
+        }
+    })
+}
+
+/// The first point on a grid of at least `least` segments; of any index, or on the first grid
+/// with the index of `rest`.
+fn search<'a>(
+    family: &'a Family<'a>,
+    (rest, fraction): (&Equilibrium, f64),
+    least: usize,
+    any_index: bool,
+) -> Result<(Grids<'a>, Point), Stuck> {
+    let leaf = &family.leaf([fraction])?;
+    let mut grid = Grid::through(&rest.shape.stations, leaf.kinks());
+    let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+    let mut state = project(leaf, &discrete, &rest.shape.rods);
+    let mut found = Err(Stuck::NotConverged);
+    loop {
+        if grid.segments() >= least {
+            let mut grids = Grids::new(family, grid.clone());
+            let point = grids
+                .of(&state)
+                .correct(&state, fraction, None)
+                .or_else(|_| {
+                    let mut system = System::new(&discrete);
+                    polish(&discrete, &mut state, &mut system, &mut Work::default());
+                    grids.of(&state).correct(&state, fraction, None)
+                });
+            match point {
+                Ok(point) => {
+                    let same = Some(point.index) == rest.stability.negative_eigenvalues;
+                    found = Ok((grids, point));
+                    if same || any_index {
+                        return found;
+                    }
+                }
+                Err(stuck) if found.is_err() => found = Err(stuck),
+                Err(_) => {}
+            }
+            if grid.segments() >= FINEST_FIRST_POINT {
+                return found.and(Err(Stuck::BesideBifurcation));
+            }
+        }
+        state = prolong(&discrete, &state);
+        grid = grid.refined();
+        discrete = DiscreteLeaf::new(leaf, grid.clone());
+    }
+}
+
+/// The first points of the branches that cross at `critical` in the plane of
+/// the first of its neutral modes, one on either side: as near as possible, but so far from the
+/// branch point that finer grids have them too, with this accuracy of their tips. A side is
+/// missing where its branch leaves the range of the parameter at once.
+pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
+    let across = critical.across(equations);
+    [across.clone(), across.reversed()]
+        .iter()
+        .filter_map(|direction| first_beside(equations, critical, direction, accuracy))
+        .collect()
+}
+
+/// The first point of the branch that leaves a branch point in this direction, within the range.
+fn first_beside(
+    equations: &mut Equations,
+    critical: &Critical,
+    direction: &Direction,
+    accuracy: f64,
+) -> Option<Point> {
+    let (family, grid) = (equations.leaves.family, equations.grid().clone());
+    let mut at = |away: f64| {
+        let point = critical.beside(equations, direction, away).ok()?;
+        let beyond = larger(-point.fraction, point.fraction - 1.0);
+        (beyond <= WITHIN).then_some(point)
+    };
+    let mut nearest = None;
+    for (k, away) in AWAY.into_iter().enumerate() {
+        let Some(point) = at(away) else {
+            if k == 0 {
+                // Over a short range the parameter changes by more than all of it there.
+                let nearer = (1..NEARER_TRIES).map(|k| away * NEARER.powi(k));
+                let found = nearer.into_iter().find_map(&mut at);
+                if found.is_some() {
+                    return found;
+                }
+            }
+            continue;
+        };
+        if refine(family, &grid, &point, accuracy).is_ok() {
+            return Some(point);
+        }
+        nearest = nearest.or(Some(point));
+    }
+    nearest
+}

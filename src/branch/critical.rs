@@ -1,0 +1,485 @@
+//! Critical points, at which the index changes: folds and branch points.
+//!
+//! The vertex of a pitchfork: where a branch turns back because another one crosses it.
+//!
+//! No eigenvalue changes its sign along the branch that turns back, and the nearer its points are to
+//! the vertex, the nearer to singular is the matrix. So they are not sought there: the vertex
+//! is interpolated from points on either side, and the singular point is that of the other branch,
+//! with the bordered matrix, which is regular.
+
+use crate::branch::equations::{Equations, Sample, Stuck};
+use crate::branch::family::eigenvalue_rounding;
+use crate::branch::{Direction, Point, add, between, combined, dot, plus, times};
+use crate::leaf::{Field, State};
+use crate::numbers::larger;
+
+/// Additional modes in the border: others may be nearly neutral.
+pub(super) const MORE: usize = 2;
+
+/// Largest number of evaluations in the search for a zero.
+const EVALUATIONS: usize = 40;
+
+/// Accuracy of a zero, as a part of the step that contains it.
+const ACCURACY: f64 = 1e-13;
+
+/// Differences over less than this part of a step do not give a reliable slope.
+const LOCAL: f64 = 1e-6;
+
+/// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
+const NEUTRAL: f64 = 1e-6;
+
+/// At a zero an eigenvalue is smaller than this part of its values at the ends of the step, or than
+/// so many times its rounding error: where the step has led across a gap to another branch, it
+/// jumps.
+const CONTINUOUS: f64 = 1e-6;
+
+const ROUNDINGS: f64 = 100.0;
+
+/// Zeros closer than this part of a step are the same.
+const SAME: f64 = 1e-6;
+
+/// The search ends within this part of the step from the point that the step reached, if both
+/// are on the same branch.
+const ARRIVES: f64 = 0.05;
+
+/// Two vertices nearer to each other than this are the same.
+const REPEATED: f64 = 1e-4;
+
+/// Kind of a critical point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The branch turns back in the parameter.
+    Fold,
+    /// Other branches cross.
+    Branching,
+}
+
+/// A point of a branch at which the matrix is singular.
+#[derive(Clone, Debug)]
+pub struct Critical {
+    pub state: State,
+    /// The parameter, as a fraction of its range.
+    pub fraction: f64,
+    pub tangent: Direction,
+    pub kind: Kind,
+    /// Morse index before and after; the same at the vertex of a pitchfork.
+    pub indices: [usize; 2],
+    /// The neutral modes, of mass one.
+    pub modes: Vec<Field>,
+    /// All modes used for the border.
+    pub soft: Vec<Field>,
+    /// Position of the vanishing one among the sorted eigenvalues of H, and its derivative with
+    /// respect to arclength along the tangent.
+    pub which: usize,
+    pub slope: f64,
+    /// Error of the fraction of a fold due to rounding of the forces: they balance along the
+    /// neutral mode to rounding only.
+    pub rounding: f64,
+}
+
+/// The critical points between two points of a branch, the second of them `step` along the
+/// tangent of the first.
+pub fn locate(
+    equations: &mut Equations,
+    a: &Point,
+    b: &Point,
+    step: f64,
+) -> Result<Vec<Critical>, Stuck> {
+    let count = a.index.abs_diff(b.index) + MORE;
+    let soft = equations.soft_modes(a, count)?;
+    let mut search = Search {
+        equations,
+        from: a,
+        soft: &soft,
+        exactly: false,
+    };
+    let ends = [search.at(0.0)?, search.at(step)?];
+    if ends[1].sample.solution.state.shift_to(&b.state) > ARRIVES * step {
+        return Err(Stuck::NotConverged);
+    }
+    let mut found: Vec<(f64, Critical)> = Vec::new();
+    for which in 0..ends[0].eigenvalues.len() {
+        let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
+        let large = values[0].abs().max(values[1].abs()) > NEUTRAL;
+        if values[0] * values[1] < 0.0 && large {
+            let (at, critical) = search.zero(which, [0.0, step], values)?;
+            match found.iter_mut().find(|(s, _)| (s - at).abs() < SAME * step) {
+                Some((_, same)) => same.modes.extend(critical.modes),
+                None => found.push((at, critical)),
+            }
+        }
+    }
+    found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    // Each accounts for its part of the change of the index, in their order along the branch.
+    let mut before = a.index;
+    for (_, critical) in &mut found {
+        let change = critical.modes.len();
+        let after = match b.index > a.index {
+            true => before + change,
+            false => before.saturating_sub(change),
+        };
+        critical.indices = [before, after];
+        before = after;
+        if change > 1 {
+            critical.kind = Kind::Branching;
+        }
+    }
+    Ok(found.into_iter().map(|(_, critical)| critical).collect())
+}
+
+/// Evaluates points along the tangent of one, and the eigenvalues of H there.
+pub(super) struct Search<'s, 'a> {
+    pub equations: &'s mut Equations<'a>,
+    pub from: &'s Point,
+    pub soft: &'s [Field],
+    /// The parameter of a fold is known better than its shape.
+    pub exactly: bool,
+}
+
+pub(super) struct Evaluated {
+    sample: Sample,
+    pub eigenvalues: Vec<f64>,
+    /// Eigenvectors of H, in the order of the eigenvalues.
+    vectors: Vec<Vec<f64>>,
+}
+
+/// A parameter's work on a mode, relative to the largest possible, below which it is rounding.
+const FORCED: f64 = 1e-6;
+
+impl Search<'_, '_> {
+    pub fn at(&mut self, distance: f64) -> Result<Evaluated, Stuck> {
+        let (equations, tangent) = (&mut *self.equations, &self.from.tangent);
+        let moved = equations.moved(&self.from.solution(), tangent, distance)?;
+        let border = equations.momenta(self.soft);
+        let sample = equations.bordered(moved, [tangent], &border, None, self.exactly)?;
+        let eigen = sample.solved.h.clone().symmetric_eigen();
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let vector = |&k: &usize| eigen.eigenvectors.column(k).iter().copied().collect();
+        Ok(Evaluated {
+            eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
+            vectors: order.iter().map(vector).collect(),
+            sample,
+        })
+    }
+
+    /// The zero of one eigenvalue by the Anderson-Bjorck method.
+    pub fn zero(
+        &mut self,
+        which: usize,
+        mut distance: [f64; 2],
+        mut value: [f64; 2],
+    ) -> Result<(f64, Critical), Stuck> {
+        let whole = distance[1] - distance[0];
+        let largest = larger(value[0].abs(), value[1].abs());
+        let mut slope = (value[1] - value[0]) / whole;
+        let mut best: Option<(f64, Evaluated)> = None;
+        let (mut last, mut last_value) = (distance[1], value[1]);
+        for _ in 0..EVALUATIONS {
+            let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
+            let next = self.at(at)?;
+            let now = next.eigenvalues[which];
+            let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
+            if (at - last).abs() > LOCAL * whole {
+                slope = (now - last_value) / (at - last);
+            }
+            let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
+            if least.is_none_or(|least| now.abs() <= least) {
+                best = Some((at, next));
+            }
+            if done {
+                break;
+            }
+            (last, last_value) = (at, now);
+            if now * value[1] < 0.0 {
+                distance[0] = distance[1];
+                value[0] = value[1];
+            } else {
+                let shrunk = 1.0 - now / value[1];
+                value[0] *= if shrunk > 0.0 { shrunk } else { 0.5 };
+            }
+            (distance[1], value[1]) = (at, now);
+        }
+        let (at, best) = best.ok_or(Stuck::NotConverged)?;
+        let params = best.sample.solution.params;
+        let stiffest = self.equations.stiffest_condensed(params)?;
+        let rounding = eigenvalue_rounding(stiffest, self.from.state.segments());
+        let least = best.eigenvalues[which].abs();
+        let vanishes = least <= larger(CONTINUOUS * largest, ROUNDINGS * rounding);
+        if !vanishes {
+            return Err(Stuck::NotConverged);
+        }
+        Ok((at, self.critical(best, which, slope)))
+    }
+
+    /// The critical point from what was evaluated at a zero.
+    fn critical(&self, zero: Evaluated, which: usize, slope: f64) -> Critical {
+        let (vector, sample) = (&zero.vectors[which], zero.sample);
+        let mode = combined(vector, &sample.solved.modes);
+        let norm = self.equations.product(&mode, &mode).sqrt();
+        let parts = vector.iter().zip(&sample.solved.rates[0].multipliers);
+        let forcing: f64 = parts.map(|(v, d)| v * d).sum();
+        let rate = &sample.rates[0];
+        let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
+        let fold = forcing.abs() > FORCED * most.max(slope.abs());
+        Critical {
+            kind: if fold { Kind::Fold } else { Kind::Branching },
+            rounding: if fold {
+                sample.noise / forcing.abs()
+            } else {
+                0.0
+            },
+            state: sample.solution.state,
+            fraction: sample.solution.params[0],
+            tangent: self.from.tangent.clone(),
+            indices: [self.from.index; 2],
+            modes: vec![times(&mode, 1.0 / norm)],
+            soft: self.soft.to_vec(),
+            which,
+            slope,
+        }
+    }
+}
+
+impl Critical {
+    /// Whether the index does not change along the branch: see [`crate::branch::critical`].
+    pub fn is_vertex(&self) -> bool {
+        self.indices[0] == self.indices[1]
+    }
+
+    /// Whether this is the same point, found again after a step that the walk gave up.
+    pub fn is_at(&self, other: &Critical) -> bool {
+        let apart = self.state.shift_to(&other.state);
+        larger(apart, (self.fraction - other.fraction).abs()) < REPEATED
+    }
+
+    /// The same critical point on another grid or of a softened matrix, by a secant method from
+    /// the known state.
+    pub fn relocated(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
+        let from = Point {
+            state: self.state.clone(),
+            fraction: self.fraction,
+            tangent: self.tangent.clone(),
+            index: self.indices[0],
+            iterations: 0,
+        };
+        let mut search = Search {
+            equations,
+            from: &from,
+            soft: &self.soft,
+            exactly: self.kind == Kind::Fold,
+        };
+        let least = match self.kind {
+            // Shorter steps follow the rounding of the eigenvalue, and the parameter of a fold
+            // depends on their squares.
+            Kind::Fold => {
+                let stiffest = search.equations.stiffest_condensed([self.fraction])?;
+                let rounding = eigenvalue_rounding(stiffest, self.state.segments());
+                (rounding / self.slope.abs()).max(ACCURACY)
+            }
+            Kind::Branching => ACCURACY,
+        };
+        let (mut distance, mut slope) = (0.0, self.slope);
+        let mut best = search.at(distance)?;
+        let mut value = best.eigenvalues[self.which];
+        let mut worse = 0;
+        for _ in 0..EVALUATIONS {
+            let step = -value / slope;
+            if !step.is_finite() || step.abs() > 1.0 {
+                return Err(Stuck::NotConverged);
+            }
+            let next = search.at(distance + step)?;
+            let after = next.eigenvalues[self.which];
+            if step.abs() > LOCAL {
+                slope = (after - value) / step;
+            }
+            (distance, value) = (distance + step, after);
+            match after.abs() < best.eigenvalues[self.which].abs() {
+                true => best = next,
+                false => worse += 1,
+            }
+            if step.abs() < least || worse > 1 {
+                break;
+            }
+        }
+        Ok(Critical {
+            kind: self.kind,
+            indices: self.indices,
+            ..search.critical(best, self.which, slope)
+        })
+    }
+
+    /// The equilibrium at a distance from it along a direction, in the plane normal to that.
+    pub fn beside(
+        &self,
+        equations: &mut Equations,
+        to: &Direction,
+        distance: f64,
+    ) -> Result<Point, Stuck> {
+        let [fraction] = to.further([self.fraction], distance);
+        let state = equations.advanced(&self.state, [fraction], &to.increments, distance)?;
+        equations.correct(&state, fraction, Some(to))
+    }
+
+    /// Derivative of the eigenvalue with respect to the parameter; infinite at a fold, where the
+    /// parameter has no first-order error.
+    pub fn steepness(&self) -> f64 {
+        match self.kind {
+            Kind::Fold => f64::INFINITY,
+            Kind::Branching => (self.slope / self.tangent.params[0]).abs(),
+        }
+    }
+
+    /// A direction along which another branch may leave: the first neutral mode
+    /// orthogonalised against this branch; at the vertex of a pitchfork the tangent, that of the
+    /// other branch.
+    pub fn across(&self, equations: &Equations) -> Direction {
+        if self.is_vertex() {
+            return self.tangent.clone();
+        }
+        let mode = &self.modes[0];
+        let part = equations.product(&self.tangent.increments, mode);
+        equations.normalised(Direction {
+            increments: plus(mode, -part, &self.tangent.increments),
+            params: [-part * self.tangent.params[0]],
+        })
+    }
+}
+
+/// Distances (arclength) from the vertex of a pitchfork between which the branch that crosses there
+/// is searched for its singular point.
+const BESIDE: [f64; 3] = [0.01, 0.003, 0.001];
+
+/// The crossing is that of the vertex if it is within this part of the step from where a cubic
+/// through the points on either side has it.
+const NEAR: f64 = 0.1;
+
+/// The point at which a branch turns back because it crosses another one there, the vertex of a
+/// pitchfork: no eigenvalue changes its sign along this branch, but one does along the other, which
+/// goes on beyond the vertex. The points are on either side of the vertex, `step` apart; the
+/// tangent of the result is that of the other branch. Fails if that is not found.
+pub fn crossing_at_vertex(
+    equations: &mut Equations,
+    a: &Point,
+    b: &Point,
+    step: f64,
+) -> Result<Critical, Stuck> {
+    let vertex = vertex_between(equations, [a, b], step)?;
+    let soft = equations.soft_modes(&vertex, 1 + MORE)?;
+    let across = crossing_direction(equations, &vertex, &soft)?;
+    let mut stuck = Stuck::NotConverged;
+    for beside in BESIDE {
+        match crossing_beside(equations, (&vertex, &across), &soft, beside) {
+            Ok(mut critical) => {
+                let shift = vertex.state.shift_to(&critical.state);
+                let apart = larger(shift, (critical.fraction - vertex.fraction).abs());
+                if apart < NEAR * step && critical.kind == Kind::Branching {
+                    critical.indices = [a.index, b.index];
+                    return Ok(critical);
+                }
+            }
+            Err(other) => stuck = other,
+        }
+    }
+    Err(stuck)
+}
+
+/// The point between two others, `step` apart, at which the parameter of the cubic through them,
+/// with their tangents, is stationary.
+fn vertex_between(
+    equations: &mut Equations,
+    [a, b]: [&Point; 2],
+    step: f64,
+) -> Result<Point, Stuck> {
+    let rates = [a, b].map(|point| step * point.tangent.params[0]);
+    let chord = b.fraction - a.fraction;
+    // The derivative of the cubic, from one rate to the other.
+    let quadratic = 3.0 * (rates[0] + rates[1] - 2.0 * chord);
+    let linear = 6.0 * chord - 4.0 * rates[0] - 2.0 * rates[1];
+    let root = (linear * linear - 4.0 * quadratic * rates[0])
+        .max(0.0)
+        .sqrt();
+    let part = -2.0 * rates[0] / (linear + root.copysign(linear));
+    let hermite = [
+        part * part * (3.0 - 2.0 * part),
+        part * (1.0 - part) * (1.0 - part),
+        -part * part * (1.0 - part),
+    ];
+    let mut increments = times(
+        &between(&a.state, &b.state, equations.first_node()),
+        hermite[0],
+    );
+    add(&mut increments, step * hermite[1], &a.tangent.increments);
+    add(&mut increments, step * hermite[2], &b.tangent.increments);
+    let fraction = a.fraction + hermite[0] * chord + hermite[1] * rates[0] + hermite[2] * rates[1];
+    Ok(Point {
+        state: equations.advanced(&a.state, [fraction], &increments, 1.0)?,
+        fraction,
+        ..a.clone()
+    })
+}
+
+/// The direction in which the other branch leaves the vertex of a pitchfork, to growing values of
+/// the parameter: that in which the neutral mode, the tangent of this branch, is not excited.
+fn crossing_direction(
+    equations: &mut Equations,
+    vertex: &Point,
+    soft: &[Field],
+) -> Result<Direction, Stuck> {
+    let solution = vertex.solution();
+    let border = equations.momenta(soft);
+    let rates = equations.rates(&solution, false)?;
+    let solved = equations.sample(solution, &border, rates, false)?.solved;
+    let eigen = solved.h.clone().symmetric_eigen();
+    let neutral = eigen.eigenvalues.map(f64::abs).imin();
+    let mut increments = solved.rates[0].increments.clone();
+    for (k, vector) in eigen.eigenvectors.column_iter().enumerate() {
+        if k != neutral {
+            let parts = vector.iter().zip(&solved.rates[0].multipliers);
+            let forcing: f64 = parts.map(|(v, d)| v * d).sum();
+            let part = -forcing / eigen.eigenvalues[k];
+            let parts: Vec<f64> = vector.iter().map(|v| part * v).collect();
+            add(&mut increments, 1.0, &combined(&parts, &solved.modes));
+        }
+    }
+    Ok(equations.normalised(Direction {
+        increments,
+        params: [1.0],
+    }))
+}
+
+/// The singular point of a branch that has this direction at a vertex, at most so far from that.
+fn crossing_beside(
+    equations: &mut Equations,
+    (vertex, across): (&Point, &Direction),
+    soft: &[Field],
+    beside: f64,
+) -> Result<Critical, Stuck> {
+    let border = equations.momenta(soft);
+    let moved = equations.moved(&vertex.solution(), across, -beside)?;
+    let sample = equations.bordered(moved, [across], &border, None, false)?;
+    let from = Point {
+        state: sample.solution.state,
+        fraction: sample.solution.params[0],
+        tangent: across.clone(),
+        ..vertex.clone()
+    };
+    let mut search = Search {
+        equations,
+        from: &from,
+        soft,
+        exactly: false,
+    };
+    let ends = [0.0, 2.0 * beside];
+    let [before, after] = [search.at(ends[0])?, search.at(ends[1])?];
+    let values = before.eigenvalues.iter().zip(&after.eigenvalues);
+    let values: Vec<[f64; 2]> = values.map(|(a, b)| [*a, *b]).collect();
+    let changing: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k][0] * values[k][1] < 0.0)
+        .collect();
+    // Eigenvalues of other modes keep their signs.
+    match changing[..] {
+        [which] => Ok(search.zero(which, ends, values[which])?.1),
+        _ => Err(Stuck::NotConverged),
+    }
+}

@@ -1,0 +1,456 @@
+//! Leaves that differ in one parameter, or in two.
+//!
+//! A small cache of values that are expensive to compute, and that of sparsity patterns.
+//!
+//! States of leaves that vary: the forces on them, the derivatives of these, and the states
+//! to which increments lead.
+
+use crate::branch::{plus, times};
+use crate::leaf::{DirectSolver, DiscreteLeaf, Field, Grid, Leaf, Scale, State, System};
+use crate::run::Limit;
+use crate::scenario::Scenario;
+use glam::DVec3;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Up to this stiffness in stretch and shear, in units of A/L^2, the matrix is that of the leaf:
+/// tangents and signs of eigenvalues are exact. The forces of stiffer, nearly rigid segments are
+/// condensed out with a lower one, `CONDENSING`: near singular points a larger one loses digits.
+pub(super) const STIFFEST: f64 = 1e7;
+
+const CONDENSING: f64 = 1e5;
+
+/// The value at a fraction of a range, or of that of its logarithm.
+pub fn between([from, to]: [f64; 2], log: bool, fraction: f64) -> f64 {
+    match log {
+        true => from * (to / from).powf(fraction),
+        false => from + (to - from) * fraction,
+    }
+}
+
+/// Fractions within this of an end of the range are at the end.
+const EXACT: f64 = 1e-12;
+
+/// Makes the scenario at values of the parameters.
+type Make<'a, const N: usize> = &'a (dyn Fn([f64; N]) -> Result<Scenario, String> + Sync);
+
+/// A leaf for all values of N parameters.
+#[derive(Clone)]
+pub struct Family<'a, const N: usize = 1> {
+    make: Make<'a, N>,
+    ranges: [Range; N],
+    /// The first leaf, in whose units all are.
+    first: Leaf,
+    /// A leaf with coupled veins, if there is one at an end of a range.
+    coupled: Leaf,
+    /// Sparsity patterns of their matrices.
+    pub patterns: Arc<Patterns>,
+    /// When branches of these leaves are followed no further: every Newton iteration checks it.
+    pub limit: Limit,
+}
+
+/// The range of a parameter.
+#[derive(Clone, Copy)]
+pub struct Range {
+    /// Values at the fractions 0 and 1.
+    pub ends: [f64; 2],
+    /// Whether fractions are those of the logarithm of the value.
+    pub log: bool,
+}
+
+impl Range {
+    /// The value at a fraction.
+    fn value(self, fraction: f64) -> f64 {
+        // At an end, rounding must not lead beyond: there may be no leaf.
+        match fraction {
+            part if part.abs() < EXACT => self.ends[0],
+            part if (part - 1.0).abs() < EXACT => self.ends[1],
+            part => between(self.ends, self.log, part),
+        }
+    }
+
+    /// The fraction at a value.
+    pub fn fraction(self, value: f64) -> f64 {
+        let [from, to] = self.ends;
+        match self.log {
+            true => (value / from).ln() / (to / from).ln(),
+            false => (value - from) / (to - from),
+        }
+    }
+}
+
+/// A value of the parameter that no leaf can have, with the message of the scenario.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct OutOfRange(pub String);
+
+impl<'a> Family<'a> {
+    /// The leaves given by `make`, for values of the parameter in this range, in the units of the
+    /// first.
+    pub fn new(make: Make<'a, 1>, ends: [f64; 2], log: bool) -> Result<Self, OutOfRange> {
+        let scale = make([ends[0]]).map_err(OutOfRange)?.scale();
+        Family::of(make, [Range { ends, log }], scale, ends.map(|end| [end]))
+    }
+
+    /// The parameter at a fraction of its range.
+    pub fn value(&self, fraction: f64) -> f64 {
+        self.values([fraction])[0]
+    }
+}
+
+impl<'a> Family<'a, 2> {
+    /// The leaves given by `make`, for values of two parameters in these ranges, in the units of
+    /// that at the start of the first and at `start` of the second.
+    pub fn plane(make: Make<'a, 2>, ranges: [Range; 2], start: f64) -> Result<Self, OutOfRange> {
+        let [[from, to], [low, high]] = ranges.map(|range| range.ends);
+        let scale = make([from, start]).map_err(OutOfRange)?.scale();
+        let ends = [[from, start], [to, start], [from, low], [from, high]];
+        Family::of(make, ranges, scale, ends)
+    }
+
+    /// Leaves of the same kind, in the same units, along a path with the parameter 0 to 1.
+    pub fn along_path<'b>(&self, make: Make<'b, 1>) -> Result<Family<'b>, OutOfRange> {
+        let (ends, log) = ([0.0, 1.0], false);
+        let family = Family::of(make, [Range { ends, log }], self.scale(), [[0.0], [1.0]])?;
+        Ok(Family {
+            patterns: self.patterns.clone(),
+            limit: self.limit.clone(),
+            ..family
+        })
+    }
+}
+
+impl<'a, const N: usize> Family<'a, N> {
+    /// In these units, with leaves at these values of the parameters.
+    fn of<const ENDS: usize>(
+        make: Make<'a, N>,
+        ranges: [Range; N],
+        scale: Scale,
+        ends: [[f64; N]; ENDS],
+    ) -> Result<Self, OutOfRange> {
+        let leaf = |values| {
+            let scenario = make(values).map_err(OutOfRange)?;
+            Ok(Leaf::in_units(Arc::new(scenario), scale))
+        };
+        let ends: Vec<Leaf> = ends.into_iter().map(leaf).collect::<Result<_, _>>()?;
+        let is_coupled =
+            |leaf: &&Leaf| (1..leaf.rods()).any(|g| leaf.coupling(g - 1) != DVec3::ZERO);
+        let coupled = ends.iter().find(is_coupled);
+        Ok(Family {
+            make,
+            ranges,
+            coupled: coupled.unwrap_or(&ends[1]).clone(),
+            first: ends[0].clone(),
+            patterns: Arc::default(),
+            limit: Limit::default(),
+        })
+    }
+
+    /// The same leaves, whose branches are followed until this limit is reached.
+    pub fn with_limit(self, limit: Limit) -> Self {
+        Family { limit, ..self }
+    }
+
+    /// The units of all its leaves.
+    pub fn scale(&self) -> Scale {
+        self.first.scale
+    }
+
+    /// Tips of all rods in the scenario's units: the shared one alone, or each.
+    pub fn tips(&self, tips: &[DVec3]) -> Vec<DVec3> {
+        let count = if self.first.joined() { 1 } else { tips.len() };
+        let tips = tips.iter().take(count);
+        tips.map(|tip| *tip * self.scale().length).collect()
+    }
+
+    /// Centerlines of a state in the scenario's units, one per rod.
+    pub fn curves(&self, state: &State) -> Vec<Vec<DVec3>> {
+        let length = self.scale().length;
+        let rods = state.x.chunks(state.segments() + 1);
+        rods.map(|rod| rod.iter().map(|x| *x * length).collect())
+            .collect()
+    }
+
+    /// The leaf at the start of the ranges.
+    pub fn first(&self) -> &Leaf {
+        &self.first
+    }
+
+    /// Values of the parameters at fractions of their ranges.
+    pub fn values(&self, params: [f64; N]) -> [f64; N] {
+        std::array::from_fn(|i| self.ranges[i].value(params[i]))
+    }
+
+    /// The scenario at fractions.
+    pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
+        (self.make)(self.values(params)).map_err(OutOfRange)
+    }
+
+    /// The leaf at fractions.
+    pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
+        Ok(Leaf::in_units(
+            Arc::new(self.scenario(params)?),
+            self.scale(),
+        ))
+    }
+
+    /// A system of equations for all its leaves on a grid.
+    pub fn system(&self, grid: &Grid) -> System {
+        System::new(&discretised(&self.coupled, grid, None))
+    }
+}
+
+/// A leaf on a grid, if requested softened: see [`Leaves::softened`].
+fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
+    let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+    for section in &mut discrete.sections {
+        section.condensing = match softening {
+            Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
+            None => {
+                let exact = section.compliance.cmpge(DVec3::splat(1.0 / STIFFEST));
+                let least = section.condensing.min(DVec3::splat(CONDENSING));
+                DVec3::select(exact, section.condensing, least)
+            }
+        };
+    }
+    discrete
+}
+
+/// The same, with the sections of another leaf on this grid if its rods are the same.
+fn discretised_as(
+    other: Option<&DiscreteLeaf>,
+    leaf: &Leaf,
+    grid: &Grid,
+    softening: Option<f64>,
+) -> DiscreteLeaf {
+    let copied = other.and_then(|other| other.with_same_rods(leaf));
+    copied.unwrap_or_else(|| discretised(leaf, grid, softening))
+}
+
+/// Leaves of a family on one grid. The last few are cached: iterations
+/// return to them, and making a scenario costs more than assembling a small leaf.
+pub struct Leaves<'a, const N: usize = 1> {
+    pub family: &'a Family<'a, N>,
+    pub grid: Grid,
+    softening: Option<f64>,
+    cache: LruCache<[f64; N], DiscreteLeaf, CACHED_LEAVES>,
+}
+
+/// Number of cached leaves: those of differences over two parameters, and one more.
+const CACHED_LEAVES: usize = 6;
+
+impl<'a, const N: usize> Leaves<'a, N> {
+    pub fn new(family: &'a Family<'a, N>, grid: Grid) -> Self {
+        Leaves {
+            family,
+            grid,
+            softening: None,
+            cache: LruCache::default(),
+        }
+    }
+
+    /// The same, the matrices being those of leaves with this additional
+    /// compliance in stretch and shear (in units of L^2/A), equilibria
+    /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
+    /// the point at which they become neutral is analytic in the softening, and can be
+    /// extrapolated to zero softening.
+    pub fn softened(family: &'a Family<'a, N>, grid: Grid, softening: f64) -> Self {
+        Leaves {
+            softening: Some(softening),
+            ..Leaves::new(family, grid)
+        }
+    }
+
+    /// The same on the grid with all segments halved.
+    pub fn refined(&self) -> Self {
+        let (grid, softening) = (self.grid.refined(), self.softening);
+        let finer = |before: Option<&DiscreteLeaf>, coarse: &DiscreteLeaf| {
+            discretised_as(before, &coarse.leaf, &grid, softening)
+        };
+        Leaves {
+            cache: self.cache.map(finer),
+            family: self.family,
+            grid,
+            softening,
+        }
+    }
+
+    /// The leaf at these parameters, as fractions of their ranges.
+    pub fn at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
+        let (family, grid, softening) = (self.family, &self.grid, self.softening);
+        self.cache.at(params, |last| {
+            Ok(discretised_as(last, &family.leaf(params)?, grid, softening))
+        })
+    }
+}
+
+/// Puts the bases of all rods where the leaf holds them, and held tips where it holds them.
+pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
+    leaf.hold(state);
+    for j in 0..leaf.rods() {
+        let base = state.base(j);
+        let (x, q) = leaf.leaf.base(j);
+        state.x[base] = x;
+        if !leaf.leaf.hinged() {
+            state.q[base] = q;
+        }
+    }
+}
+
+/// At most `MOST` values by key, the most recently used first.
+pub struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
+
+impl<K, V, const MOST: usize> Default for LruCache<K, V, MOST> {
+    fn default() -> Self {
+        LruCache(VecDeque::new())
+    }
+}
+
+impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
+    /// The value of a key, computed by `make` if it is not cached; this takes the value that was
+    /// used last.
+    pub fn at<E>(
+        &mut self,
+        key: K,
+        make: impl FnOnce(Option<&V>) -> Result<V, E>,
+    ) -> Result<&V, E> {
+        let known = self.0.iter().position(|(other, _)| *other == key);
+        let found = match known.and_then(|index| self.0.remove(index)) {
+            Some((_, value)) => value,
+            None => make(self.0.front().map(|(_, value)| value))?,
+        };
+        self.0.truncate(MOST - 1);
+        self.0.push_front((key, found));
+        Ok(&self.0[0].1)
+    }
+
+    /// Values derived from these, under the same keys; `other` takes the one made before, too.
+    pub fn map(&self, other: impl Fn(Option<&V>, &V) -> V) -> Self {
+        let mut mapped = VecDeque::with_capacity(self.0.len());
+        for (key, value) in &self.0 {
+            let made = other(mapped.back().map(|(_, before)| before), value);
+            mapped.push_back((*key, made));
+        }
+        LruCache(mapped)
+    }
+}
+
+/// Number of cached patterns: five grids, bordered and unbordered.
+const CACHED_SYSTEMS: usize = 10;
+
+/// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
+/// equally many segments, and ordering it takes as long as factorising a matrix.
+#[derive(Default)]
+pub struct Patterns(Mutex<LruCache<Shape, Arc<DirectSolver>, CACHED_SYSTEMS>>);
+
+/// What determines the pattern of a system: its segments, whether its rods are coupled, and
+/// the number of border rows.
+type Shape = (usize, bool, usize);
+
+impl Patterns {
+    /// The pattern of a system with `border` border rows; `None` if memory is short.
+    pub fn of(&self, system: &System, border: usize) -> Option<Arc<DirectSolver>> {
+        let shape = (system.segments(), system.coupled(), border);
+        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = |_: Option<&_>| DirectSolver::bordered(system, border).map(Arc::new);
+        cache.at(shape, made).ok().cloned()
+    }
+}
+
+/// Step of central differences of forces, as a part of the parameter's range: truncation
+/// error and rounding error are both about 1e-10.
+const DIFFERENCE: f64 = 1e-5;
+
+/// A value after and before the present one of a parameter, for a central difference; `value`
+/// takes the distance from it. At an end of the range, where there may be no leaf beyond, the
+/// present one takes the place of that.
+pub fn both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T; 2], E> {
+    let sides = [DIFFERENCE, -DIFFERENCE];
+    let [after, before] = sides.map(|step| value(step).or_else(|_| value(0.0)));
+    Ok([after?, before?])
+}
+
+/// Derivative of the forces with respect to a parameter, by central differences; `forces` takes
+/// the distance from the present value of the parameter.
+pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field, E> {
+    let at = |step: f64| Ok((step, forces(step)?));
+    let [(after, forces_after), (before, forces_before)] = both_sides(at)?;
+    let rate = plus(&forces_after, -1.0, &forces_before);
+    Ok(times(&rate, 1.0 / (after - before)))
+}
+
+/// The largest stiffness in stretch and shear with which segment forces are condensed out.
+pub fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
+    let stiffnesses = leaf.sections.iter().map(|it| it.condensing.max_element());
+    stiffnesses.fold(0.0, f64::max)
+}
+
+/// Rounding error of an eigenvalue of the matrix of a leaf of this largest stiffness.
+pub fn eigenvalue_rounding(stiffest: f64, segments: usize) -> f64 {
+    f64::EPSILON * stiffest * (segments as f64).powi(2)
+}
+
+/// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
+pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
+    let mut moved = state.clone();
+    clamp(leaf, &mut moved);
+    leaf.assemble_forces(&moved, system);
+    system.rhs()
+}
+
+/// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
+/// segments at a clamp depend on all of its displacement, however short the step. The segments
+/// change by `law_forces` in addition (none if empty).
+pub fn advanced(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    (increments, law_forces): (&Field, &[DVec3]),
+    step: f64,
+) -> State {
+    let mut clamped = state.clone();
+    clamp(leaf, &mut clamped);
+    let mut next = clamped.clone();
+    if clamped.x == state.x && clamped.q == state.q {
+        // The rounding error in the lengths of nearly rigid segments is scaled down
+        // with the step.
+        system.set_completed(increments, law_forces);
+        leaf.advance(state, system, step, &mut next);
+        return next;
+    }
+    let mut increments = times(increments, step);
+    let law_forces: Vec<DVec3> = law_forces.iter().map(|force| step * *force).collect();
+    for (j, i) in leaf.each(leaf.moving_nodes()) {
+        let [turns, shifts] = leaf.moves(j, i);
+        let increment = &mut increments[j][i - leaf.first_node()];
+        if !shifts {
+            increment[3..].fill(0.0);
+        }
+        if !turns {
+            increment[..3].fill(0.0);
+        }
+    }
+    system.set_completed(&increments, &law_forces);
+    leaf.advance(&clamped, system, 1.0, &mut next);
+    next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_needed_last_is_not_made_again() {
+        let mut lru_cache = LruCache::<i32, i32, 2>::default();
+        let mut made = Vec::new();
+        for key in [1, 2, 1, 3, 1, 2] {
+            let value = lru_cache.at(key, |_| {
+                made.push(key);
+                Ok::<_, ()>(10 * key)
+            });
+            assert_eq!(value, Ok(&(10 * key)));
+        }
+        assert_eq!(made, [1, 2, 3, 2]);
+        assert_eq!(lru_cache.at(4, |_| Err("none")), Err("none"));
+    }
+}

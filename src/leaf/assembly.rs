@@ -1,0 +1,621 @@
+//! Assembly of a discretised leaf: unbalanced forces, matrix, energy.
+//!
+//! The loops over the segments of a group of rods.
+//!
+//! The first-order response of a leaf to jumps of the fields along its rods.
+
+use crate::leaf::block_tridiagonal::{Increments, TURNS, group_and_lane, lanes_of};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
+use crate::leaf::state::{State, add};
+use crate::leaf::system::{Group, Sums, System, each_group, rods_of};
+use crate::numbers::{larger, largest};
+use crate::rod::{Blocks, Element, Nodes, Section, Sections, Segment, UNKNOWNS, on_nodes};
+use crate::rotation::{Quaternions, exp_each, multiply_each};
+use crate::simd::{Four, GROUP, Kernel, Lanes, Vectors, run};
+use glam::{DMat3, DQuat, DVec3};
+use pulp::Simd;
+use rayon::prelude::*;
+use std::ops::Range;
+
+impl DiscreteLeaf {
+    /// Assembles matrix and right-hand side of Newton's equations into
+    /// `system`.
+    pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
+        self.assemble_with::<true>(state, system)
+    }
+
+    /// Assembles the right-hand side alone; the matrix is unchanged.
+    pub fn assemble_forces(&self, state: &State, system: &mut System) -> Sums {
+        self.assemble_with::<false>(state, system)
+    }
+
+    fn assemble_with<const MATRIX: bool>(&self, state: &State, system: &mut System) -> Sums {
+        let arch = system.arch;
+        system.law_forces.clear();
+        each_group(system.parallel, &mut system.groups, |g, group| {
+            let rods = Rods::new(self, state, g);
+            run(arch, &mut Assemble::<MATRIX> { rods, group });
+        });
+        let mut total = Sums {
+            energy: self.add_tissue(state, system, MATRIX)
+                + self.add_own_loads(state, system)
+                + self.base_energy(state),
+            turn: 0.0,
+        };
+        self.add_moments(system);
+        each_group(system.parallel, &mut system.groups, |g, group| {
+            for j in rods_of(g, self.rods()) {
+                self.clear_held_components(j, &mut group.rhs);
+                if MATRIX {
+                    self.hold_components(j, &mut group.matrix);
+                }
+            }
+        });
+        if MATRIX && self.tied() {
+            self.hold_across(system);
+        }
+        for group in &system.groups {
+            total.energy += group.sums.energy;
+            total.turn = larger(total.turn, group.sums.turn);
+        }
+        total
+    }
+
+    /// Assembles the right-hand side for the first-order change if the rods had no compliance
+    /// in the components `dropped` (ones and zeros).
+    pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
+        let arch = system.arch;
+        each_group(system.parallel, &mut system.groups, |g, group| {
+            let rods = Rods::new(self, state, g);
+            let mut kernel = Stiffen {
+                rods,
+                dropped,
+                group,
+            };
+            run(arch, &mut kernel);
+        });
+        for j in 0..self.rods() {
+            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
+        }
+    }
+
+    /// Subtracts `times` the excess stiffness of the elements against rotations of their nodes
+    /// from an assembled matrix.
+    pub fn subtract_excess_stiffness(&self, state: &State, system: &mut System, times: f64) {
+        let n = self.segments();
+        let excess = |j: usize, i: usize| {
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            0.5 * times * segment.excess_stiffness(self.section(j, i))
+        };
+        for j in 0..self.rods() {
+            let mut before = 0.0;
+            for i in 0..=n {
+                let after = if i < n { excess(j, i) } else { 0.0 };
+                if self.moves(j, i)[0] {
+                    let matrix = DMat3::from_diagonal(DVec3::splat(-before - after));
+                    system.add(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
+                }
+                before = after;
+            }
+        }
+    }
+
+    /// The state after `step` times the increments in `solution` (rod after
+    /// rod, all nodes with equations), written over `next`.
+    pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
+        next.clone_from(state);
+        if self.tied() {
+            self.advance_tissue(state, solution, step, next);
+        }
+        let (n, arch) = (self.segments(), solution.arch);
+        let (nodes, forces) = (GROUP * (n + 1), GROUP * n);
+        let advance = |(g, ((x, q), n)): (usize, ((&mut [_], &mut [_]), &mut [_]))| {
+            let rods = Rods::new(self, state, g);
+            let solution = &solution.groups[g].solution;
+            let mut kernel = Advance {
+                rods,
+                solution,
+                step,
+                x,
+                q,
+                n,
+            };
+            run(arch, &mut kernel);
+        };
+        match solution.parallel {
+            true => (next.x.par_chunks_mut(nodes))
+                .zip(next.q.par_chunks_mut(nodes))
+                .zip(next.n.par_chunks_mut(forces))
+                .enumerate()
+                .for_each(advance),
+            false => (next.x.chunks_mut(nodes))
+                .zip(next.q.chunks_mut(nodes))
+                .zip(next.n.chunks_mut(forces))
+                .enumerate()
+                .for_each(advance),
+        }
+        for (force, more) in next.n.iter_mut().zip(&solution.law_forces) {
+            *force += step * *more;
+        }
+    }
+
+    /// Largest unbalanced nodal force or moment, or violation of the
+    /// constitutive law (as length), of a state.
+    pub fn residual(&self, state: &State) -> f64 {
+        let n = self.segments();
+        let mut largest = 0.0_f64;
+        let mut tip = DVec3::ZERO;
+        for j in 0..self.rods() {
+            let turned = self.tissue_load(state, j, 0).moment + self.moment_on(0);
+            let (mut force, mut moment) = (DVec3::ZERO, turned);
+            for i in 0..n {
+                let segment = self.segment(state, j, i, state.n[j * n + i]);
+                let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
+                if i >= self.first_node() {
+                    let (forces, moments) = self.unbalanced_residual(j, force + g_x, moment - g_a);
+                    let [turned, held] = self.is_gripped(j, i);
+                    let forces = if held { 0.0 } else { forces };
+                    let moments = if turned { 0.0 } else { moments };
+                    largest = larger(largest, larger(forces, moments));
+                }
+                let load = self.load(state, j, i + 1);
+                force = load.force - g_x;
+                moment = load.moment + self.moment_on(i + 1) - g_b;
+                largest = larger(largest, component(segment.gap));
+            }
+            let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
+            // The holder balances the remaining force on a held tip.
+            let [turned, held] = self.is_gripped(j, n);
+            match &self.leaf.held {
+                _ if turned => continue,
+                _ if held => {}
+                Some(held) if held.clamps.is_some() => continue,
+                Some(_) => {}
+                None if self.leaf.joined() => tip += force,
+                None => largest = larger(largest, unbalanced_force),
+            }
+            largest = larger(largest, unbalanced_moment);
+        }
+        if self.leaf.mirrored {
+            tip.y = 0.0;
+        }
+        larger(largest, component(tip))
+    }
+
+    /// Potential energy of the loads and of the coupling at the bases: none where these are in the
+    /// origin.
+    fn base_energy(&self, state: &State) -> f64 {
+        let apart = |j: usize| state.x[state.base(j)] != DVec3::ZERO;
+        if !(0..self.rods()).any(apart) {
+            return 0.0;
+        }
+        let of = |j: usize| self.load(state, j, 0).energy - self.tissue_load(state, j, 0).energy;
+        (0..self.rods()).map(of).sum()
+    }
+
+    /// Potential energy of a state: elastic, of the coupling, and of the loads.
+    /// Dead moments on a rod have no potential and are left out.
+    pub fn energy(&self, state: &State) -> f64 {
+        let n = self.segments();
+        let mut energy = self.base_energy(state);
+        for (j, i) in self.each(0..1) {
+            energy += self.tissue_load(state, j, i).energy;
+        }
+        for j in 0..self.rods() {
+            for i in 0..n {
+                let segment = self.segment(state, j, i, state.n[j * n + i]);
+                energy +=
+                    self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).energy;
+            }
+        }
+        energy
+    }
+}
+
+/// The largest component of a vector.
+pub(super) fn component(vector: DVec3) -> f64 {
+    largest(vector.abs().to_array())
+}
+
+/// The rods of a group in a state; lanes without a rod repeat the last.
+pub struct Rods<'a> {
+    leaf: &'a DiscreteLeaf,
+    group: usize,
+    sections: [&'a [Section]; GROUP],
+    x: [&'a [DVec3]; GROUP],
+    q: [&'a [DQuat]; GROUP],
+    n: [&'a [DVec3]; GROUP],
+    /// Positions of the previous and the next rods, or their own if there is none.
+    beside: [[&'a [DVec3]; GROUP]; 2],
+    loads: GroupLoads,
+}
+
+impl<'a> Rods<'a> {
+    pub fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
+        let (n, last) = (leaf.segments(), leaf.rods() - 1);
+        let rods = lanes_of(group, leaf.rods());
+        let x = |j: usize| &state.x[state.base(j)..][..=n];
+        Rods {
+            leaf,
+            group,
+            sections: rods.map(|j| &leaf.sections[j * n..][..n]),
+            x: rods.map(x),
+            q: rods.map(|j| &state.q[state.base(j)..][..=n]),
+            n: rods.map(|j| &state.n[j * n..][..n]),
+            beside: [
+                rods.map(|j| x(j.saturating_sub(1))),
+                rods.map(|j| x((j + 1).min(last))),
+            ],
+            loads: group_loads(rods.map(|j| leaf.rod_load(j))),
+        }
+    }
+
+    #[inline(always)]
+    fn q<S: Simd>(&self, simd: S, i: usize, part: usize) -> Quaternions<S> {
+        let [a, b, c, d] = self.q;
+        let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
+        let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
+        let v = Vectors::gather(simd, [vector(a), vector(b), vector(c), vector(d)], part);
+        (v, Lanes::of(simd, &Four([a.w, b.w, c.w, d.w]), part))
+    }
+
+    #[inline(always)]
+    fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> Sections<S> {
+        let [a, b, c, d] = self.sections;
+        Sections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
+    }
+
+    /// Segment `i` of every rod, and its sections.
+    #[inline(always)]
+    fn element<S: Simd>(&self, simd: S, i: usize, part: usize) -> (Element<S>, Sections<S>) {
+        let nodes = Nodes {
+            x: [
+                gather(simd, self.x, i, part),
+                gather(simd, self.x, i + 1, part),
+            ],
+            q: [self.q(simd, i, part), self.q(simd, i + 1, part)],
+        };
+        let sections = self.sections(simd, i, part);
+        let n = gather(simd, self.n, i, part);
+        (Element::new(&sections, &nodes, n), sections)
+    }
+}
+
+/// Number `i` of the vectors of each lane.
+#[inline(always)]
+fn gather<S: Simd>(simd: S, of: [&[DVec3]; GROUP], i: usize, part: usize) -> Vectors<S> {
+    let [a, b, c, d] = of;
+    Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
+}
+
+/// Right-hand side and energy, and the matrix if requested.
+pub struct Assemble<'a, const MATRIX: bool> {
+    pub rods: Rods<'a>,
+    pub group: &'a mut Group,
+}
+
+impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let Group {
+            matrix,
+            rhs,
+            active,
+            sums,
+            ..
+        } = &mut *self.group;
+        let (rods, active) = (&self.rods, Lanes::of(simd, active, part));
+        let zero = Lanes::splat(simd, 0.0);
+        let loads = RodLoads::of(simd, &rods.loads, part);
+        let stiffness = loads.stiffness().array();
+        let (mut energy, mut squared_turn) = (zero, zero);
+        let (mut own, mut force) = ([[zero; UNKNOWNS]; UNKNOWNS], [zero; UNKNOWNS]);
+        let (n, first) = (rods.leaf.segments(), rods.leaf.first_node());
+        for i in 0..n {
+            let (element, sections) = rods.element(simd, i, part);
+            energy = energy + element.strain_energy(&sections);
+            squared_turn = squared_turn.larger(element.squared_turn());
+            let gradient = on_nodes(element.condensed(&sections));
+            if i >= first {
+                for r in 0..UNKNOWNS {
+                    let force = active * (force[r] - gradient[0][r]);
+                    force.put(&mut rhs[i - first][r], part);
+                }
+            }
+            if MATRIX {
+                let hessian = element.hessian(&sections);
+                if i >= first {
+                    for r in 0..UNKNOWNS {
+                        for c in r..UNKNOWNS {
+                            own[r][c] = own[r][c] + hessian.own[0][r][c];
+                        }
+                    }
+                    matrix.put(i - first, &own, Some(&hessian.across), active, part);
+                }
+                own = hessian.own[1];
+            }
+            let tip = i + 1 == n;
+            let weights = [
+                rods.leaf.grid.weight(i + 1),
+                rods.leaf.coupling_weight(i + 1),
+            ];
+            let [previous, next] = rods.beside;
+            let x = [
+                gather(simd, previous, i + 1, part),
+                gather(simd, rods.x, i + 1, part),
+                gather(simd, next, i + 1, part),
+            ];
+            let (load, potential) = loads.at(x, weights, tip);
+            energy = energy + potential;
+            let load = load.array();
+            let coupling_weight = Lanes::splat(simd, weights[1]);
+            for r in 0..UNKNOWNS {
+                force[r] = -gradient[1][r];
+                if r >= TURNS {
+                    let c = r - TURNS;
+                    force[r] = force[r] + load[c];
+                    own[r][r] = stiffness[c].mul_add(coupling_weight, own[r][r]);
+                }
+            }
+        }
+        for r in 0..UNKNOWNS {
+            (active * force[r]).put(&mut rhs[n - first][r], part);
+        }
+        if MATRIX {
+            matrix.put(n - first, &own, None, active, part);
+        }
+        if part == 0 {
+            *sums = Sums::default();
+        }
+        sums.energy += energy.where_positive(active, zero).sum();
+        sums.turn = larger(sums.turn, squared_turn.largest().sqrt());
+    }
+}
+
+/// The right-hand side of [`DiscreteLeaf::assemble_stiffening`].
+pub struct Stiffen<'a> {
+    pub rods: Rods<'a>,
+    pub dropped: DVec3,
+    pub group: &'a mut Group,
+}
+
+impl Kernel for Stiffen<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let Group { rhs, active, .. } = &mut *self.group;
+        let active = Lanes::of(simd, active, part);
+        let dropped = Vectors::splat(simd, self.dropped.to_array());
+        let none = [Lanes::splat(simd, 0.0); UNKNOWNS];
+        let (n, first) = (self.rods.leaf.segments(), self.rods.leaf.first_node());
+        let mut force = none;
+        for i in 0..=n {
+            let gradient = match i < n {
+                true => {
+                    let (element, sections) = self.rods.element(simd, i, part);
+                    on_nodes(element.stiffening(&sections, dropped))
+                }
+                false => [none; 2],
+            };
+            for r in 0..UNKNOWNS {
+                if i >= first {
+                    let force = active * (force[r] - gradient[0][r]);
+                    force.put(&mut rhs[i - first][r], part);
+                }
+                force[r] = -gradient[1][r];
+            }
+        }
+    }
+}
+
+/// The next state of a group, without clamped bases, which stay.
+pub struct Advance<'a> {
+    pub rods: Rods<'a>,
+    pub solution: &'a [Increments],
+    pub step: f64,
+    pub x: &'a mut [DVec3],
+    pub q: &'a mut [DQuat],
+    pub n: &'a mut [DVec3],
+}
+
+impl Kernel for Advance<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let step = Lanes::splat(simd, self.step);
+        let lanes = rods_of(self.rods.group, self.rods.leaf.rods()).len();
+        let lanes = part..lanes.min(part + S::F64_LANES);
+        let none = Vectors::splat(simd, [0.0; 3]);
+        let (mut turn, mut shift) = (none, none);
+        let segments = self.rods.leaf.segments();
+        let ahead = self.solution.len() - segments;
+        if ahead > 0 {
+            turn = vectors(simd, &self.solution[0], 0, part);
+            self.turn_bases(turn.scale(step), lanes.clone(), part);
+        }
+        for (i, increment) in self.solution[ahead..].iter().enumerate() {
+            let of = |c: usize| vectors(simd, increment, c, part);
+            let (turn_after, shift_after) = (of(0), of(3));
+            let rods = &self.rods;
+            let (element, sections) = rods.element(simd, i, part);
+            let turns = [turn, turn_after];
+            let change = element.force_increment(&sections, shift_after - shift, turns);
+            let n = change.mul_add(step, gather(simd, rods.n, i, part));
+            let x = shift_after.mul_add(step, gather(simd, rods.x, i + 1, part));
+            let turned = exp_each(turn_after.scale(step));
+            let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
+            let mut numbers = [Four::default(); 10];
+            let [n, x, q] = [n, x, q].map(Vectors::array);
+            for c in 0..3 {
+                n[c].put(&mut numbers[c], part);
+                x[c].put(&mut numbers[3 + c], part);
+                q[c].put(&mut numbers[6 + c], part);
+            }
+            qw.put(&mut numbers[9], part);
+            for lane in lanes.clone() {
+                let [n1, n2, n3, x1, x2, x3, q1, q2, q3, qw] = numbers.map(|four| four.0[lane]);
+                let node = lane * (segments + 1) + i + 1;
+                self.n[lane * segments + i] = DVec3::new(n1, n2, n3);
+                self.x[node] = DVec3::new(x1, x2, x3);
+                self.q[node] = DQuat::from_xyzw(q1, q2, q3, qw);
+            }
+            (turn, shift) = (turn_after, shift_after);
+        }
+    }
+}
+
+impl Advance<'_> {
+    /// Turns the bases, which hinges hold in their places.
+    #[inline(always)]
+    fn turn_bases<S: Simd>(&mut self, turn: Vectors<S>, lanes: Range<usize>, part: usize) {
+        let simd = turn.x.simd;
+        let (q, qw) = multiply_each(exp_each(turn), self.rods.q(simd, 0, part));
+        let mut numbers = [Four::default(); 4];
+        let [x, y, z] = q.array();
+        for (number, four) in [x, y, z, qw].into_iter().zip(&mut numbers) {
+            number.put(four, part);
+        }
+        let nodes = self.rods.leaf.segments() + 1;
+        for lane in lanes {
+            self.q[lane * nodes] = DQuat::from_array(numbers.map(|four| four.0[lane]));
+        }
+    }
+}
+
+/// The components of increments from `c` on.
+#[inline(always)]
+fn vectors<S: Simd>(simd: S, of: &Increments, c: usize, part: usize) -> Vectors<S> {
+    let [x, y, z] = [&of[c], &of[c + 1], &of[c + 2]];
+    Vectors::new(
+        Lanes::of(simd, x, part),
+        Lanes::of(simd, y, part),
+        Lanes::of(simd, z, part),
+    )
+}
+
+/// Jumps of a rod's position, rotation, force and moment at a node: the values before the
+/// node, seen from the base, minus those beyond it.
+pub type Jump = [DVec3; 4];
+
+/// A segment with its derivatives.
+pub struct Tangent {
+    /// The segment.
+    pub segment: Segment,
+    /// Derivatives of Pi with respect to its end position and the rotations of both nodes.
+    pub first: (DVec3, DVec3, DVec3),
+    /// Second derivatives, the force condensed out.
+    pub second: Blocks,
+}
+
+impl DiscreteLeaf {
+    /// Segment `i` of rod `j` with its derivatives.
+    pub fn tangent(&self, state: &State, j: usize, i: usize) -> Tangent {
+        let section = self.section(j, i);
+        let segment = self.segment(state, j, i, state.n[j * self.segments() + i]);
+        Tangent {
+            first: segment.gradient(section),
+            second: segment.hessian(section),
+            segment,
+        }
+    }
+
+    /// Assembles the right-hand side for the first-order change that removes the `jumps` of a
+    /// leaf, given rod after rod at the midpoints of equal parts; `tangents` are the segments
+    /// that begin there.
+    pub fn assemble_jumps(
+        &self,
+        tangents: &[Vec<Tangent>],
+        jumps: &[Vec<Jump>],
+        system: &mut System,
+    ) {
+        let (n, first) = (self.segments(), self.first_node());
+        let mut rhs = vec![vec![[0.0; 6]; self.moving_nodes().len()]; self.rods()];
+        for ((rhs, rod), tangents) in rhs.iter_mut().zip(jumps).zip(tangents) {
+            let part = n / rod.len();
+            for (k, (&[shift, turn, force, moment], tangent)) in
+                rod.iter().zip(tangents).enumerate()
+            {
+                // After the change the segment beyond the node begins where the one before it
+                // ends.
+                let i = k * part + part / 2;
+                let (second, (_, held, _)) = (&tangent.second, tangent.first);
+                let pull = second.xa * turn - second.xx * shift;
+                // A moment with fixed lab components does not rotate with its node.
+                let at_begin =
+                    second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
+                let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
+                add(&mut rhs[i - first], -at_begin - moment, pull - force);
+                add(&mut rhs[i + 1 - first], -at_end, -pull);
+            }
+        }
+        system.set_rhs(&rhs);
+        for j in 0..self.rods() {
+            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::{Grid, Leaf, Solved, shift};
+    use crate::scenario::Scenario;
+    use glam::DQuat;
+
+    const ROD: &str = r#"
+        name = "rod"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 2.0, bending_2 = 1.0, bending_3 = 1.0, axial = 40.0, shear_2 = 50.0, shear_3 = 60.0 }
+    "#;
+    const SEGMENTS: usize = 8;
+
+    /// The displacements of a straight rod at rest, from its first node on, due to a jump at
+    /// its midpoint.
+    fn displacements(jump: Jump) -> Vec<DVec3> {
+        let rod = Scenario::from_toml(ROD).unwrap();
+        let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(SEGMENTS, &[]));
+        let x = leaf.grid.sigma().iter().map(|&sigma| sigma * DVec3::X);
+        let state = State::new(SEGMENTS, x.collect(), vec![DQuat::IDENTITY; SEGMENTS + 1]);
+        let mut system = System::new(&leaf);
+        leaf.assemble(&state, &mut system);
+        assert!(system.factorize(0.0));
+        let tangent = leaf.tangent(&state, 0, SEGMENTS / 2);
+        leaf.assemble_jumps(&[vec![tangent]], &[vec![jump]], &mut system);
+        assert!(matches!(system.solve(None, 1e-12), Solved::Yes(_)));
+        system.solution()[0].iter().map(shift).collect()
+    }
+
+    fn assert_moved(jump: Jump, expected: impl Fn(f64) -> DVec3) {
+        for (i, found) in displacements(jump).into_iter().enumerate() {
+            let expected = expected((i + 1) as f64 / SEGMENTS as f64);
+            let off = (found - expected).length();
+            assert!(off < 1e-12, "{jump:?}, {i}: {found} for {expected}");
+        }
+    }
+
+    /// The part beyond the jump moves as a rigid body.
+    #[test]
+    fn behind_a_jump_the_free_part_follows() {
+        let zero = DVec3::ZERO;
+        let jump = DVec3::new(0.1, -0.2, 0.3);
+        let beyond = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
+        assert_moved([jump, zero, zero, zero], |sigma| beyond(sigma) * jump);
+        let turned = |sigma: f64| beyond(sigma) * jump.cross((sigma - 0.5) * DVec3::X);
+        assert_moved([zero, jump, zero, zero], turned);
+    }
+
+    /// Removing a jump of force or moment is equivalent to a load of that size at the
+    /// midpoint.
+    #[test]
+    fn before_a_jump_of_a_force_the_held_part_bends_back() {
+        let zero = DVec3::ZERO;
+        let axial = DVec3::new(0.7, 0.0, 0.0);
+        let pulled = |sigma: f64| -sigma.min(0.5) / 40.0 * axial;
+        assert_moved([zero, zero, axial, zero], pulled);
+        // A cantilever of half the length under a moment M at its end: M s^2/(2 A).
+        let moment = DVec3::new(0.0, 0.0, 0.6);
+        assert_moved([zero, zero, zero, moment], |sigma| {
+            let s = sigma.min(0.5);
+            -0.6 * (0.5 * s * s + (sigma - s) * s) * DVec3::Y
+        });
+    }
+}

@@ -1,0 +1,437 @@
+//! The matrices of a group of rods, one rod in each lane: every rod's block-tridiagonal matrix
+//! (chain), its factorisation, base to tip, and its triangular solves. Linear in the number of
+//! nodes.
+//!
+//! The unknowns of a node are (theta, dx). The last node's dx is either the rod's own, or belongs
+//! to the joint tip: then it is not eliminated, and its Schur complement is the rod's contribution
+//! to the tip's 3 x 3 matrix.
+//!
+//! The loops along the rods of a group.
+
+use crate::leaf::state::Increment;
+use crate::rod;
+use crate::rod::{Block, UNKNOWNS};
+use crate::simd::{Four, GROUP, Kernel, Lanes, run};
+use glam::DVec3;
+use pulp::{Arch, Simd};
+
+/// Increments of a node, or the forces dual to them, of all rods of a group.
+pub type Increments = [Four; 6];
+
+/// The increments of the rod in a lane.
+pub fn of_lane(increments: &Increments, lane: usize) -> Increment {
+    increments.map(|four| four.0[lane])
+}
+
+/// Writes the increments of the rod in a lane.
+pub fn set_lane(increments: &mut Increments, lane: usize, of_rod: &Increment) {
+    for (four, value) in increments.iter_mut().zip(of_rod) {
+        four.0[lane] = *value;
+    }
+}
+
+/// A block of a chain, rows first.
+pub type ChainBlock = [[f64; UNKNOWNS]; UNKNOWNS];
+
+/// Number of rotations among the unknowns of a node; they come first.
+pub const TURNS: usize = 3;
+
+/// Entries of the upper triangle of a block.
+const TRIANGLE: usize = UNKNOWNS * (UNKNOWNS + 1) / 2;
+
+/// The entries of a node: the triangle of its own block, then the block (i, i + 1), both rows first.
+type Entries = [Four; ENTRIES];
+
+const ENTRIES: usize = TRIANGLE + UNKNOWNS * UNKNOWNS;
+
+/// Position of the entry (r, c) of a triangle, r <= c.
+const fn upper(r: usize, c: usize) -> usize {
+    r * (2 * UNKNOWNS - r - 1) / 2 + c
+}
+
+/// Position of the entry (r, c) of a block (i, i + 1).
+const fn off(r: usize, c: usize) -> usize {
+    TRIANGLE + r * UNKNOWNS + c
+}
+
+/// The 3 x 3 matrix of a tip, rows first.
+pub type Tip = [[f64; 3]; 3];
+
+/// The matrices of a group of rods, nodes from the first with equations on (from 0), without the
+/// coupling to others, and their factorisations.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// Entries of all nodes.
+    matrix: Vec<Entries>,
+    /// L D L^T, with unit lower L: of every node L^T of its own block above the
+    /// diagonal and 1/d on it, then L^-1 times the block (i, i + 1).
+    factor: Vec<Entries>,
+    /// Number of eliminated unknowns of the last node: with a joint tip its rotations alone.
+    last: usize,
+}
+
+/// The contribution of the masses to a matrix: `shift` times the masses per weight, rotary and
+/// translational, times the nodes' weights.
+pub struct Masses<'a> {
+    pub shift: f64,
+    pub per_weight: [Four; 2],
+    pub weights: &'a [f64],
+}
+
+impl Chain {
+    /// Identity matrices, for rods with `nodes` nodes that have equations.
+    pub fn new(nodes: usize, joined: bool) -> Self {
+        let zeros = [Four::default(); ENTRIES];
+        let mut identity = zeros;
+        for k in 0..UNKNOWNS {
+            identity[upper(k, k)] = Four::splat(1.0);
+        }
+        Chain {
+            matrix: vec![identity; nodes],
+            factor: vec![zeros; nodes],
+            last: if joined { TURNS } else { UNKNOWNS },
+        }
+    }
+
+    fn nodes(&self) -> usize {
+        self.matrix.len()
+    }
+
+    /// Writes the upper triangle of the block of node `i` (from 0), and the block
+    /// between it and the next if there is one; identities in lanes without a rod.
+    #[inline(always)]
+    pub fn put<S: Simd>(
+        &mut self,
+        i: usize,
+        own: &rod::Block<S>,
+        next: Option<&rod::Block<S>>,
+        active: Lanes<S>,
+        part: usize,
+    ) {
+        let node = &mut self.matrix[i];
+        let zero = Lanes::splat(active.simd, 0.0);
+        let one = Lanes::splat(active.simd, 1.0);
+        for r in 0..UNKNOWNS {
+            let own_r = own[r][r].where_positive(active, one);
+            own_r.put(&mut node[upper(r, r)], part);
+            for c in r + 1..UNKNOWNS {
+                let own = own[r][c].where_positive(active, zero);
+                own.put(&mut node[upper(r, c)], part);
+            }
+            if let Some(next) = next {
+                for c in 0..UNKNOWNS {
+                    let next = next[r][c].where_positive(active, zero);
+                    next.put(&mut node[off(r, c)], part);
+                }
+            }
+        }
+    }
+
+    /// Entry (r, c) of the block of node `i` (from 0), r <= c.
+    pub fn diagonal(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
+        &mut self.matrix[i][upper(r, c)]
+    }
+
+    /// Entry (r, c) of the block between nodes `i` (from 0) and `i` + 1.
+    pub fn off(&mut self, i: usize, r: usize, c: usize) -> &mut Four {
+        &mut self.matrix[i][off(r, c)]
+    }
+
+    /// The block of node `i` (from 0) of the rod in a lane, its upper triangle, and
+    /// the one between it and the next.
+    pub fn blocks(&self, i: usize, lane: usize) -> (ChainBlock, ChainBlock) {
+        let node = &self.matrix[i];
+        let (mut own, mut next) = ([[0.0; UNKNOWNS]; UNKNOWNS], [[0.0; UNKNOWNS]; UNKNOWNS]);
+        for r in 0..UNKNOWNS {
+            for c in 0..UNKNOWNS {
+                next[r][c] = node[off(r, c)].0[lane];
+                if r <= c {
+                    own[r][c] = node[upper(r, c)].0[lane];
+                }
+            }
+        }
+        (own, next)
+    }
+
+    /// Factorises the matrices plus `masses`. False if a pivot is not positive or, with
+    /// `any_sign`, if one is zero.
+    pub fn factorize(&mut self, arch: Arch, masses: &Masses, any_sign: bool) -> bool {
+        let mut kernel = Factorize {
+            chain: self,
+            masses,
+            any_sign,
+            definite: true,
+        };
+        run(arch, &mut kernel);
+        kernel.definite
+    }
+
+    /// The contribution of the rod in a lane to the matrix of the joint tip.
+    pub fn tip(&self, lane: usize) -> Tip {
+        let node = &self.factor[self.nodes() - 1];
+        let entry = |r: usize, c: usize| node[upper(TURNS + r.min(c), TURNS + r.max(c))].0[lane];
+        std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
+    }
+
+    /// Forward substitution L y = b. With a joint tip the last dx slots of y then hold the
+    /// rods' contributions to the tip's right-hand side.
+    pub fn forward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) {
+        let chain = self;
+        run(arch, &mut Forward { chain, b, y });
+    }
+
+    /// Backward substitution in place, from the result of [`Chain::forward`]; with a joint tip
+    /// the last dx slots must hold its displacement. Returns b . y.
+    pub fn backward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) -> f64 {
+        let mut kernel = Backward {
+            chain: self,
+            b,
+            y,
+            product: Four::default(),
+        };
+        run(arch, &mut kernel);
+        kernel.product.sum()
+    }
+}
+
+/// Solves a symmetric 3 x 3 system by L D L^T; `None` if not positive definite.
+#[derive(Clone, Copy, Debug)]
+pub struct TipFactor(Tip);
+
+impl TipFactor {
+    pub fn new(mut a: Tip) -> Option<Self> {
+        for k in 0..3 {
+            if a[k][k].is_nan() || a[k][k] <= 0.0 {
+                return None;
+            }
+            let (row, inverse) = (a[k], 1.0 / a[k][k]);
+            for r in k + 1..3 {
+                for c in r..3 {
+                    a[r][c] -= row[r] * inverse * row[c];
+                }
+                a[k][r] = row[r] * inverse;
+            }
+            a[k][k] = inverse;
+        }
+        Some(TipFactor(a))
+    }
+
+    pub fn solve(&self, mut b: DVec3) -> DVec3 {
+        let u = &self.0;
+        b.y -= u[0][1] * b.x;
+        b.z -= u[0][2] * b.x + u[1][2] * b.y;
+        let z = b.z * u[2][2];
+        let y = b.y * u[1][1] - u[1][2] * z;
+        let x = b.x * u[0][0] - u[0][1] * y - u[0][2] * z;
+        DVec3::new(x, y, z)
+    }
+}
+
+/// Group and lane of rod `j`.
+pub fn group_and_lane(j: usize) -> (usize, usize) {
+    (j / GROUP, j % GROUP)
+}
+
+/// The rods of a group, lane by lane; lanes without a rod repeat the last.
+#[inline(always)]
+pub fn lanes_of(group: usize, rods: usize) -> [usize; GROUP] {
+    std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
+}
+
+/// See [`Chain::factorize`].
+pub struct Factorize<'a> {
+    pub chain: &'a mut Chain,
+    pub masses: &'a Masses<'a>,
+    pub any_sign: bool,
+    pub definite: bool,
+}
+
+impl Kernel for Factorize<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let shift = Lanes::splat(simd, self.masses.shift);
+        let mut masses = [zero; 2];
+        for k in 0..2 {
+            masses[k] = shift * Lanes::of(simd, &self.masses.per_weight[k], part);
+        }
+        let n = self.chain.nodes();
+        let mut schur = [[zero; UNKNOWNS]; UNKNOWNS];
+        for i in 0..n {
+            let node = &self.chain.matrix[i];
+            let factor = &mut self.chain.factor[i];
+            let weight = Lanes::splat(simd, self.masses.weights[i]);
+            let mut a = [[zero; UNKNOWNS]; UNKNOWNS];
+            for r in 0..UNKNOWNS {
+                for c in r..UNKNOWNS {
+                    a[r][c] = Lanes::of(simd, &node[upper(r, c)], part) - schur[r][c];
+                }
+            }
+            for k in 0..UNKNOWNS {
+                a[k][k] = masses[k / TURNS].mul_add(weight, a[k][k]);
+            }
+            // Rows above the diagonal become L^T, the diagonal 1/d.
+            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            let mut definite = one;
+            for k in 0..UNKNOWNS {
+                if k < count {
+                    let (row, d) = (a[k], a[k][k]);
+                    let test = if self.any_sign { d * d } else { d };
+                    definite = definite.where_positive(test, zero);
+                    let inverse = d.recip();
+                    for r in k + 1..UNKNOWNS {
+                        let l = row[r] * inverse;
+                        for c in r..UNKNOWNS {
+                            a[r][c] = l.neg_mul_add(row[c], a[r][c]);
+                        }
+                        a[k][r] = l;
+                    }
+                    a[k][k] = inverse;
+                }
+            }
+            if definite.smallest() != 1.0 {
+                self.definite = false;
+                return;
+            }
+            for r in 0..UNKNOWNS {
+                for c in r..UNKNOWNS {
+                    a[r][c].put(&mut factor[upper(r, c)], part);
+                }
+            }
+            if i + 1 < n {
+                schur = substitute(simd, &a, node, factor, part);
+            }
+        }
+    }
+}
+
+/// Writes w = L^-1 times the block (i, i + 1); returns the upper triangle of
+/// w^T D^-1 w.
+#[inline(always)]
+fn substitute<S: Simd>(
+    simd: S,
+    a: &Block<S>,
+    node: &Entries,
+    factor: &mut Entries,
+    part: usize,
+) -> Block<S> {
+    let zero = Lanes::splat(simd, 0.0);
+    let (mut w, mut schur) = ([[zero; UNKNOWNS]; UNKNOWNS], [[zero; UNKNOWNS]; UNKNOWNS]);
+    for r in 0..UNKNOWNS {
+        for c in 0..UNKNOWNS {
+            w[r][c] = Lanes::of(simd, &node[off(r, c)], part);
+        }
+    }
+    for k in 0..UNKNOWNS {
+        let row = w[k];
+        for r in k + 1..UNKNOWNS {
+            for c in 0..UNKNOWNS {
+                w[r][c] = a[k][r].neg_mul_add(row[c], w[r][c]);
+            }
+        }
+        for c in 0..UNKNOWNS {
+            row[c].put(&mut factor[off(k, c)], part);
+        }
+    }
+    for k in 0..UNKNOWNS {
+        for r in 0..UNKNOWNS {
+            let t = w[k][r] * a[k][k];
+            for c in r..UNKNOWNS {
+                schur[r][c] = t.mul_add(w[k][c], schur[r][c]);
+            }
+        }
+    }
+    schur
+}
+
+/// See [`Chain::forward`].
+pub struct Forward<'a> {
+    pub chain: &'a Chain,
+    pub b: &'a [Increments],
+    pub y: &'a mut [Increments],
+}
+
+impl Kernel for Forward<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let n = self.chain.nodes();
+        let mut y = [Lanes::splat(simd, 0.0); UNKNOWNS];
+        let mut before = y;
+        for i in 0..n {
+            for k in 0..UNKNOWNS {
+                y[k] = Lanes::of(simd, &self.b[i][k], part);
+            }
+            if i > 0 {
+                let w = &self.chain.factor[i - 1];
+                for k in 0..UNKNOWNS {
+                    for c in 0..UNKNOWNS {
+                        let w = Lanes::of(simd, &w[off(k, c)], part);
+                        y[c] = before[k].neg_mul_add(w, y[c]);
+                    }
+                }
+            }
+            let own = &self.chain.factor[i];
+            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            for k in 0..UNKNOWNS {
+                if k < count {
+                    for r in k + 1..UNKNOWNS {
+                        let l = Lanes::of(simd, &own[upper(k, r)], part);
+                        y[r] = y[k].neg_mul_add(l, y[r]);
+                    }
+                }
+            }
+            for k in 0..UNKNOWNS {
+                y[k].put(&mut self.y[i][k], part);
+                before[k] = y[k] * Lanes::of(simd, &own[upper(k, k)], part);
+            }
+        }
+    }
+}
+
+/// See [`Chain::backward`].
+pub struct Backward<'a> {
+    pub chain: &'a Chain,
+    pub b: &'a [Increments],
+    pub y: &'a mut [Increments],
+    pub product: Four,
+}
+
+impl Kernel for Backward<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let n = self.chain.nodes();
+        let mut y = [Lanes::splat(simd, 0.0); UNKNOWNS];
+        let (mut after, mut product) = (y, y[0]);
+        for i in (0..n).rev() {
+            let own = &self.chain.factor[i];
+            for k in 0..UNKNOWNS {
+                y[k] = Lanes::of(simd, &self.y[i][k], part);
+            }
+            if i + 1 < n {
+                for k in 0..UNKNOWNS {
+                    for c in 0..UNKNOWNS {
+                        let w = Lanes::of(simd, &own[off(k, c)], part);
+                        y[k] = after[c].neg_mul_add(w, y[k]);
+                    }
+                }
+            }
+            let count = if i + 1 < n { UNKNOWNS } else { self.chain.last };
+            for k in (0..UNKNOWNS).rev() {
+                if k < count {
+                    y[k] = y[k] * Lanes::of(simd, &own[upper(k, k)], part);
+                    for r in k + 1..UNKNOWNS {
+                        let l = Lanes::of(simd, &own[upper(k, r)], part);
+                        y[k] = y[r].neg_mul_add(l, y[k]);
+                    }
+                }
+            }
+            for k in 0..UNKNOWNS {
+                let b = Lanes::of(simd, &self.b[i][k], part);
+                product = b.mul_add(y[k], product);
+                y[k].put(&mut self.y[i][k], part);
+            }
+            after = y;
+        }
+        product.put(&mut self.product, part);
+    }
+}

@@ -1,0 +1,725 @@
+//! The matrix of a leaf factorised vein after vein, without a general sparse solver.
+//!
+//! The rotations of a vein are eliminated node by node. What they leave is a dense symmetric matrix
+//! T_j of its displacements, by which alone a vein is coupled with the next one (diagonal matrices
+//! E_j), so that the veins follow one another: S_1 = T_1 and
+//! S_j+1 = T_j+1 - E_j S_j^-1 E_j. Every S_j is inverted in place by symmetric sweeps (J. H.
+//! Goodnight, A tutorial on the SWEEP operator, Am. Stat. 33, 1979), whose pivots have the signs of
+//! the eigenvalues by Sylvester's law; the displacement of a joint tip follows all others.
+//!
+//! The pivots are the rotation or the displacement of a node. Where one would let the other entries
+//! grow, the matrix is left to the sparse factorisation, which chooses its pivots.
+//!
+//! One vein of a leaf: its matrix, condensed to the displacements and eliminated after the vein before
+//! it, and solutions for its rotations.
+//!
+//! Symmetric sweeps: matrices inverted in place (J. H. Goodnight, A tutorial on the SWEEP operator,
+//! Am. Stat. 33, 1979). A sweep of the pivots P turns the blocks [P B; B^T C] of a symmetric matrix
+//! into [-P^-1 P^-1 B; B^T P^-1 C - B^T P^-1 B]; the negative pivots are as many as the negative
+//! eigenvalues of P.
+
+use crate::leaf::block_tridiagonal::{ChainBlock, group_and_lane};
+use crate::leaf::direct::Unknowns;
+use crate::leaf::system::System;
+use pulp::{Arch, Simd, WithSimd};
+
+/// The factorised matrix.
+pub struct Condensed {
+    veins: Vec<Vein>,
+    /// Coupling of every vein with the next, at the displacements that are eliminated.
+    coupling: Vec<Vec<f64>>,
+    /// Minus the inverse of the matrix that is left for the displacement of a joint tip.
+    tip: Option<Matrix3>,
+    /// Number of negative pivots.
+    negative: usize,
+    /// Displacements of a vein, and those of them that are eliminated with it.
+    width: usize,
+    own: usize,
+    arch: Arch,
+}
+
+impl Condensed {
+    /// Factorises the matrix assembled in `system` plus `shift` times its mass matrix. `None` if
+    /// pivots are too small or not numbers.
+    pub fn new(system: &System, shift: f64) -> Option<Self> {
+        let mut work = Workspace::new(system);
+        let (width, own) = (work.width, work.own);
+        let mut condensed = Condensed {
+            veins: Vec::with_capacity(system.rods()),
+            coupling: (1..system.rods())
+                .map(|j| coupling(system, j - 1, own))
+                .collect(),
+            tip: None,
+            negative: 0,
+            width,
+            own,
+            arch: system.arch,
+        };
+        for j in 0..system.rods() {
+            let mut vein = Vein::default();
+            let before = j.checked_sub(1);
+            let before = before.map(|k| (&condensed.veins[k], condensed.coupling[k].as_slice()));
+            condensed.negative += vein.eliminate((system, shift, j), before, &mut work)?;
+            mirror(&mut vein.swept, width);
+            condensed.veins.push(vein);
+        }
+        if system.joined {
+            let (negative, tip) = tip(condensed.veins.last()?, &work)?;
+            condensed.negative += negative;
+            condensed.tip = Some(tip);
+        }
+        Some(condensed)
+    }
+
+    /// The number of negative eigenvalues alone, without the factors. `None` as for
+    /// [`Condensed::new`].
+    pub fn count(system: &System, shift: f64) -> Option<usize> {
+        let mut work = Workspace::new(system);
+        let [mut vein, mut last] = [(); 2].map(|()| Vein::default());
+        let mut negative = 0;
+        let mut gap = Vec::new();
+        for j in 0..system.rods() {
+            let before = (j > 0).then_some((&last, gap.as_slice()));
+            negative += vein.eliminate((system, shift, j), before, &mut work)?;
+            gap = coupling(system, j, work.own);
+            std::mem::swap(&mut vein, &mut last);
+        }
+        if system.joined {
+            negative += tip(&last, &work)?.0;
+        }
+        Some(negative)
+    }
+
+    /// Number of negative eigenvalues, by Sylvester's law of inertia.
+    pub fn negative(&self) -> usize {
+        self.negative
+    }
+
+    /// Solves in place, with these numbers of the unknowns. A step of iterative refinement makes the
+    /// solution as accurate as one without inverse matrices.
+    pub fn solve(&self, unknowns: &Unknowns, b: &mut [f64]) {
+        let mut x = b.to_vec();
+        self.solve_once(unknowns, &mut x);
+        self.subtract_product(unknowns, &x, b);
+        self.solve_once(unknowns, b);
+        b.iter_mut().zip(&x).for_each(|(b, x)| *b += x);
+    }
+
+    /// Solves in place without refinement.
+    pub fn solve_once(&self, unknowns: &Unknowns, b: &mut [f64]) {
+        self.arch.dispatch(Solution {
+            condensed: self,
+            unknowns,
+            b,
+        });
+    }
+
+    /// Subtracts the matrix times `x` from `b`.
+    fn subtract_product(&self, unknowns: &Unknowns, x: &[f64], b: &mut [f64]) {
+        for (j, vein) in self.veins.iter().enumerate() {
+            for (i, node) in vein.nodes.iter().enumerate() {
+                let here = unknowns.of(j, i);
+                let own = here.map(|k| x[k]);
+                for (at, row) in here.iter().zip(&node.own) {
+                    b[*at] -= product(row, &own);
+                }
+                if i + 1 < vein.nodes.len() {
+                    let ahead = unknowns.of(j, i + 1);
+                    let next = ahead.map(|k| x[k]);
+                    for (r, row) in node.next.iter().enumerate() {
+                        b[here[r]] -= product(row, &next);
+                        for (at, value) in ahead.iter().zip(row) {
+                            b[*at] -= value * own[r];
+                        }
+                    }
+                }
+                if j + 1 < self.veins.len() && 3 * i < self.own {
+                    let other = unknowns.of(j + 1, i);
+                    for c in 0..3 {
+                        let coupling = self.coupling[j][3 * i + c];
+                        b[here[3 + c]] += coupling * x[other[3 + c]];
+                        b[other[3 + c]] += coupling * x[here[3 + c]];
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn product(row: &[f64; 6], values: &[f64; 6]) -> f64 {
+    row.iter().zip(values).map(|(a, b)| a * b).sum()
+}
+
+/// The coupling of a vein with the next at the displacements that are eliminated with it.
+fn coupling(system: &System, j: usize, own: usize) -> Vec<f64> {
+    let spring = |k: usize| system.spring(j, k / 3).map_or(0.0, |spring| spring[k % 3]);
+    (0..own).map(spring).collect()
+}
+
+/// Completes a symmetric matrix of padded rows, given by its upper triangle.
+fn mirror(a: &mut [f64], width: usize) {
+    let stride = padded(width);
+    for r in 1..width {
+        for c in 0..r {
+            a[r * stride + c] = a[c * stride + r];
+        }
+    }
+}
+
+/// The number of negative pivots of a joint tip after the last vein, and minus the inverse of
+/// its matrix.
+fn tip(last: &Vein, work: &Workspace) -> Option<(usize, Matrix3)> {
+    let at = |k: usize| (work.own + k) * padded(work.width) + work.own;
+    let entry = |r: usize, c: usize| last.swept[at(r.min(c)) + r.max(c)];
+    let mut tip: Matrix3 = std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)));
+    let scale = std::array::from_fn(|k| tip[k][k].abs());
+    Some((sweep3(&mut tip, scale)?, tip))
+}
+
+/// Solves for a vector of all unknowns, in place.
+struct Solution<'a> {
+    condensed: &'a Condensed,
+    unknowns: &'a Unknowns,
+    b: &'a mut [f64],
+}
+
+impl WithSimd for Solution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Solution {
+            condensed,
+            unknowns,
+            b,
+        } = self;
+        let Condensed { width, own, .. } = *condensed;
+        let rods = condensed.veins.len();
+        let mut turns = vec![[0.0; 3]; width / 3];
+        // S^-1 times what is left for the displacements of every vein, then these themselves.
+        let mut shifts = vec![0.0; rods * width];
+        let mut load = vec![0.0; width];
+        let mut tip = unknowns
+            .tip
+            .map_or([0.0; 3], |tip| [b[tip], b[tip + 1], b[tip + 2]]);
+        for (j, vein) in condensed.veins.iter().enumerate() {
+            load.fill(0.0);
+            for (i, turn) in turns.iter_mut().enumerate() {
+                let at = unknowns.of(j, i);
+                for c in 0..3 {
+                    turn[c] = b[at[c]];
+                    if 3 * i < own {
+                        load[3 * i + c] = b[at[3 + c]];
+                    }
+                }
+            }
+            vein.solve_rotations(&mut turns);
+            for (i, turn) in turns.iter().enumerate() {
+                let at = unknowns.of(j, i);
+                for c in 0..3 {
+                    b[at[c]] = turn[c];
+                }
+            }
+            vein.subtract_rotations(&turns, &mut load);
+            let (before, here) = shifts.split_at_mut(j * width);
+            if j > 0 {
+                let before = &before[(j - 1) * width..];
+                for k in 0..own {
+                    load[k] += condensed.coupling[j - 1][k] * before[k];
+                }
+            }
+            let here = &mut here[..width];
+            vein.multiply(&load[..own], here);
+            for c in 0..width - own {
+                tip[c] += load[own + c] - here[own + c];
+            }
+            here[..own].iter_mut().for_each(|value| *value = -*value);
+        }
+        if let Some(inverse) = condensed.tip {
+            tip = inverse.map(|row| -(row[0] * tip[0] + row[1] * tip[1] + row[2] * tip[2]));
+            let first = unknowns.tip.expect("a joint tip has numbers");
+            b[first..first + 3].copy_from_slice(&tip);
+        }
+        let mut product = vec![0.0; width];
+        for (j, vein) in condensed.veins.iter().enumerate().rev() {
+            let (here, next) = shifts.split_at_mut((j + 1) * width);
+            let here = &mut here[j * width..];
+            if j + 1 < rods {
+                for k in 0..own {
+                    load[k] = condensed.coupling[j][k] * next[k];
+                }
+                vein.multiply(&load[..own], &mut product);
+                for k in 0..own {
+                    here[k] -= product[k];
+                }
+            }
+            for (c, tip) in tip.iter().enumerate().take(width - own) {
+                let column = &vein.swept[(own + c) * padded(width)..];
+                for k in 0..own {
+                    here[k] -= column[k] * tip;
+                }
+                here[own + c] = *tip;
+            }
+            vein.rotations_of(here, &mut turns);
+            for (i, turn) in turns.iter().enumerate() {
+                let at = unknowns.of(j, i);
+                for c in 0..3 {
+                    b[at[c]] -= turn[c];
+                    if 3 * i < own {
+                        b[at[3 + c]] = here[3 * i + c];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A vein of a factorised leaf.
+#[derive(Default)]
+pub struct Vein {
+    pub nodes: Vec<Node>,
+    /// The swept matrix: -S^-1 and, in the columns of a joint tip, S^-1 times the matrix between
+    /// the vein and the tip; rows padded, symmetric.
+    pub swept: Vec<f64>,
+}
+
+/// A node of a vein: the blocks of the assembled matrix, the inverse pivot of its rotation, and
+/// that times the block between it and the next rotation.
+pub struct Node {
+    pub own: ChainBlock,
+    pub next: ChainBlock,
+    inverse: Matrix3,
+    ahead: Matrix3,
+}
+
+impl Vein {
+    /// Eliminates vein `j` after the one `before` it, and what couples them; the number of
+    /// negative pivots. Of the swept matrix the upper triangle is written.
+    pub fn eliminate(
+        &mut self,
+        (system, shift, j): (&System, f64, usize),
+        before: Option<(&Vein, &[f64])>,
+        work: &mut Workspace,
+    ) -> Option<usize> {
+        self.assemble(system, j, shift, work.width);
+        system.arch.dispatch(Elimination {
+            vein: self,
+            before,
+            work,
+        })
+    }
+
+    /// Writes the blocks of its matrix, and the matrix of its displacements, upper triangle.
+    fn assemble(&mut self, system: &System, j: usize, shift: f64, width: usize) {
+        let (group, lane) = group_and_lane(j);
+        let chain = &system.groups[group].matrix;
+        let (n, stride) = (system.nodes(), padded(width));
+        self.nodes.clear();
+        self.swept.clear();
+        self.swept.resize(width * stride, 0.0);
+        for i in 0..n {
+            let (mut own, mut next) = chain.blocks(i, lane);
+            let mass = system.mass(j, i);
+            for r in 0..6 {
+                own[r][r] += shift * mass[r / 3];
+                for c in 0..r {
+                    own[r][c] = own[c][r];
+                }
+            }
+            if i + 1 == n {
+                next = ChainBlock::default();
+            }
+            for r in 0..3 {
+                let row = &mut self.swept[(3 * i + r) * stride..][..width];
+                row[3 * i..3 * i + 3].copy_from_slice(&own[3 + r][3..]);
+                if i + 1 < n {
+                    row[3 * i + 3..3 * i + 6].copy_from_slice(&next[3 + r][3..]);
+                }
+            }
+            self.nodes.push(Node {
+                own,
+                next,
+                inverse: Matrix3::default(),
+                ahead: Matrix3::default(),
+            });
+        }
+    }
+
+    /// The swept matrix times a vector of the eliminated displacements.
+    #[inline(always)]
+    pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
+        product.fill(0.0);
+        let stride = padded(product.len());
+        for (row, factor) in self.swept.chunks_exact(stride).zip(vector) {
+            for (product, value) in product.iter_mut().zip(row) {
+                *product += factor * value;
+            }
+        }
+    }
+
+    /// Solves for the rotations with the displacements held.
+    #[inline(always)]
+    pub fn solve_rotations(&self, turns: &mut [[f64; 3]]) {
+        for (i, node) in self.nodes.iter().enumerate() {
+            if i + 1 < self.nodes.len() {
+                for c in 0..3 {
+                    let passed: f64 = (0..3).map(|k| node.ahead[k][c] * turns[i][k]).sum();
+                    turns[i + 1][c] -= passed;
+                }
+            }
+            let turn = turns[i];
+            turns[i] = node
+                .inverse
+                .map(|row| row[0] * turn[0] + row[1] * turn[1] + row[2] * turn[2]);
+        }
+        for i in (0..self.nodes.len() - 1).rev() {
+            let next = turns[i + 1];
+            for c in 0..3 {
+                let row = self.nodes[i].ahead[c];
+                turns[i][c] -= row[0] * next[0] + row[1] * next[1] + row[2] * next[2];
+            }
+        }
+    }
+
+    /// Subtracts from the forces on the nodes those of rotations.
+    #[inline(always)]
+    pub fn subtract_rotations(&self, turns: &[[f64; 3]], load: &mut [f64]) {
+        for (i, Node { own, next, .. }) in self.nodes.iter().enumerate() {
+            let ahead = i + 1 < self.nodes.len();
+            for c in 0..3 {
+                for k in 0..3 {
+                    load[3 * i + c] -= own[k][3 + c] * turns[i][k];
+                    if ahead {
+                        load[3 * i + c] -= next[3 + c][k] * turns[i + 1][k];
+                        load[3 * (i + 1) + c] -= next[k][3 + c] * turns[i][k];
+                    }
+                }
+            }
+        }
+    }
+
+    /// The rotations that balance the moments of displacements, with the opposite sign.
+    #[inline(always)]
+    pub fn rotations_of(&self, shifts: &[f64], turns: &mut [[f64; 3]]) {
+        turns.fill([0.0; 3]);
+        for (i, Node { own, next, .. }) in self.nodes.iter().enumerate() {
+            let ahead = i + 1 < self.nodes.len();
+            for c in 0..3 {
+                for k in 0..3 {
+                    turns[i][k] += own[k][3 + c] * shifts[3 * i + c];
+                    if ahead {
+                        turns[i][k] += next[k][3 + c] * shifts[3 * (i + 1) + c];
+                        turns[i + 1][k] += next[3 + c][k] * shifts[3 * i + c];
+                    }
+                }
+            }
+        }
+        self.solve_rotations(turns);
+    }
+}
+
+/// Condenses a vein to its displacements, subtracts what the vein `before` it leaves, and
+/// eliminates its own displacements; returns the number of negative pivots.
+struct Elimination<'a> {
+    work: &'a mut Workspace,
+    vein: &'a mut Vein,
+    before: Option<(&'a Vein, &'a [f64])>,
+}
+
+impl WithSimd for Elimination<'_> {
+    type Output = Option<usize>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<usize> {
+        let Elimination { work, vein, before } = self;
+        let turns = eliminate_rotations(simd, vein, work)?;
+        if let Some((before, coupling)) = before {
+            add_previous(&mut vein.swept, &before.swept, coupling, work)?;
+        }
+        Some(turns + sweep(simd, &mut vein.swept, work)?)
+    }
+}
+
+/// Eliminates the rotations base to tip: the displacements of nodes up to the next one are
+/// coupled with a rotation once those before it are eliminated.
+#[inline(always)]
+fn eliminate_rotations<S: Simd>(simd: S, vein: &mut Vein, work: &mut Workspace) -> Option<usize> {
+    let Vein { nodes, swept } = vein;
+    let width = work.width;
+    let stride = padded(width);
+    for k in 0..width {
+        work.scale[k] = swept[k * stride + k].abs();
+    }
+    let mut negative = 0;
+    for i in 0..nodes.len() {
+        let filled = (3 * (i + 2)).min(width);
+        let mut pivot: Matrix3 = matrix3(|r, c| nodes[i].own[r][c]);
+        let turn_scale = std::array::from_fn(|k| pivot[k][k].abs());
+        match i.checked_sub(1).map(|k| &nodes[k]) {
+            None => work.rows.fill(0.0),
+            Some(Node { next, ahead, .. }) => {
+                let turned = matrix3(|r, c| ahead[c][r]);
+                multiply_rows(simd, &turned, &work.before, &mut work.rows);
+                for r in 0..3 {
+                    for k in 0..3 {
+                        for c in 0..3 {
+                            pivot[r][c] -= next[k][r] * ahead[k][c];
+                        }
+                        work.rows[r * stride + 3 * (i - 1) + k] += next[3 + k][r];
+                    }
+                }
+            }
+        }
+        let Node { own, next, .. } = &nodes[i];
+        for r in 0..3 {
+            let row = &mut work.rows[r * stride..][..filled];
+            for c in 0..3 {
+                row[3 * i + c] += own[r][3 + c];
+                if i + 1 < nodes.len() {
+                    row[3 * (i + 1) + c] += next[r][3 + c];
+                }
+            }
+        }
+        negative += sweep3(&mut pivot, turn_scale)?;
+        multiply_rows(simd, &pivot, &work.rows, &mut work.scaled);
+        let (rows, scaled) = (rows_of(&work.rows), rows_of(&work.scaled));
+        if !are_small(rows, scaled, &work.scale, |_| false) {
+            return None;
+        }
+        subtract_product(simd, swept, rows, scaled, filled);
+        nodes[i].ahead = matrix3(|r, c| -(0..3).map(|k| pivot[r][k] * next[k][c]).sum::<f64>());
+        nodes[i].inverse = pivot.map(|row| row.map(|value| -value));
+        std::mem::swap(&mut work.rows, &mut work.before);
+    }
+    Some(negative)
+}
+
+/// Adds what the elimination of the vein before leaves: of it the swept matrix, upper triangle.
+/// `None` if that is too large.
+#[inline(always)]
+fn add_previous(
+    swept: &mut [f64],
+    before: &[f64],
+    coupling: &[f64],
+    work: &Workspace,
+) -> Option<()> {
+    let Workspace { width, own, .. } = *work;
+    let stride = padded(width);
+    for a in 0..width {
+        let factor = coupling.get(a).copied().unwrap_or(1.0);
+        let row = &mut swept[a * stride..][..width];
+        let from = &before[a * stride..][..width];
+        let small = factor * from[a].abs() * factor <= GROWTH * work.scale[a];
+        if a < own && !small {
+            return None;
+        }
+        for c in a..own {
+            row[c] += factor * from[c] * coupling[c];
+        }
+        for c in a.max(own)..width {
+            row[c] += factor * from[c];
+        }
+    }
+    Some(())
+}
+
+/// The largest factor by which the elimination of a pivot may change a diagonal entry of a
+/// matrix, in units of the entry that was assembled. In a positive definite one it is less than
+/// one.
+pub const GROWTH: f64 = 1e3;
+
+/// Rows are padded to a multiple of so many numbers, with zeros.
+pub const LANES: usize = 8;
+
+pub type Matrix3 = [[f64; 3]; 3];
+
+/// The matrix with these entries.
+#[inline(always)]
+pub fn matrix3(entry: impl Fn(usize, usize) -> f64) -> Matrix3 {
+    std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
+}
+
+/// The length of a padded row.
+pub fn padded(width: usize) -> usize {
+    width.div_ceil(LANES) * LANES
+}
+
+/// Memory for the elimination of a vein.
+pub struct Workspace {
+    /// Displacements of a vein, and those of them that are eliminated with it.
+    pub width: usize,
+    pub own: usize,
+    /// Sizes of the diagonal entries that were assembled.
+    pub scale: Vec<f64>,
+    /// Three rows of the matrix, those before them, and their multiples by an inverse pivot.
+    pub rows: Vec<f64>,
+    pub before: Vec<f64>,
+    pub scaled: Vec<f64>,
+    /// Whether the displacement of a node is eliminated.
+    swept: Vec<bool>,
+}
+
+impl Workspace {
+    pub fn new(system: &System) -> Self {
+        let width = 3 * system.nodes();
+        let rows = || vec![0.0; 3 * padded(width)];
+        Workspace {
+            width,
+            own: if system.joined { width - 3 } else { width },
+            scale: vec![0.0; width],
+            rows: rows(),
+            before: rows(),
+            scaled: rows(),
+            swept: vec![false; width / 3],
+        }
+    }
+}
+
+/// Sweeps the displacements of the nodes that precede row `own` of a symmetric matrix, given by its
+/// upper triangle; the number of negative pivots. A node whose pivot is too small for what it
+/// divides is left for later; `None` if only such are left.
+#[inline(always)]
+pub fn sweep<S: Simd>(simd: S, a: &mut [f64], work: &mut Workspace) -> Option<usize> {
+    let Workspace { width, own, .. } = *work;
+    let stride = padded(width);
+    work.swept.fill(false);
+    let (mut negative, mut left) = (0, own / 3);
+    while left > 0 {
+        let before = left;
+        for node in 0..own / 3 {
+            if work.swept[node] {
+                continue;
+            }
+            let first = 3 * node;
+            for r in 0..3 {
+                let column = &mut work.rows[r * stride..][..stride];
+                for i in 0..first + r {
+                    column[i] = a[i * stride + first + r];
+                }
+                column[first + r..].copy_from_slice(&a[(first + r) * stride..][first + r..stride]);
+            }
+            let mut pivot = matrix3(|r, c| work.rows[r * stride + first + c]);
+            let own_scale = std::array::from_fn(|k| work.scale[first + k]);
+            let Some(below_zero) = sweep3(&mut pivot, own_scale) else {
+                continue;
+            };
+            multiply_rows(simd, &pivot, &work.rows, &mut work.scaled);
+            let (columns, scaled) = (rows_of(&work.rows), rows_of(&work.scaled));
+            let is_free = |i: usize| i / 3 == node || work.swept[i / 3];
+            if !are_small(columns, scaled, &work.scale, is_free) {
+                continue;
+            }
+            negative += below_zero;
+            subtract_product(simd, a, columns, scaled, width);
+            for (r, z) in scaled.into_iter().enumerate() {
+                for i in 0..first {
+                    a[i * stride + first + r] = z[i];
+                }
+                let row = &mut a[(first + r) * stride..][first..stride];
+                row[..3].copy_from_slice(&pivot[r]);
+                row[3..].copy_from_slice(&z[first + 3..]);
+            }
+            work.swept[node] = true;
+            left -= 1;
+        }
+        if left == before {
+            return None;
+        }
+    }
+    Some(negative)
+}
+
+/// Three rows of one memory.
+#[inline(always)]
+pub fn rows_of(rows: &[f64]) -> [&[f64]; 3] {
+    let stride = rows.len() / 3;
+    [0, 1, 2].map(|r| &rows[r * stride..][..stride])
+}
+
+/// Minus a matrix times three rows.
+#[inline(always)]
+pub fn multiply_rows<S: Simd>(simd: S, factor: &Matrix3, rows: &[f64], product: &mut [f64]) {
+    let [r0, r1, r2] = rows_of(rows).map(|row| S::as_simd_f64s(row).0);
+    let products = product.chunks_exact_mut(rows.len() / 3);
+    for (product, row) in products.zip(factor) {
+        let [m0, m1, m2] = row.map(|value| simd.splat_f64s(-value));
+        let sources = r0.iter().zip(r1).zip(r2);
+        for (value, ((r0, r1), r2)) in S::as_mut_simd_f64s(product).0.iter_mut().zip(sources) {
+            let sum = simd.mul_f64s(m0, *r0);
+            let sum = simd.mul_add_e_f64s(m1, *r1, sum);
+            *value = simd.mul_add_e_f64s(m2, *r2, sum);
+        }
+    }
+}
+
+/// Subtracts from the upper triangle of a matrix of padded rows, up to row and column `filled`, the
+/// product of three columns and three rows. Less than a lane is written beside the triangle.
+#[inline(always)]
+pub fn subtract_product<S: Simd>(
+    simd: S,
+    a: &mut [f64],
+    [c0, c1, c2]: [&[f64]; 3],
+    rows: [&[f64]; 3],
+    filled: usize,
+) {
+    let stride = c0.len();
+    let lanes = size_of::<S::f64s>() / size_of::<f64>();
+    let (a, blocks) = (S::as_mut_simd_f64s(a).0, stride / lanes);
+    let [z0, z1, z2] = rows.map(|row| S::as_simd_f64s(row).0);
+    for block in 0..filled.div_ceil(lanes) {
+        let (z0, z1, z2) = (z0[block], z1[block], z2[block]);
+        let last = filled.min(lanes * (block + 1));
+        let column = a[block..].iter_mut().step_by(blocks);
+        let factors = c0[..last].iter().zip(&c1[..last]).zip(&c2[..last]);
+        for (target, ((f0, f1), f2)) in column.zip(factors) {
+            let [f0, f1, f2] = [f0, f1, f2].map(|f| simd.splat_f64s(-f));
+            let sum = simd.mul_add_e_f64s(f0, z0, *target);
+            let sum = simd.mul_add_e_f64s(f1, z1, sum);
+            *target = simd.mul_add_e_f64s(f2, z2, sum);
+        }
+    }
+}
+
+/// [`sweep`] of a matrix of three rows: minus its inverse.
+#[inline(always)]
+pub fn sweep3(a: &mut Matrix3, scale: [f64; 3]) -> Option<usize> {
+    let mut swept = [false; 3];
+    let mut negative = 0;
+    for _ in 0..3 {
+        // The pivot that is largest in its scale.
+        let size = |k: &usize| a[*k][*k].abs() / scale[*k];
+        let left = (0..3).filter(|&k| !swept[k]);
+        let k = left.max_by(|i, k| size(i).total_cmp(&size(k)))?;
+        let column = a.map(|row| row[k]);
+        let pivot = column[k];
+        let small = |i: usize| column[i] * column[i] <= GROWTH * scale[i] * pivot.abs();
+        if !(pivot != 0.0 && (0..3).all(|i| swept[i] || small(i))) {
+            return None;
+        }
+        negative += usize::from(pivot < 0.0);
+        for i in (0..3).filter(|&i| i != k) {
+            for c in (0..3).filter(|&c| c != k) {
+                a[i][c] -= column[i] * column[c] / pivot;
+            }
+            a[i][k] = column[i] / pivot;
+            a[k][i] = column[i] / pivot;
+        }
+        a[k][k] = -1.0 / pivot;
+        swept[k] = true;
+    }
+    Some(negative)
+}
+
+/// Whether the product of three columns and three rows changes no diagonal entry by too much,
+/// but for some; what is not a number does.
+#[inline(always)]
+pub fn are_small(
+    [c0, c1, c2]: [&[f64]; 3],
+    [z0, z1, z2]: [&[f64]; 3],
+    scale: &[f64],
+    is_free: impl Fn(usize) -> bool,
+) -> bool {
+    // By parts: those of a pivot that is not definite may cancel.
+    let change = |i: usize| (c0[i] * z0[i]).abs() + (c1[i] * z1[i]).abs() + (c2[i] * z2[i]).abs();
+    (0..scale.len()).all(|i| is_free(i) || change(i) <= GROWTH * scale[i])
+}

@@ -1,0 +1,304 @@
+//! Factorisation, and conjugate gradients.
+//!
+//! B p is updated by the same recursion as p, so that an iteration costs one solve with B and
+//! one product with the sparse E.
+//!
+//! A positive definite matrix that is factorised once and solved with several right-hand sides: rod
+//! by rod with conjugate gradients or, where tissue ties the rods, as a whole.
+
+use crate::leaf::block_tridiagonal::{Increments, Masses, TipFactor};
+use crate::leaf::direct::{DirectSolver, Factors};
+use crate::leaf::state::Increment;
+use crate::leaf::system::{Advance, Coupled, Direction, Product, System, each_group, rods_of};
+use crate::simd::{Four, run};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Largest number of iterations with the rod-wise preconditioner.
+const MAX_ITERATIONS: usize = 200;
+
+/// The outcome of a linear solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solved {
+    /// Converged to the tolerance, with the number of iterations.
+    Yes(usize),
+    /// The matrix is not positive definite; detected after this number of iterations.
+    Indefinite(usize),
+    /// The iteration limit was reached.
+    TooSlow(usize),
+    /// The matrix of a rod under a dead moment is singular.
+    Singular,
+}
+
+impl Solved {
+    /// The number of iterations.
+    pub fn iterations(self) -> usize {
+        match self {
+            Solved::Yes(count) | Solved::Indefinite(count) | Solved::TooSlow(count) => count,
+            Solved::Singular => 1,
+        }
+    }
+}
+
+impl System {
+    /// Factorises B + shift M; false if it is not positive definite, or tissue ties the rods.
+    pub fn factorize(&mut self, shift: f64) -> bool {
+        // Without the tissue, which is not in B + E.
+        if self.tied() {
+            return false;
+        }
+        self.factorize_signed(shift, false)
+    }
+
+    /// Factorises the matrix of a single rod whatever the signs of its pivots;
+    /// false only if one of them is zero.
+    pub fn factorize_indefinite(&mut self) -> bool {
+        debug_assert_eq!(self.rods, 1);
+        self.factorize_signed(0.0, true)
+    }
+
+    fn factorize_signed(&mut self, shift: f64, any_sign: bool) -> bool {
+        let (arch, weights) = (self.arch, &self.weights);
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            let masses = Masses {
+                shift,
+                per_weight: group.masses,
+                weights,
+            };
+            group.definite = group.matrix.factorize(arch, &masses, any_sign);
+        });
+        if !self.groups.iter().all(|group| group.definite) {
+            return false;
+        }
+        if !self.joined {
+            return true;
+        }
+        let mut sum = [[0.0; 3]; 3];
+        for (g, group) in self.groups.iter().enumerate() {
+            for lane in 0..rods_of(g, self.rods).len() {
+                for (sum, row) in sum.iter_mut().zip(group.matrix.tip(lane)) {
+                    for c in 0..3 {
+                        sum[c] += row[c];
+                    }
+                }
+            }
+        }
+        self.tip = TipFactor::new(sum);
+        self.tip.is_some()
+    }
+
+    /// Solves with the factorised matrix for the assembled right-hand side
+    /// plus `inertia` (mass times velocity over time step), to the relative
+    /// accuracy `tolerance` in the energy norm.
+    pub fn solve(&mut self, inertia: Option<(&[Vec<Increment>], f64)>, tolerance: f64) -> Solved {
+        let mut tip_residual = self.set_residual(inertia);
+        let (mut tip_z, mut rz) = self.precondition(tip_residual);
+        if !self.coupled {
+            for group in &mut self.groups {
+                group.solution.copy_from_slice(&group.z);
+            }
+            return match self.moments.is_empty() || self.correct_for_moments() {
+                true => Solved::Yes(1),
+                false => Solved::Singular,
+            };
+        }
+
+        let mut tip_p = tip_z;
+        let mut tip_b_p = tip_residual;
+        let mut tip_solution = DVec3::ZERO;
+        for (group, p) in self.groups.iter_mut().zip(&mut self.p) {
+            group.solution.fill(Increments::default());
+            p.copy_from_slice(&group.z);
+            group.b_p.copy_from_slice(&group.residual);
+        }
+        let target = tolerance * tolerance * rz;
+        let mut iterations = 1;
+        loop {
+            let p_k_p = self.multiply() + tip_p.dot(tip_b_p);
+            if p_k_p.is_nan() || p_k_p <= 0.0 {
+                return if rz == 0.0 {
+                    Solved::Yes(iterations)
+                } else {
+                    Solved::Indefinite(iterations)
+                };
+            }
+            let alpha = rz / p_k_p;
+            self.advance(alpha);
+            tip_solution += alpha * tip_p;
+            tip_residual -= alpha * tip_b_p;
+            let rz_next;
+            (tip_z, rz_next) = self.precondition(tip_residual);
+            if rz_next <= target {
+                break;
+            }
+            if iterations >= MAX_ITERATIONS {
+                return Solved::TooSlow(iterations);
+            }
+            iterations += 1;
+            let beta = rz_next / rz;
+            rz = rz_next;
+            tip_p = tip_z + beta * tip_p;
+            tip_b_p = tip_residual + beta * tip_b_p;
+            self.update_direction(beta);
+        }
+        if self.joined {
+            for group in &mut self.groups {
+                let last = group.solution.last_mut().expect("a rod has a segment");
+                set_tip(last, tip_solution, &group.active);
+            }
+        }
+        Solved::Yes(iterations)
+    }
+
+    /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
+    fn set_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> DVec3 {
+        let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            group.residual.copy_from_slice(&group.rhs);
+            let Some((velocity, per_step)) = inertia else {
+                return;
+            };
+            for (lane, j) in rods_of(g, rods).enumerate() {
+                let [rotary, mass] = group.masses.map(|mass| mass.0[lane] * per_step);
+                for ((r, v), weight) in group.residual.iter_mut().zip(&velocity[j]).zip(weights) {
+                    for c in 0..3 {
+                        r[c].0[lane] += rotary * weight * v[c];
+                        r[3 + c].0[lane] += mass * weight * v[3 + c];
+                    }
+                }
+            }
+        });
+        let mut tip_residual = DVec3::ZERO;
+        if joined {
+            for group in &mut self.groups {
+                let last = group.residual.last_mut().expect("a rod has a segment");
+                for c in 0..3 {
+                    tip_residual[c] += last[3 + c].sum();
+                    last[3 + c] = Four::default();
+                }
+            }
+        }
+        tip_residual
+    }
+
+    /// z = B^-1 residual, including the tip's displacement in every rod's last slot; returns
+    /// that displacement and residual . z over all unknowns.
+    fn precondition(&mut self, tip_residual: DVec3) -> (DVec3, f64) {
+        let (last, arch) = (self.nodes() - 1, self.arch);
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            group.matrix.forward(arch, &group.residual, &mut group.z);
+        });
+        let mut tip = None;
+        if let Some(factor) = self.tip.as_ref().filter(|_| self.joined) {
+            let mut b = tip_residual;
+            for group in &self.groups {
+                for c in 0..3 {
+                    b[c] += group.z[last][3 + c].sum();
+                }
+            }
+            tip = Some(factor.solve(b));
+        }
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            if let Some(tip) = tip {
+                set_tip(&mut group.z[last], tip, &group.active);
+            }
+            // A joint tip's slots hold no residual, only its displacement.
+            group.partial = (group.matrix).backward(arch, &group.residual, &mut group.z);
+        });
+        let tip = tip.unwrap_or_default();
+        let product = self.groups.iter().map(|group| group.partial).sum::<f64>();
+        (tip, product + tip_residual.dot(tip))
+    }
+
+    /// p . (B + E) p without the contribution of the tip.
+    fn multiply(&mut self) -> f64 {
+        let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            let mut kernel = Product {
+                group,
+                coupled: Coupled {
+                    p,
+                    group: g,
+                    weights,
+                },
+                product: Four::default(),
+            };
+            run(arch, &mut kernel);
+            group.partial = kernel.product.sum();
+        });
+        self.groups.iter().map(|group| group.partial).sum()
+    }
+
+    /// Adds `alpha` p to the solution and updates the residual, which stays zero in the slots
+    /// of a joint tip, where no coupling acts.
+    fn advance(&mut self, alpha: f64) {
+        let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            let coupled = Coupled {
+                p,
+                group: g,
+                weights,
+            };
+            run(
+                arch,
+                &mut Advance {
+                    group,
+                    coupled,
+                    alpha,
+                },
+            );
+        });
+    }
+
+    /// The next direction: z plus `beta` times the last.
+    fn update_direction(&mut self, beta: f64) {
+        let arch = self.arch;
+        let turn = |(group, p): (&mut _, &mut Vec<Increments>)| {
+            run(arch, &mut Direction { group, p, beta });
+        };
+        match self.parallel {
+            true => (self.groups.par_iter_mut()).zip(&mut self.p).for_each(turn),
+            false => self.groups.iter_mut().zip(&mut self.p).for_each(turn),
+        }
+    }
+}
+
+/// Writes the displacement of a joint tip.
+fn set_tip(last: &mut Increments, tip: DVec3, active: &Four) {
+    for c in 0..3 {
+        last[3 + c] = Four(active.0.map(|active| active * tip[c]));
+    }
+}
+
+/// The factors of the matrix assembled in a [`System`]; those of the rods are in the system itself.
+pub struct Factorised(Option<Factors>);
+
+impl Factorised {
+    /// Factorises K + `shift` M; `None` if it is not positive definite, or does not fit into memory.
+    pub fn new(system: &mut System, shift: f64) -> Option<Self> {
+        if !system.tied() {
+            return system.factorize(shift).then_some(Factorised(None));
+        }
+        let solver = DirectSolver::new(system).ok()?;
+        let factors = solver.factorize_definite(system, shift).ok()??;
+        Some(Factorised(Some(factors)))
+    }
+
+    /// Factorises the matrix of a single rod whatever the signs of its pivots; `None` if one of them
+    /// is zero.
+    pub fn of_single_rod(system: &mut System) -> Option<Self> {
+        system.factorize_indefinite().then_some(Factorised(None))
+    }
+
+    /// Solves for the right-hand side in `system`, to the relative accuracy `tolerance` in the
+    /// energy norm.
+    pub fn solve(&mut self, system: &mut System, tolerance: f64) -> Solved {
+        match &mut self.0 {
+            None => system.solve(None, tolerance),
+            Some(factors) => {
+                factors.solve(system, None);
+                Solved::Yes(1)
+            }
+        }
+    }
+}

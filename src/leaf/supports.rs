@@ -1,0 +1,260 @@
+//! Nodes that are held: bases, tips by their holder, and others by grips along their veins.
+//!
+//! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
+//! at a pinned or clamped tip, at a hinged base, or by grips.
+
+use crate::leaf::Gripped;
+use crate::leaf::assembly::component;
+use crate::leaf::block_tridiagonal::{Chain, Increments, group_and_lane};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::{Field, State};
+use crate::leaf::system::System;
+use crate::rod::UNKNOWNS;
+use crate::scenario::{Grip, Hold};
+use crate::simd::Four;
+use glam::DVec3;
+use std::ops::Range;
+
+impl DiscreteLeaf {
+    /// The nodes that grips hold, where they are in the `natural` leaf and moved by their
+    /// displacements.
+    pub(super) fn gripped(&self, natural: &State) -> Vec<Gripped> {
+        let length = self.leaf.scale.length;
+        let each = self.leaf.scenario().grips.iter().enumerate();
+        let nodes = each.flat_map(|(number, grip)| {
+            let Grip { vein, at, .. } = *grip;
+            let [from, to] = at.map(|sigma| self.grid.nearest(sigma));
+            let moved = DVec3::from_array(grip.displacement) / length;
+            (from..=to).map(move |node| {
+                let k = natural.base(vein) + node;
+                Gripped {
+                    grip: number,
+                    rod: vein,
+                    node,
+                    position: natural.x[k] + moved,
+                    rotation: (grip.held == Hold::Clamped).then_some(natural.q[k]),
+                }
+            })
+        });
+        nodes.collect()
+    }
+
+    /// Whether grips hold nodes.
+    pub fn has_grips(&self) -> bool {
+        !self.grips.is_empty()
+    }
+
+    /// The nodes of rod `j` that grips hold.
+    pub fn grips_of(&self, j: usize) -> impl Iterator<Item = &Gripped> {
+        self.grips.iter().filter(move |held| held.rod == j)
+    }
+
+    /// The nodes of rod `j` with equations that hinges or grips hold, and the components that are.
+    pub(super) fn held_inside(&self, j: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let hinge = (0..1)
+            .filter(|_| self.leaf.hinged())
+            .map(|base| (base, 3..6));
+        let grips = self.grips_of(j).map(|held| {
+            let first = if held.rotation.is_some() { 0 } else { 3 };
+            (held.node, first..6)
+        });
+        hinge.chain(grips)
+    }
+
+    /// Whether node `i` of rod `j` is held at its base or by a grip: its rotation, and its position.
+    pub(super) fn is_gripped(&self, j: usize, i: usize) -> [bool; 2] {
+        if i == 0 {
+            return [!self.leaf.hinged(), true];
+        }
+        let here = |it: &&Gripped| (it.rod, it.node) == (j, i);
+        match self.grips.iter().find(here) {
+            Some(held) => [held.rotation.is_some(), true],
+            None => [false; 2],
+        }
+    }
+
+    /// Whether node `i` of rod `j` may rotate, and be displaced.
+    pub fn moves(&self, j: usize, i: usize) -> [bool; 2] {
+        match &self.leaf.held {
+            Some(held) if i == self.segments() => [held.clamps.is_none(), false],
+            _ if i > 0 && self.grips.is_empty() => [true; 2],
+            _ => self.is_gripped(j, i).map(|held| !held),
+        }
+    }
+
+    /// Puts tips and nodes where they are held.
+    pub fn hold(&self, state: &mut State) {
+        self.leaf.hold_tips(state);
+        for held in &self.grips {
+            let k = state.base(held.rod) + held.node;
+            state.x[k] = held.position;
+            if let Some(rotation) = held.rotation {
+                state.q[k] = rotation;
+            }
+        }
+    }
+
+    /// Force on every grip, and the moment about its middle if it is clamped.
+    pub fn grip_reactions(&self, state: &State) -> Vec<[DVec3; 2]> {
+        let grips = &self.leaf.scenario().grips;
+        let middle = |number: usize| {
+            let held = self.grips.iter().filter(|it| it.grip == number);
+            let (sum, count) = held.fold((DVec3::ZERO, 0.0), |(sum, count), it| {
+                (sum + it.position, count + 1.0)
+            });
+            sum / count
+        };
+        let middles: Vec<DVec3> = (0..grips.len()).map(middle).collect();
+        let mut reactions = vec![[DVec3::ZERO; 2]; grips.len()];
+        for held in &self.grips {
+            let [moment, force] = self.unbalanced(state, held.rod, held.node);
+            let [force_on, moment_on] = &mut reactions[held.grip];
+            *force_on += force;
+            if held.rotation.is_some() {
+                *moment_on += moment + (held.position - middles[held.grip]).cross(force);
+            }
+        }
+        reactions
+    }
+
+    /// The forces on all holders: on that of held tips, if they are, and on every grip.
+    pub fn forces_on_holders(&self, state: &State) -> Vec<DVec3> {
+        let tips = self.leaf.held.as_ref().map(|_| self.reaction(state).0);
+        let grips = match self.has_grips() {
+            true => self.grip_reactions(state),
+            false => Vec::new(),
+        };
+        let grips = grips.into_iter().map(|[force, _]| force);
+        tips.into_iter().chain(grips).collect()
+    }
+
+    /// Moment and force on a node by its segments, loads and neighbours.
+    pub(super) fn unbalanced(&self, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+        let n = self.segments();
+        let gradient = |i: usize| {
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            segment.gradient(self.section(j, i))
+        };
+        let load = self.load(state, j, i);
+        let (mut moment, mut force) = (load.moment + self.moment_on(i), load.force);
+        if i > 0 {
+            let (g_x, _, g_b) = gradient(i - 1);
+            (moment, force) = (moment - g_b, force - g_x);
+        }
+        if i < n {
+            let (g_x, g_a, _) = gradient(i);
+            (moment, force) = (moment - g_a, force + g_x);
+        }
+        [moment, force]
+    }
+}
+
+/// Components of a node's increment (rotation, displacement) that are zero for a node in the
+/// mirror plane: rotations about x and z, the displacement along y.
+const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
+
+/// All components; displacements are the last three.
+const ALL: [usize; UNKNOWNS] = [0, 1, 2, 3, 4, 5];
+
+/// The entry on the diagonal of held components: with the masses of nodes within a vein it is a
+/// frequency above all others.
+const HELD: f64 = 1e9;
+
+impl DiscreteLeaf {
+    /// The components that are zero in the increments of node `i` of rod `j`.
+    fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
+        if i == 0 || !self.grips.is_empty() {
+            match self.is_gripped(j, i) {
+                [true, _] => return &ALL,
+                [false, true] => return &ALL[3..],
+                [false, false] => {}
+            }
+        }
+        if let Some(held) = self.leaf.held.as_ref().filter(|_| i == self.segments()) {
+            match held.clamps {
+                Some(_) => &ALL,
+                None => &ALL[3..],
+            }
+        } else if self.leaf.in_plane(j) {
+            &ACROSS_THE_PLANE
+        } else if self.leaf.mirrored && self.leaf.joined() && i == self.segments() {
+            &ACROSS_THE_PLANE[2..]
+        } else {
+            &[]
+        }
+    }
+
+    /// The first node with equations that may be held.
+    fn first_held(&self) -> usize {
+        match (self.leaf.mirrored, &self.leaf.held) {
+            _ if self.leaf.hinged() || !self.grips.is_empty() => self.first_node(),
+            (true, _) => self.first_node(),
+            (false, Some(_)) => self.segments(),
+            (false, None) => self.segments() + 1,
+        }
+    }
+
+    /// Sets the held components of rod `j` to zero in the right-hand side of its
+    /// group.
+    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
+        for i in self.first_held()..self.segments() + 1 {
+            let rhs = &mut rhs[i - self.first_node()];
+            for &c in self.held_components(j, i) {
+                rhs[c].0[group_and_lane(j).1] = 0.0;
+            }
+        }
+    }
+
+    /// Sets the held components of forces on the nodes to zero.
+    pub(super) fn clear_held_forces(&self, forces: &mut Field) {
+        for (j, i) in self.each(self.first_held()..self.segments() + 1) {
+            for &c in self.held_components(j, i) {
+                forces[j][i - self.first_node()][c] = 0.0;
+            }
+        }
+    }
+
+    /// Replaces rows and columns of the held components of rod `j` in the matrix by those of
+    /// the identity, which makes them zero.
+    pub(super) fn hold_components(&self, j: usize, chain: &mut Chain) {
+        let set = |four: &mut Four, value: f64| four.0[group_and_lane(j).1] = value;
+        for i in self.first_held()..self.segments() + 1 {
+            let at = i - self.first_node();
+            for &c in self.held_components(j, i) {
+                for k in 0..UNKNOWNS {
+                    set(chain.diagonal(at, c.min(k), c.max(k)), 0.0);
+                    set(chain.off(at, c, k), 0.0);
+                    if at > 0 {
+                        set(chain.off(at - 1, k, c), 0.0);
+                    }
+                }
+                let gripped = self.is_gripped(j, i)[1];
+                set(chain.diagonal(at, c, c), if gripped { HELD } else { 1.0 });
+            }
+        }
+    }
+
+    /// Sets the entries of held components between neighbouring rods to zero.
+    pub(super) fn hold_across(&self, system: &mut System) {
+        for (g, i) in self.each(self.first_held()..self.segments() + 1) {
+            if g + 1 < self.rods() {
+                let across = system.across_mut(g, i - self.first_node());
+                for &c in self.held_components(g, i) {
+                    across[c] = [0.0; UNKNOWNS];
+                }
+                for &c in self.held_components(g + 1, i) {
+                    across.iter_mut().for_each(|row| row[c] = 0.0);
+                }
+            }
+        }
+    }
+
+    /// The largest components of an unbalanced force and moment on a node of
+    /// rod `j`, without those that the mirror image balances.
+    pub(super) fn unbalanced_residual(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
+        match self.leaf.in_plane(j) {
+            true => (component(force.with_y(0.0)), moment.y.abs()),
+            false => (component(force), component(moment)),
+        }
+    }
+}

@@ -1,0 +1,599 @@
+//! Newton's equations of the leaf, solved rod by rod.
+//!
+//! K = B + E, where B consists of every rod's own block-tridiagonal matrix (with its
+//! neighbours fixed) and the joint tip, and E is the coupling between neighbours. B is
+//! factorised in linear time and preconditions conjugate gradients for K; E is weak compared
+//! with a rod's own stiffness ([`solve`]).
+//!
+//! Additions to the equations of single nodes.
+//!
+//! The coupling of neighbouring rods, in the lanes of their groups.
+//!
+//! The vectors of the conjugate gradients.
+
+use crate::leaf::block_tridiagonal::{
+    Chain, Increments, TipFactor, group_and_lane, of_lane, set_lane,
+};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::loads::DeadMoments;
+pub use crate::leaf::solve::Solved;
+use crate::leaf::state::{Field, Increment, shift, turn};
+use crate::numbers::larger;
+use crate::rod::NodeBlock;
+use crate::simd::{Four, GROUP, Kernel, Lanes, widest_arch};
+use glam::{DMat3, DVec3};
+use pulp::{Arch, Simd};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// From this many nodes on, groups of rods are distributed over threads. Measured: below it
+/// waking the threads costs more than it saves.
+const PARALLEL_NODES: usize = 8192;
+
+/// Sums, and a maximum, over all rods from an assembly.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Potential energy: of the strains, the coupling and the loads.
+    pub energy: f64,
+    /// Largest rotation between the ends of a segment.
+    pub turn: f64,
+}
+
+/// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
+/// and forces are zero.
+#[derive(Clone, Debug)]
+pub(crate) struct Group {
+    pub matrix: Chain,
+    /// One in lanes with a rod, zero in others.
+    pub active: Four,
+    /// Right-hand side; with a joint tip, the last displacement slots hold
+    /// the rods' shares of the tip's.
+    pub rhs: Vec<Increments>,
+    /// Solution, all nodes with equations, complete.
+    pub solution: Vec<Increments>,
+    pub sums: Sums,
+    /// Nodal masses per weight: rotary, translational.
+    pub(super) masses: [Four; 2],
+    /// E: coupling per weight with the previous rods, with the next.
+    pub(super) coupling: [[Four; 3]; 2],
+    pub(super) residual: Vec<Increments>,
+    pub(super) z: Vec<Increments>,
+    pub(super) b_p: Vec<Increments>,
+    /// Whether the last factorisation succeeded.
+    pub(super) definite: bool,
+    /// Its part of a scalar product.
+    pub(super) partial: f64,
+}
+
+/// The linear system of a leaf, with workspace for its solution.
+#[derive(Clone, Debug)]
+pub struct System {
+    pub(crate) groups: Vec<Group>,
+    pub(super) rods: usize,
+    pub(super) p: Vec<Vec<Increments>>,
+    pub(super) joined: bool,
+    pub(super) coupled: bool,
+    pub(super) parallel: bool,
+    pub(super) segments: usize,
+    /// The first node of a rod with equations, from which its nodes are numbered here.
+    pub(super) first: usize,
+    /// Weights of the nodes with equations in the masses.
+    pub(super) weights: Vec<f64>,
+    /// Weights of the nodes in E: zero at a joint tip and at hinged bases, which stay.
+    pub(super) coupling_weights: Vec<f64>,
+    pub(super) arch: Arch,
+    pub(super) tip: Option<TipFactor>,
+    /// Coupling of every gap per weight; empty if the leaf has no coupling.
+    pub(super) gaps: Vec<DVec3>,
+    /// The blocks between neighbouring rods, gap after gap, all nodes with equations; empty without tissue.
+    pub(super) across: Vec<NodeBlock>,
+    /// Nodes that hinges or grips hold, with the components that are: these have no momentum.
+    pub(super) held: Vec<(usize, usize, Range<usize>)>,
+    /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
+    /// rigid ones; empty without any.
+    pub(super) law_forces: Vec<DVec3>,
+    /// Dead moments on the nodes of a single rod, as of the last assembly.
+    pub(super) moments: DeadMoments,
+}
+
+/// Runs `f` over the groups, on all threads if `parallel`. Each group works on its
+/// own data only and sums are taken in the order of the groups afterwards, so
+/// that the result does not depend on the number of threads.
+pub(super) fn each_group<T: Send>(
+    parallel: bool,
+    groups: &mut [T],
+    f: impl Fn(usize, &mut T) + Sync,
+) {
+    if parallel {
+        let groups = groups.par_iter_mut().enumerate();
+        groups.for_each(|(g, group)| f(g, group));
+    } else {
+        let groups = groups.iter_mut().enumerate();
+        groups.for_each(|(g, group)| f(g, group));
+    }
+}
+
+/// The numbers of the rods of a group.
+pub(super) fn rods_of(group: usize, rods: usize) -> Range<usize> {
+    GROUP * group..rods.min(GROUP * (group + 1))
+}
+
+impl System {
+    /// Allocates the equations of `leaf`.
+    pub fn new(leaf: &DiscreteLeaf) -> Self {
+        let (rods, nodes) = (leaf.rods(), leaf.moving_nodes());
+        let (first, n) = (nodes.start, nodes.len());
+        let joined = leaf.tips_move_together();
+        let coupled = leaf.coupled() || leaf.tied();
+        let gaps = match leaf.coupled() {
+            true => of_gaps(leaf).collect(),
+            false => Vec::new(),
+        };
+        let count = rods.div_ceil(GROUP);
+        System {
+            groups: (0..count).map(|g| Group::new(leaf, g, &gaps)).collect(),
+            rods,
+            p: vec![vec![Increments::default(); n]; count],
+            joined,
+            coupled,
+            parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
+            segments: leaf.segments(),
+            first,
+            weights: nodes.clone().map(|i| leaf.moving_weight(i)).collect(),
+            coupling_weights: nodes
+                .map(|i| if i == 0 { 0.0 } else { leaf.coupling_weight(i) })
+                .collect(),
+            arch: widest_arch(),
+            tip: None,
+            gaps,
+            across: vec![Default::default(); if leaf.tied() { (rods - 1) * n } else { 0 }],
+            held: (0..rods)
+                .flat_map(|j| {
+                    leaf.held_inside(j)
+                        .map(move |(i, parts)| (j, i - first, parts))
+                })
+                .collect(),
+            law_forces: Vec::new(),
+            moments: DeadMoments::default(),
+        }
+    }
+
+    /// Updates the coupling between rods, if there is any, from a leaf that otherwise differs
+    /// from that of [`System::new`] only in what is assembled.
+    pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
+        if !self.gaps.is_empty() {
+            self.gaps.clear();
+            self.gaps.extend(of_gaps(leaf));
+            for (g, group) in self.groups.iter_mut().enumerate() {
+                group.coupling = of_group(rods_of(g, self.rods), &self.gaps);
+            }
+        }
+    }
+
+    /// The equations of `leaf` in the memory of a `spare` system of the same leaf, if that is
+    /// on a grid of as many segments.
+    pub fn reused(spare: Option<System>, leaf: &DiscreteLeaf) -> Self {
+        let fits = |spare: &System| {
+            let same = (spare.rods, spare.segments) == (leaf.rods(), leaf.segments());
+            same && spare.first == leaf.first_node()
+        };
+        spare.filter(fits).unwrap_or_else(|| System::new(leaf))
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.rods
+    }
+
+    /// Segments of a rod.
+    pub fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// The first node of a rod with equations; fields begin with it.
+    pub fn first(&self) -> usize {
+        self.first
+    }
+
+    /// Number of nodes of a rod with equations.
+    pub fn nodes(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Whether neighbours are coupled, so that conjugate gradients are needed.
+    pub fn coupled(&self) -> bool {
+        self.coupled
+    }
+
+    /// Coupling of gap `g` at node `i` (from the first with equations), if there is one.
+    pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
+        Some(*self.gaps.get(g)? * self.coupling_weights[i])
+    }
+
+    /// Nodal mass of node `i` (from the first with equations) of rod `j`: rotary, translational.
+    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
+        let (group, lane) = group_and_lane(j);
+        let masses = &self.groups[group].masses;
+        masses.map(|mass| mass.0[lane] * self.weights[i])
+    }
+
+    /// The right-hand side of node `i` of rod `j`: moment and force on it; at a joint
+    /// tip the rod's share.
+    pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
+        let (group, lane) = group_and_lane(j);
+        let rhs = of_lane(&self.groups[group].rhs[i - self.first], lane);
+        (turn(&rhs), shift(&rhs))
+    }
+
+    /// Sets the right-hand side to the mass matrix times the last solution, scaled to a
+    /// largest component of one: a step of inverse iteration.
+    pub fn iterate_mode(&mut self) {
+        let (turn, shift) = self.largest();
+        let scale = 1.0 / turn.max(shift);
+        let mut rhs = self.momentum(&self.solution());
+        for value in rhs.iter_mut().flatten().flatten() {
+            *value *= scale;
+        }
+        self.set_rhs(&rhs);
+    }
+
+    /// Sets a right-hand side without symmetry, the same on all grids, as the start of inverse
+    /// iteration.
+    pub fn seed_mode(&mut self) {
+        // Multiples of the golden ratio are equidistributed: no symmetry, and deterministic.
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let segments = self.segments as f64;
+        let node = |j: usize, i: usize| {
+            let along = (i + self.first) as f64 / segments;
+            std::array::from_fn(|c| golden(12 * j + c + 1) + along * golden(12 * j + c + 7))
+        };
+        let rod = |j: usize| (0..self.nodes()).map(|i| node(j, i)).collect();
+        let seed: Field = (0..self.rods).map(rod).collect();
+        self.set_rhs(&self.momentum(&seed));
+    }
+
+    /// Whether K + shift M is positive definite even without the coupling, which is positive
+    /// semidefinite: then no eigenvalue is negative. Not known with tissue. Overwrites the matrix.
+    pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
+        if self.tied() {
+            return false;
+        }
+        for group in &mut self.groups {
+            for (i, weight) in self.coupling_weights.iter().enumerate() {
+                for c in 0..3 {
+                    let block = group.matrix.diagonal(i, 3 + c, 3 + c);
+                    for (lane, value) in block.0.iter_mut().enumerate() {
+                        let [previous, next] = group.coupling.map(|side| side[c].0[lane]);
+                        *value -= (previous + next) * weight;
+                    }
+                }
+            }
+        }
+        self.factorize(shift)
+    }
+
+    /// The right-hand side as of the last assembly.
+    pub fn rhs(&self) -> Field {
+        self.gather(|group| &group.rhs)
+    }
+
+    /// Replaces the right-hand side.
+    pub fn set_rhs(&mut self, rhs: &Field) {
+        self.scatter(rhs, |group| &mut group.rhs);
+    }
+
+    /// The last solution.
+    pub fn solution(&self) -> Field {
+        self.gather(|group| &group.solution)
+    }
+
+    /// The last solution at node `i` of rod `j`.
+    pub fn increment(&self, j: usize, i: usize) -> Increment {
+        let (group, lane) = group_and_lane(j);
+        of_lane(&self.groups[group].solution[i - self.first], lane)
+    }
+
+    /// Replaces the last solution.
+    pub fn set_solution(&mut self, increments: &Field) {
+        self.law_forces.clear();
+        self.scatter(increments, |group| &mut group.solution);
+    }
+
+    fn gather(&self, of: impl Fn(&Group) -> &Vec<Increments>) -> Field {
+        let rod = |j: usize| {
+            let (group, lane) = group_and_lane(j);
+            let nodes = of(&self.groups[group]).iter();
+            nodes.map(|node| of_lane(node, lane)).collect()
+        };
+        (0..self.rods).map(rod).collect()
+    }
+
+    fn scatter(&mut self, field: &Field, of: impl Fn(&mut Group) -> &mut Vec<Increments>) {
+        for (j, rod) in field.iter().enumerate() {
+            let (group, lane) = group_and_lane(j);
+            for (node, of_rod) in of(&mut self.groups[group]).iter_mut().zip(rod) {
+                set_lane(node, lane, of_rod);
+            }
+        }
+    }
+
+    /// The mass matrix times increments.
+    pub fn momentum(&self, increments: &Field) -> Field {
+        let node = |j: usize, (i, v): (usize, &Increment)| {
+            let mass = self.mass(j, i);
+            std::array::from_fn(|c| mass[c / 3] * v[c])
+        };
+        let rods = increments.iter().enumerate();
+        let mut momentum: Field = rods
+            .map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
+            .collect();
+        for (j, i, held) in &self.held {
+            momentum[*j][*i][held.clone()].fill(0.0);
+        }
+        momentum
+    }
+
+    /// Largest rotation and largest displacement of the last solution; infinite if one is not a
+    /// number.
+    pub fn largest(&self) -> (f64, f64) {
+        let mut largest = [Four::default(); 2];
+        for increment in self.groups.iter().flat_map(|group| &group.solution) {
+            for c in 0..6 {
+                for (most, value) in largest[c / 3].0.iter_mut().zip(&increment[c].0) {
+                    *most = larger(*most, value.abs());
+                }
+            }
+        }
+        let [turn, shift] = largest.map(|four| crate::numbers::largest(four.0));
+        (turn, shift)
+    }
+
+    /// Kinetic energy at unit density of the given nodal velocities.
+    pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
+        let node = |j: usize, (i, v): (usize, &Increment)| {
+            let mass = self.mass(j, i);
+            0.5 * (mass[0] * turn(v).length_squared() + mass[1] * shift(v).length_squared())
+        };
+        let rods = velocity.iter().enumerate();
+        rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
+            .sum()
+    }
+
+    /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
+    /// time `dt`.
+    pub fn velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+        for (j, rod) in velocity.iter_mut().enumerate() {
+            let (group, lane) = group_and_lane(j);
+            for (v, d) in rod.iter_mut().zip(&self.groups[group].solution) {
+                *v = of_lane(d, lane).map(|d| part * d / dt);
+            }
+        }
+    }
+}
+
+impl Group {
+    /// Allocates the equations of a group of the rods of `leaf`.
+    fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
+        let n = leaf.moving_nodes().len();
+        let zeros = vec![Increments::default(); n];
+        let (mut active, mut masses) = (Four::default(), [Four::default(); 2]);
+        for (lane, j) in rods_of(group, leaf.rods()).enumerate() {
+            active.0[lane] = 1.0;
+            for (four, mass) in masses.iter_mut().zip(leaf.mass_per_weight(j)) {
+                four.0[lane] = mass;
+            }
+        }
+        Group {
+            matrix: Chain::new(n, leaf.tips_move_together()),
+            active,
+            rhs: zeros.clone(),
+            solution: zeros.clone(),
+            sums: Sums::default(),
+            masses,
+            coupling: of_group(rods_of(group, leaf.rods()), gaps),
+            residual: zeros.clone(),
+            z: zeros.clone(),
+            b_p: zeros,
+            definite: false,
+            partial: 0.0,
+        }
+    }
+}
+
+impl System {
+    /// Adds to the equations of node `i` of rod `j`: to the matrix a rotary and a
+    /// translational part on its diagonal, to the right-hand side a moment and a force.
+    pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
+        let (group, lane) = group_and_lane(j);
+        let (at, group) = (i - self.first, &mut self.groups[group]);
+        let chain = &mut group.matrix;
+        let increment = &mut group.rhs[at];
+        for c in 0..3 {
+            for r in 0..=c {
+                chain.diagonal(at, r, c).0[lane] += matrix.0.col(c)[r];
+            }
+            chain.diagonal(at, 3 + c, 3 + c).0[lane] += matrix.1;
+            increment[c].0[lane] += rhs.0[c];
+            increment[3 + c].0[lane] += rhs.1[c];
+        }
+    }
+
+    /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its
+    /// displacement.
+    pub fn hold(&mut self, j: usize, i: usize, stiffness: DMat3) {
+        let (group, lane) = group_and_lane(j);
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
+        for c in 0..3 {
+            for r in 0..=c {
+                chain.diagonal(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+            }
+        }
+    }
+
+    /// Adds a spring's `stiffness` to the matrix at node `i` of rod `j`, against its rotation.
+    pub fn hold_rotation(&mut self, j: usize, i: usize, stiffness: DMat3) {
+        let none = (DVec3::ZERO, DVec3::ZERO);
+        self.add(j, i, (stiffness, 0.0), none);
+    }
+
+    /// Adds `stiffness` to the matrix between the displacements of nodes `i` and `i` + 1 of
+    /// rod `j`.
+    pub fn hold_together(&mut self, j: usize, i: usize, stiffness: DMat3) {
+        let (group, lane) = group_and_lane(j);
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
+        for c in 0..3 {
+            for r in 0..3 {
+                chain.off(at, 3 + r, 3 + c).0[lane] += stiffness.col(c)[r];
+            }
+        }
+    }
+}
+
+/// Coupling of every gap per weight.
+pub(super) fn of_gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
+    let gap = move |g: usize| {
+        // A node in the mirror plane is not displaced across it.
+        let free = match leaf.leaf.in_plane(g) {
+            true => DVec3::new(1.0, 0.0, 1.0),
+            false => DVec3::ONE,
+        };
+        free * leaf.coupling(g - 1)
+    };
+    (1..leaf.rods()).map(gap)
+}
+
+/// Coupling of the rods of a group with the previous and the next rods.
+pub(super) fn of_group(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
+    let mut coupling = [[Four::default(); 3]; 2];
+    for (lane, j) in rods.enumerate() {
+        for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
+            for c in 0..3 {
+                coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
+            }
+        }
+    }
+    coupling
+}
+
+/// The operands of E p.
+#[derive(Clone, Copy)]
+pub struct Coupled<'a> {
+    /// The p of all groups, and the index of this group.
+    pub p: &'a [Vec<Increments>],
+    pub group: usize,
+    pub weights: &'a [f64],
+}
+
+impl Coupled<'_> {
+    /// Component `c` of the displacement part of E p at node `i`.
+    #[inline(always)]
+    fn pull<S: Simd>(
+        self,
+        simd: S,
+        i: usize,
+        c: usize,
+        coupling: &[[Four; 3]; 2],
+        part: usize,
+    ) -> Lanes<S> {
+        let at = |group: usize, lane: usize| match self.p.get(group) {
+            Some(p) => p[i][3 + c].0[lane],
+            None => 0.0,
+        };
+        let own = self.p[self.group][i][3 + c].0;
+        let first = at(self.group.wrapping_sub(1), GROUP - 1);
+        let last = at(self.group + 1, 0);
+        let previous = Four([first, own[0], own[1], own[2]]);
+        let next = Four([own[1], own[2], own[3], last]);
+        let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &previous, part);
+        let next = Lanes::of(simd, &next, part);
+        let pull = next.mul_add(Lanes::of(simd, &coupling[1][c], part), pull);
+        Lanes::splat(simd, -self.weights[i]) * pull
+    }
+
+    /// Component `c` of (B + E) p at node `i` of its group.
+    #[inline(always)]
+    fn product<S: Simd>(self, simd: S, of: &Group, i: usize, c: usize, part: usize) -> Lanes<S> {
+        let b_p = Lanes::of(simd, &of.b_p[i][c], part);
+        match c.checked_sub(3) {
+            Some(c) => b_p + self.pull(simd, i, c, &of.coupling, part),
+            None => b_p,
+        }
+    }
+}
+
+/// p . (B + E) p.
+pub struct Product<'a> {
+    pub group: &'a Group,
+    pub coupled: Coupled<'a>,
+    pub product: Four,
+}
+
+impl Kernel for Product<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let mut sum = Lanes::splat(simd, 0.0);
+        let p = &self.coupled.p[self.coupled.group];
+        for (i, p) in p.iter().enumerate() {
+            for c in 0..6 {
+                let k_p = self.coupled.product(simd, self.group, i, c, part);
+                sum = k_p.mul_add(Lanes::of(simd, &p[c], part), sum);
+            }
+        }
+        sum.put(&mut self.product, part);
+    }
+}
+
+/// solution += alpha p, residual -= alpha (B + E) p.
+pub struct Advance<'a> {
+    pub group: &'a mut Group,
+    pub coupled: Coupled<'a>,
+    pub alpha: f64,
+}
+
+impl Kernel for Advance<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let alpha = Lanes::splat(simd, self.alpha);
+        let p = &self.coupled.p[self.coupled.group];
+        for i in 0..p.len() {
+            for c in 0..6 {
+                let k_p = self.coupled.product(simd, self.group, i, c, part);
+                let solution = &mut self.group.solution[i][c];
+                let residual = &mut self.group.residual[i][c];
+                let p = Lanes::of(simd, &p[i][c], part);
+                p.mul_add(alpha, Lanes::of(simd, solution, part))
+                    .put(solution, part);
+                k_p.neg_mul_add(alpha, Lanes::of(simd, residual, part))
+                    .put(residual, part);
+            }
+        }
+    }
+}
+
+/// p = z + beta p, B p = residual + beta B p.
+pub struct Direction<'a> {
+    pub group: &'a mut Group,
+    pub p: &'a mut [Increments],
+    pub beta: f64,
+}
+
+impl Kernel for Direction<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let beta = Lanes::splat(simd, self.beta);
+        let Group {
+            z, residual, b_p, ..
+        } = &mut *self.group;
+        for i in 0..z.len() {
+            for c in 0..6 {
+                for (old, new) in [
+                    (&mut self.p[i][c], &z[i][c]),
+                    (&mut b_p[i][c], &residual[i][c]),
+                ] {
+                    let new = Lanes::of(simd, new, part);
+                    Lanes::of(simd, old, part).mul_add(beta, new).put(old, part);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! The longest stable time step of the explicit method.
+//!
+//! A leapfrog step h is stable while h omega < 2 for every frequency omega of
+//! the leaf. Its squared frequencies are at most the largest of any single
+//! segment with its share of the masses at its ends, plus the contribution of
+//! coupling (T. J. R. Hughes, The Finite Element Method, 1987, section
+//! 9.2). The shares are arbitrary; here they are in proportion to the stiffness with which
+//! each segment holds the node, so that a short or stiff segment has most of a mass
+//! that it alone moves fast. With the rate of internal friction from three
+//! strains (see [`crate::motion::friction::rates`]) a mode with the part K of its squared frequency
+//! from strains and C from coupling satisfies
+//!
+//! ```text
+//! z^3 + (a + 3 b/2 - 2) z^2 + (1 - 2 b) z + b/2 = 0,   a = h^2 (K + C),   b = eta h K
+//! ```
+//!
+//! with roots inside the unit circle while a + 4 b < 4; external damping
+//! does not change that. The drag of wind, with velocities extrapolated from those of the last two
+//! half steps, at which they decay at the rate lambda, gives
+//!
+//! ```text
+//! z^3 + (a + 3 b/2 - 2) z^2 + (1 - 2 b) z + b/2 = 0,   b = h lambda
+//! ```
+//!
+//! and the same bound.
+//!
+//! Masses with which a leaf comes to rest fastest.
+//!
+//! If only the equilibrium matters, masses are arbitrary. With these, the
+//! fastest motion of every single segment and of every coupling between neighbours,
+//! alone with its share of the masses, has the frequency 2: that bounds the frequencies of
+//! the leaf, the longest stable time step is one, and slow motions are as fast relative
+//! to it as possible (P. Underwood, Dynamic relaxation, in: Computational
+//! Methods for Transient Analysis, 1983).
+
+use crate::leaf::{DiscreteLeaf, State};
+use crate::motion::explicit::kernel::{Layout, Node};
+use crate::motion::explicit::packs::{Pack, materials, node_data};
+use crate::motion::physics::{Physics, Wind};
+use glam::{DMat3, DQuat, DVec3};
+use nalgebra::SMatrix;
+use std::array::from_fn;
+
+/// The longest stable time step, and what limits it.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StableStep {
+    /// The step.
+    pub step: f64,
+    /// The fastest motion.
+    pub limit: &'static str,
+}
+
+impl StableStep {
+    /// For a leaf with these positions and rotations.
+    pub fn of(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
+        let (strains, mut limit) = fastest_segment(leaf, physics, state);
+        let (coupling, tissue) = (coupling(leaf, physics), tissue(leaf, physics, state));
+        if coupling.max(tissue) > strains {
+            limit = if tissue > coupling {
+                "tissue"
+            } else {
+                "coupling"
+            };
+        }
+        let coupling = coupling + tissue;
+        let all = strains + coupling;
+        let friction = physics.retardation * strains;
+        let drag = Wind::new(leaf, physics).map_or(0.0, |wind| wind.fastest_decay(leaf, physics));
+        let damping = friction + drag;
+        if damping * damping > all {
+            limit = if drag > friction {
+                "the drag of the wind"
+            } else {
+                "internal damping"
+            };
+        }
+        StableStep {
+            step: 2.0 / (damping + (damping * damping + all).sqrt()),
+            limit,
+        }
+    }
+}
+
+/// Stiffness of a segment, between the displacements of its left and its right end, and
+/// the rotations of both.
+type Stiffness = [[DMat3; 4]; 4];
+
+/// Stiffness with which a node is held: for displacements along its directors, and for rotations
+/// about them.
+type Hold = [DVec3; 2];
+
+/// Least stiffness of a hold in any direction, as a part of its largest component.
+const LEAST_HOLD: f64 = 0.01;
+
+/// Largest squared frequency of any single segment, and the motion it belongs to.
+fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
+    let (rods, n) = (leaf.rods(), leaf.segments());
+    let joined = leaf.leaf.joined() && rods > 1;
+    let mut held: Vec<Hold> = vec![[DVec3::ZERO; 2]; state.x.len()];
+    for (j, i) in leaf.each(0..n) {
+        let stiffness = stiffness(leaf, state, j, i);
+        for end in 0..2 {
+            let node = state.base(j) + i + end;
+            let hold = hold(&stiffness, end, state.q[node]);
+            for c in 0..2 {
+                held[node][c] += hold[c];
+            }
+        }
+    }
+    // All rods hold a shared tip, along their own directors: as a scalar.
+    let tips = (0..rods).map(|j| held[state.base(j) + n][0].max_element());
+    let tip: f64 = tips.sum();
+    let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
+    let tip_mass: f64 = tip_mass.sum();
+    let (mut largest, mut fastest) = (0.0, None);
+    for (j, i) in leaf.each(0..n) {
+        let stiffness = stiffness(leaf, state, j, i);
+        // Inverse square root of the masses of an end, along the lab axes.
+        let root = |end: usize| {
+            let free = match i + end == 0 && physics.clamped() {
+                true => leaf.moves(j, 0),
+                false => [true; 2],
+            };
+            if free == [false; 2] {
+                return [DMat3::ZERO; 2];
+            }
+            let node = state.base(j) + i + end;
+            let inertia = physics.inertia(leaf, j, i + end);
+            let [shift, turn] = hold(&stiffness, end, state.q[node]);
+            let moving = match joined && i + end == n {
+                true => DVec3::splat(tip_mass * shift.max_element() / tip),
+                false => inertia.mass * shift / held[node][0],
+            };
+            let (j1, j2) = (inertia.polar(), inertia.transverse);
+            let turning = DVec3::new(j1, j2, j2) * turn / held[node][1];
+            let frame = DMat3::from_quat(state.q[node]);
+            [(moving, free[1]), (turning, free[0])].map(|(mass, free)| match free {
+                true => {
+                    let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
+                    frame * root * frame.transpose()
+                }
+                false => DMat3::ZERO,
+            })
+        };
+        let (left, right) = (root(0), root(1));
+        let roots = [left[0], right[0], left[1], right[1]];
+        let scaled: Stiffness = from_fn(|r| from_fn(|c| roots[r] * stiffness[r][c] * roots[c]));
+        let matrix = SMatrix::<f64, 12, 12>::from_fn(|r, c| scaled[r / 3][c / 3].col(c % 3)[r % 3]);
+        let squared = matrix.symmetric_eigenvalues().max();
+        if squared > largest {
+            (largest, fastest) = (squared, Some((j, i, roots, matrix)));
+        }
+    }
+    let Some((j, i, roots, matrix)) = fastest else {
+        return (0.0, "");
+    };
+    let eigen = matrix.symmetric_eigen();
+    let mode = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let motion = from_fn(|k| roots[k] * DVec3::from_slice(&mode.as_slice()[3 * k..3 * k + 3]));
+    (largest, name(leaf, state, (j, i), motion))
+}
+
+/// Stiffness of a segment that carries the force of its strain.
+fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffness {
+    let section = leaf.section(j, i).condense(f64::INFINITY);
+    let k = leaf.strained_segment(state, j, i).hessian(&section);
+    [
+        [k.xx, -k.xx, -k.xa, -k.xb],
+        [-k.xx, k.xx, k.xa, k.xb],
+        [-k.xa.transpose(), k.xa.transpose(), k.aa, k.ab],
+        [-k.xb.transpose(), k.xb.transpose(), k.ab.transpose(), k.bb],
+    ]
+}
+
+/// Stiffness with which a segment holds the node of rotation `q` at its left or right end.
+fn hold(stiffness: &Stiffness, end: usize, q: DQuat) -> Hold {
+    let frame = DMat3::from_quat(q);
+    [end, 2 + end].map(|c| {
+        let seen = frame.transpose() * stiffness[c][c] * frame;
+        let hold = DVec3::new(seen.x_axis.x, seen.y_axis.y, seen.z_axis.z);
+        hold.max(DVec3::splat(LEAST_HOLD * hold.max_element()))
+    })
+}
+
+/// The dominant kind of a motion of a segment, given by displacements and rotations of its ends.
+fn name(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    (j, i): (usize, usize),
+    [x0, x1, a, b]: [DVec3; 4],
+) -> &'static str {
+    let (section, node) = (leaf.section(j, i), state.base(j) + i);
+    let frame = leaf.segment(state, j, i, DVec3::ZERO).frame.transpose();
+    let along = frame * (state.x[node + 1] - state.x[node]);
+    let strain = frame * (x1 - x0) + along.cross(frame * (0.5 * (a + b)));
+    let stretch = strain * strain / section.compliance;
+    let turn = frame * (b - a);
+    let bend = turn * turn * section.couple_stiffness;
+    let motions = [
+        (stretch.x, "waves of stretch"),
+        (bend.x, "waves of twist"),
+        (bend.y + bend.z, "waves of bending"),
+        (stretch.y + stretch.z, "shear with rotation"),
+    ];
+    let most = motions.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    most.map_or("", |(_, name)| name)
+}
+
+/// Upper bound on the contribution of coupling to the squared frequency: of all pairs of
+/// coupled nodes, the largest sum of the stiffness that couples each, over its
+/// mass. (The same bound for the Laplacian of a graph: W. N. Anderson and
+/// T. D. Morley, Linear and Multilinear Algebra 18, 1985.)
+fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
+    let mut largest = 0.0_f64;
+    for i in 1..=leaf.segments() {
+        let of = |j: usize| {
+            let gaps = [j.wrapping_sub(1), j];
+            let inside = gaps.into_iter().filter(|&g| g < leaf.rods() - 1);
+            let springs: DVec3 = inside.map(|g| leaf.spring(g, i)).sum();
+            springs / physics.inertia(leaf, j, i).mass
+        };
+        for gap in 0..leaf.rods() - 1 {
+            let tied = leaf.spring(gap, i).cmpgt(DVec3::ZERO);
+            let sum = DVec3::select(tied, of(gap) + of(gap + 1), DVec3::ZERO);
+            largest = largest.max(sum.max_element());
+        }
+    }
+    largest
+}
+
+/// Upper bound on the contribution of the tissue to the squared frequency: the largest of any single
+/// strip, half of the masses of a node belonging to either of its two gaps.
+fn tissue(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> f64 {
+    let mut largest = 0.0_f64;
+    for (g, i, stiffness) in leaf.tissue_stiffness(state) {
+        let inverse = |rod: usize| {
+            let inertia = physics.inertia(leaf, rod, i);
+            let ends = [0, leaf.rods() - 1].contains(&rod);
+            let share = if ends { 1.0 } else { 0.5 };
+            // Bases that are held do not move.
+            let [turns, shifts] = match i == 0 && physics.clamped() {
+                true => leaf.moves(rod, 0),
+                false => [true; 2],
+            };
+            let part = |free: bool| if free { 1.0 / share } else { 0.0 };
+            let turning = inertia.polar().min(inertia.transverse);
+            [part(turns) / turning, part(shifts) / inertia.mass].map(f64::sqrt)
+        };
+        let (a, b) = (inverse(g), inverse(g + 1));
+        let roots = [a[0], a[1], b[0], b[1]];
+        let scaled = |r: usize, c: usize| roots[r / 3] * stiffness[(r, c)] * roots[c / 3];
+        let matrix = SMatrix::<f64, 12, 12>::from_fn(scaled);
+        largest = largest.max(matrix.symmetric_eigenvalues().max());
+    }
+    largest
+}
+
+/// Part of the squared frequency 4 of a segment that is due to the rotations of its
+/// ends, the rest being due to their translations. Slow motions are mostly translations:
+/// rotations get the smaller part of the frequency, hence larger masses.
+const ROTATING: f64 = 0.5;
+
+/// Sets the masses of the rods; returns that of a shared tip.
+pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, layout: Layout, packs: &mut [Pack]) -> f64 {
+    let (n, count) = (leaf.segments(), leaf.rods());
+    let mut tip = 0.0;
+    let mut rods: Vec<Vec<Node>> = Vec::with_capacity(count);
+    for j in 0..count {
+        let old: Vec<Node> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
+        let mut new = old.clone();
+        for i in 0..=n {
+            let (mut mass, mut inertia) = (0.0, 0.0);
+            let before = i.checked_sub(1).map(|before| &old[before]);
+            for segment in before.into_iter().chain([&old[i]]) {
+                let stretch = segment.stretch.into_iter().fold(0.0_f64, f64::max);
+                let bend = segment.bend.into_iter().fold(0.0_f64, f64::max);
+                let arm = 0.5 * segment.rest_length[0];
+                mass += 2.0 * stretch / (4.0 - ROTATING);
+                inertia += 2.0 * (bend + stretch * arm * arm) / ROTATING;
+            }
+            let node = &mut new[i];
+            // Both neighbours pull on a node, and may move as much as it does.
+            for (gap, coupled) in [j.wrapping_sub(1), j].into_iter().zip(node.coupled) {
+                if gap < count - 1 {
+                    mass += 0.5 * (leaf.leaf.coupling(gap) * coupled).max_element();
+                }
+            }
+            for (stiffness, fold, width) in leaf.tissue_at(j, i) {
+                let arm = 0.5 * width;
+                mass += 2.0 * stiffness / (4.0 - ROTATING);
+                inertia += 2.0 * (fold + stiffness * arm * arm) / ROTATING;
+            }
+            if i == n {
+                tip += mass;
+            }
+            node.per_spin = 0.0;
+            // Zero for a held node, and for a shared tip.
+            if node.per_inertia != 0.0 {
+                node.per_inertia = 1.0 / inertia;
+            }
+            if node.per_mass != 0.0 {
+                node.mass = mass;
+                node.per_mass = 1.0 / mass;
+            }
+        }
+        rods.push(new);
+    }
+    for (pack, material) in packs.iter_mut().zip(materials(layout, |j, i| rods[j][i])) {
+        pack.material = material;
+    }
+    tip
+}

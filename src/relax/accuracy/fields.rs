@@ -1,0 +1,490 @@
+//! The leaf at the nodes of its grids, extrapolated over them.
+//!
+//! A leaf between two stations where it is known: the equilibrium equations integrated from both.
+//!
+//! A leaf at rest at other stations.
+
+use crate::leaf::{DiscreteLeaf, Flow, Grid, Leaf, RodFields, Slice};
+use crate::numbers::larger;
+use crate::relax::accuracy::richardson::{Richardson, distance};
+use crate::relax::accuracy::transfer::Stencil;
+use crate::relax::accuracy::{Level, positions, transfer};
+use crate::relax::result::forces::Stresses;
+use crate::relax::result::{Equilibrium, Outcome, Shape};
+use crate::scenario::Scenario;
+use crate::shape::{SAME_STATION, equally_spaced};
+use glam::{DQuat, DVec3};
+
+/// A node's values that are extrapolated: position, quaternion, n and m along the directors.
+type Node = [f64; 13];
+
+/// Nodes of the interpolation of lower order.
+const LOWER: usize = 5;
+
+/// The leaf's fields after `columns` extrapolations at the ends of `parts` equal parts of its
+/// grids, rod after rod, dimensionless.
+pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodFields>> {
+    let finest = &levels[levels.len() - 1];
+    let rods = 0..finest.leaf.rods();
+    if columns == 0 {
+        return rods.map(|j| on_grid(finest, j, parts)).collect();
+    }
+    let used = &levels[levels.len() - 1 - columns..];
+    let rod = |j: usize| unpacked(&extrapolated(used, &rotations(finest, j), j, parts));
+    rods.map(rod).collect()
+}
+
+/// The fields of a rod on one grid.
+fn on_grid(level: &Level, j: usize, parts: usize) -> Vec<RodFields> {
+    let Level { leaf, state } = level;
+    let stride = leaf.segments() / parts;
+    let node = |(i, q): (usize, DQuat)| {
+        let [n, m] = transfer::resultants(leaf, state, j, i).map(|vector| q * vector);
+        let x = state.x[state.base(j) + i];
+        RodFields { x, q, n, m }
+    };
+    let rotations = rotations(level, j).into_iter().enumerate();
+    rotations.step_by(stride).map(node).collect()
+}
+
+/// The leaf's fields at all nodes of one of the first `wanted` grids: of the finest where the error
+/// of positions exceeds that at the nodes of the coarsest, `known`, by no more than `allowed`. Also
+/// returns the number of this grid, and the excess.
+///
+/// Nodes added by a grid have the extrapolation of the grids from there on, plus the remainder of
+/// that of the coarser grids, which is small and smooth, interpolated between their nodes. The
+/// error of the interpolation is estimated by the largest difference from one of lower order.
+pub fn finer_nodes(
+    levels: &[Level],
+    columns: usize,
+    wanted: usize,
+    [known, allowed]: [f64; 2],
+) -> (usize, Vec<Vec<RodFields>>, f64) {
+    let used = levels.len() - 1 - columns;
+    let finest = &levels[levels.len() - 1];
+    let rods = 0..finest.leaf.rods();
+    let signs: Vec<_> = rods.clone().map(|j| rotations(finest, j)).collect();
+    let on = |k: usize, j: usize| {
+        let segments = levels[k].leaf.segments();
+        extrapolated(&levels[k.max(used)..], &signs[j], j, segments)
+    };
+    let mut reached: Vec<Vec<Node>> = rods.clone().map(|j| on(0, j)).collect();
+    let (mut grid, mut between) = (0, 0.0);
+    for k in 1..wanted {
+        let mut excess = match k {
+            1 => known * (layer_ratio(levels) - 1.0),
+            _ => 0.0,
+        };
+        let mut nodes: Vec<Vec<Node>> = rods.clone().map(|j| on(k, j)).collect();
+        excess += add_remainder(&mut nodes, &reached, [&levels[k - 1].leaf, &levels[k].leaf]);
+        if !excess.is_finite() || between + excess > allowed {
+            break;
+        }
+        (grid, reached, between) = (k, nodes, between + excess);
+    }
+    (
+        grid,
+        reached.iter().map(|rod| unpacked(rod)).collect(),
+        between,
+    )
+}
+
+/// Adds to the `nodes` of a grid what those of the `coarser` one have more, interpolated between
+/// them; returns the error of that.
+fn add_remainder(
+    nodes: &mut [Vec<Node>],
+    known: &[Vec<Node>],
+    [coarser, finer]: [&DiscreteLeaf; 2],
+) -> f64 {
+    let stride = finer.segments() / coarser.segments();
+    let stencil = |&at: &f64| {
+        let [stencil, _] = <Stencil>::at(coarser, at);
+        let [lower, _] = Stencil::<LOWER>::at(coarser, at);
+        (stencil, lower)
+    };
+    let stencils: Vec<_> = finer.grid.sigma().iter().map(stencil).collect();
+    let mut error = 0.0_f64;
+    for (nodes, known) in nodes.iter_mut().zip(known) {
+        let own = nodes.iter().step_by(stride);
+        let remainder = |(a, b): (&Node, &Node)| -> Node { std::array::from_fn(|k| a[k] - b[k]) };
+        let remainders: Vec<Node> = known.iter().zip(own).map(remainder).collect();
+        let position = |i: usize| DVec3::from_slice(&remainders[i]);
+        for (node, (stencil, lower)) in nodes.iter_mut().zip(&stencils) {
+            let difference = stencil.value(position) - lower.value(position);
+            error = larger(error, difference.length());
+            for (i, weight) in stencil.terms() {
+                (node.iter_mut().zip(&remainders[i])).for_each(|(sum, it)| *sum += weight * it);
+            }
+        }
+    }
+    error
+}
+
+/// Ratio of the largest changes of positions by the last grid at the nodes of the grid before and
+/// at those of the first: errors may be larger by it, as with a boundary layer between the nodes
+/// of the first grid.
+fn layer_ratio(levels: &[Level]) -> f64 {
+    let [first, .., before, finest] = levels else {
+        return 1.0;
+    };
+    let change = |stride| distance(&positions(before, stride), &positions(finest, 2 * stride));
+    ratio(
+        change(1),
+        change(before.leaf.segments() / first.leaf.segments()),
+    )
+}
+
+/// Ratio of a change to another, which is a part of it; one if there is no change.
+fn ratio(change: f64, part: f64) -> f64 {
+    match change == 0.0 {
+        true => 1.0,
+        false => change / part,
+    }
+}
+
+/// The values of a rod extrapolated over `levels` at the ends of so many parts; its quaternions on
+/// the finest grid are `signs`.
+fn extrapolated(levels: &[Level], signs: &[DQuat], j: usize, parts: usize) -> Vec<Node> {
+    let on = |Level { leaf, state }: &Level| {
+        let stride = leaf.segments() / parts;
+        let node = |i: usize| -> Node {
+            let k = state.base(j) + i * stride;
+            let [n, m] = transfer::resultants(leaf, state, j, i * stride);
+            // q and -q are the same rotation: all grids must use the same sign.
+            let q = with_sign_of(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
+            let x = state.x[k];
+            [
+                x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
+            ]
+        };
+        (leaf.segments(), (0..=parts).flat_map(node).collect())
+    };
+    let table: Richardson = levels.iter().map(on).collect();
+    table.column(levels.len() - 1).as_chunks().0.to_vec()
+}
+
+/// The fields with these values.
+fn unpacked(rod: &[Node]) -> Vec<RodFields> {
+    let fields = |node: &Node| {
+        let vector = |k: usize| DVec3::from_slice(&node[k..]);
+        let q = DQuat::from_slice(&node[3..]).normalize();
+        RodFields {
+            x: vector(0),
+            q,
+            n: q * vector(7),
+            m: q * vector(10),
+        }
+    };
+    rod.iter().map(fields).collect()
+}
+
+/// Quaternions of rod `j` at all nodes, continuous in sign.
+fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
+    let base = level.state.base(j);
+    let mut before = level.state.q[base];
+    let same = |q: &DQuat| {
+        before = with_sign_of(*q, before);
+        before
+    };
+    let rotations = level.state.q[base..=base + level.leaf.segments()].iter();
+    rotations.map(same).collect()
+}
+
+/// Of q and -q the one nearer to `other`.
+pub fn with_sign_of(q: DQuat, other: DQuat) -> DQuat {
+    if q.dot(other) < 0.0 { -q } else { q }
+}
+
+/// Longest step of the integration.
+const STEP: f64 = 1.0 / 64.0;
+
+/// Safety factor on the error estimate.
+const SAFETY: f64 = 2.0;
+
+/// All rods at one sigma.
+pub type Section = Vec<RodFields>;
+
+/// A leaf at rest at `points` between two stations, given the sections there, and the largest
+/// error of a position in addition to those at the stations: the mean of what is integrated from
+/// either side, with weights that fall linearly to zero at the other. `None` where positions
+/// integrated from one station miss the other by more than the distance of the two.
+///
+/// Let a and b be the vectors by which the two miss. Errors that grow linearly from either
+/// station have a + b = 0 if the mean is free of them; otherwise its error is at most |a + b|/4.
+pub fn integrated_between(
+    flow: &mut Flow,
+    kinks: &[f64],
+    [(from, begin), (to, end)]: [(f64, &Section); 2],
+    points: &[f64],
+) -> Option<(Vec<Section>, f64)> {
+    let forward = points.iter().copied().chain([to]);
+    let mut before = integrated(flow, kinks, (from, begin), forward);
+    let backward = points.iter().rev().copied().chain([from]);
+    let mut behind = integrated(flow, kinks, (to, end), backward);
+    let (there, here) = (before.pop()?, behind.pop()?);
+    let mut error = 0.0_f64;
+    for j in 0..begin.len() {
+        let (a, b) = (there[j].x - end[j].x, here[j].x - begin[j].x);
+        // Also where the integration yields no numbers.
+        let near = |miss: DVec3| miss.is_finite() && miss.length() <= to - from;
+        if !near(a) || !near(b) {
+            return None;
+        }
+        error = larger(error, 0.25 * (a + b).length());
+    }
+    behind.reverse();
+    let sections = before.iter().zip(&behind).zip(points);
+    let sections = sections.map(|((a, b), at)| mean([a, b], (at - from) / (to - from)));
+    Some((sections.collect(), SAFETY * error))
+}
+
+/// The mean of two sections, the second with this weight.
+pub fn mean([a, b]: [&Section; 2], weight: f64) -> Section {
+    let rod = |(a, b): (&RodFields, &RodFields)| RodFields {
+        x: a.x.lerp(b.x, weight),
+        q: a.q.lerp(b.q, weight),
+        n: a.n.lerp(b.n, weight),
+        m: a.m.lerp(b.m, weight),
+    };
+    a.iter().zip(b).map(rod).collect()
+}
+
+/// The sections at `points`, one after the other, integrated from one section; no step reaches
+/// across a kink.
+fn integrated(
+    flow: &mut Flow,
+    kinks: &[f64],
+    (mut at, begin): (f64, &Section),
+    points: impl Iterator<Item = f64>,
+) -> Vec<Section> {
+    let mut section = begin.clone();
+    let mut integrate_to = |point: f64| {
+        let inside = |kink: &&f64| (**kink - at) * (**kink - point) < 0.0;
+        let mut stops: Vec<f64> = kinks.iter().filter(inside).copied().collect();
+        if point < at {
+            stops.reverse();
+        }
+        for stop in stops.into_iter().chain([point]) {
+            let steps = ((stop - at).abs() / STEP).ceil().max(1.0);
+            let mut after = vec![Slice::default(); steps as usize];
+            flow.integrate(|j| section[j], [at, stop], &mut after);
+            if let Some(last) = after.last() {
+                section = (0..section.len()).map(|j| last.rod(j)).collect();
+            }
+            at = stop;
+        }
+        section.clone()
+    };
+    points.map(&mut integrate_to).collect()
+}
+
+/// Smallest number of parts into which the stations of a result divide a vein.
+const PARTS: usize = 16;
+
+/// Advice if interpolated stations are less accurate than the tolerance.
+const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
+    stations between: ask for a smaller tolerance, or for other stations";
+
+impl Equilibrium {
+    /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
+    /// nodes of the finest grid, with its segments halved until there are at least 17
+    /// stations.
+    ///
+    /// Between the stations of the solution the equilibrium equations are integrated; a leaf that
+    /// is not at rest is interpolated linearly. The error between stations in addition to that at
+    /// them is added to the error estimate; if that then exceeds the tolerance, the outcome becomes
+    /// [`Outcome::ToleranceNotReached`], or without `parts` the stations stay as they are.
+    #[must_use]
+    pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
+        let to = match parts {
+            Some(parts) => equally_spaced(parts),
+            None => finest(&self.shape),
+        };
+        if to == self.shape.stations {
+            return self;
+        }
+        let mut there = self.clone().interpolated(scenario, to);
+        if there.keeps_tolerance() || !self.keeps_tolerance() {
+            return there;
+        }
+        if parts.is_none() {
+            return self;
+        }
+        if there.outcome.is_success() {
+            there.outcome = Outcome::ToleranceNotReached;
+            there.remark = Some(BETWEEN.into());
+        }
+        there
+    }
+
+    /// Whether the tolerance, if it is kept at the stations of the solution, is kept at the ends
+    /// of so many equal `parts`, too.
+    pub(in crate::relax) fn keeps_tolerance_at(&self, scenario: &Scenario, parts: usize) -> bool {
+        let there = || self.clone().interpolated(scenario, equally_spaced(parts));
+        !self.keeps_tolerance() || there().keeps_tolerance()
+    }
+
+    pub(in crate::relax) fn keeps_tolerance(&self) -> bool {
+        let allowed = self.accuracy.tolerance * self.shape.longest();
+        (self.accuracy.error_estimate).is_none_or(|error| error <= allowed)
+    }
+
+    /// The same at these stations.
+    fn interpolated(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
+        let at_rest = !matches!(
+            self.outcome,
+            Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
+        );
+        let leaf = Leaf::new(scenario);
+        let discrete = DiscreteLeaf::new(&leaf, Grid::new(1, leaf.kinks()));
+        let mut flow = Flow::new(&discrete);
+        let (stations, known) = (&self.shape.stations, &self.shape.rods);
+        let section = |i: usize| -> Section {
+            let rods = known.iter();
+            rods.map(|rod| transfer::fields(&leaf, &rod.nodes[i]))
+                .collect()
+        };
+        let mut between = 0.0_f64;
+        let mut rods = vec![Vec::with_capacity(to.len()); known.len()];
+        let mut rest = to.as_slice();
+        for (i, &station) in stations.iter().enumerate() {
+            if rest
+                .first()
+                .is_some_and(|at| (at - station).abs() < SAME_STATION)
+            {
+                for (rod, known) in rods.iter_mut().zip(known) {
+                    rod.push(known.nodes[i]);
+                }
+                rest = &rest[1..];
+            }
+            let next = stations.get(i + 1).copied().unwrap_or(1.0);
+            let (points, others) =
+                rest.split_at(rest.partition_point(|at| *at < next - SAME_STATION));
+            rest = others;
+            if points.is_empty() {
+                continue;
+            }
+            let [begin, end] = [i, i + 1].map(section);
+            let ends = [(station, &begin), (next, &end)];
+            let found = match at_rest {
+                true => integrated_between(&mut flow, leaf.kinks(), ends, points),
+                false => None,
+            };
+            let (sections, error) = found.unwrap_or_else(|| {
+                let weight = |at: &f64| (at - station) / (next - station);
+                let mean = |at: &f64| mean([&begin, &end], weight(at));
+                let error = if at_rest { next - station } else { 0.0 };
+                (points.iter().map(mean).collect(), error)
+            });
+            between = larger(between, error * leaf.scale.length);
+            for (&at, section) in points.iter().zip(&sections) {
+                for (j, fields) in section.iter().enumerate() {
+                    rods[j].push(transfer::node_of(&leaf, (j, at), fields));
+                }
+            }
+        }
+        for (rod, nodes) in self.shape.rods.iter_mut().zip(rods) {
+            rod.nodes = nodes;
+        }
+        let error = self.stress.as_ref().and_then(|it| it.error);
+        // Where stations in between are less accurate than the nodes, so are the forces there.
+        let at_nodes = self.accuracy.error_estimate;
+        let error = error.filter(|_| at_nodes.is_some_and(|at_nodes| between <= at_nodes));
+        let stress = Stresses::of(scenario, &to, &self.shape.rods);
+        self.stress = stress.map(|it| Stresses { error, ..it });
+        self.shape.stations = to;
+        if let Some(error) = &mut self.accuracy.error_estimate {
+            *error += between;
+        }
+        self
+    }
+}
+
+/// Nodes of the finest grid, with all segments halved until there are enough.
+fn finest(shape: &Shape) -> Vec<f64> {
+    let mut stations = shape.curve_stations.clone();
+    while (2..=PARTS).contains(&stations.len()) {
+        let middles = stations
+            .windows(2)
+            .flat_map(|w| [0.5 * (w[0] + w[1]), w[1]]);
+        stations = stations[..1].iter().copied().chain(middles).collect();
+    }
+    stations
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_between_nodes_that_do_not_move_is_no_small_one() {
+        assert_eq!(ratio(3e-9, 1e-9), 3.0);
+        assert_eq!(ratio(3e-9, 0.0), f64::INFINITY);
+        assert_eq!(ratio(0.0, 0.0), 1.0);
+    }
+}
+
+#[cfg(test)]
+mod stations_tests {
+    use super::*;
+
+    /// A tapering vein with a knot, compared with an accurate solution at the same stations.
+    #[test]
+    fn stations_between_are_as_accurate_as_those_that_were_solved_for() {
+        let scenario = Scenario::from_toml(
+            r#"
+            name = "taper"
+            leaf = { rods = 3, length = [1.0, 1.1, 0.9], fan = "paper" }
+            stiffness = { torsion = 0.5, bending_2 = { at = [0.0, 0.3, 1.0], value = [1.0, 1.0, 0.4] }, bending_3 = 1.0, axial = 100.0, shear_2 = 50.0, shear_3 = inf }
+            rest = { bend_2 = 0.7, twist = -0.4, stretch = 1.05 }
+            coupling = { y = 1.0, z = 2.0 }
+            load = { gravity = [0.1, 0.2, -2.0] }
+            "#,
+        )
+        .unwrap();
+        let to = |tolerance| {
+            let relaxation = scenario.relaxation().tolerance(tolerance);
+            relaxation.every_node().run().unwrap()
+        };
+        let sharp = to(1e-10);
+        for tolerance in [1e-3, 1e-6, 1e-8] {
+            let found = to(tolerance);
+            let there = found.clone().at_stations(&scenario, None);
+            let finest = found.shape.curves[0].len();
+            let count = there.shape.stations.len();
+            assert!(count > PARTS && count >= finest);
+            let within = there.accuracy.error_estimate.unwrap();
+            assert!(within <= tolerance * found.shape.longest());
+            let sharp = sharp.clone().at_stations(&scenario, Some(40));
+            let there = found.at_stations(&scenario, Some(40));
+            assert_eq!(there.shape.stations, equally_spaced(40));
+            let error = there.accuracy.error_estimate.unwrap();
+            for (one, other) in there.shape.rods.iter().zip(&sharp.shape.rods) {
+                for (node, exact) in one.nodes.iter().zip(&other.nodes) {
+                    let away = (node.position - exact.position).length();
+                    assert!(away <= error, "{tolerance}: {away} > {error}");
+                    assert!((node.m - exact.m).length() < 1e2 * error);
+                    assert!((node.n - exact.n).length() < 1e3 * error);
+                    assert!((node.u - exact.u).length() < 1e3 * error);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stations_that_were_found_stay_as_they_are() {
+        let scenario = Scenario::from_toml(include_str!("../../../scenarios/paper/fig04.toml"));
+        let scenario = scenario.unwrap();
+        let found = scenario.relaxation().every_node().run().unwrap();
+        let there = found.clone().at_stations(&scenario, None);
+        for (i, station) in found.shape.stations.iter().enumerate() {
+            let mut stations = there.shape.stations.iter();
+            let k = stations.position(|s| s == station).unwrap();
+            for (one, other) in found.shape.rods.iter().zip(&there.shape.rods) {
+                assert_eq!(one.nodes[i], other.nodes[k]);
+            }
+        }
+        let nodes = there.shape.curves[0].len();
+        assert_eq!(there.shape.stations.len(), nodes.max(PARTS + 1));
+    }
+}

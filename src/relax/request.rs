@@ -1,0 +1,412 @@
+//! What is asked of a relaxation: the method, the options, and the leaf on nested grids.
+//!
+//! The methods by which a leaf is brought to rest, each with its own options.
+//!
+//! Options of a relaxation, and the errors of requests that cannot be met.
+
+use crate::memory::TooMuch;
+use crate::relax::path::Route;
+use crate::run::{Limit, RefusedOption, Unmodelled};
+use crate::scenario::{Scenario, UnbalancedMoment};
+use crate::{read_and_write, shooting};
+use glam::DVec3;
+use std::fmt;
+
+/// How a leaf is brought to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Method {
+    /// Linearly implicit damped motion that turns into Newton's method.
+    SemiImplicit(SemiImplicit),
+    /// Explicit damped motion, then accelerated descent with fictitious masses and damping.
+    /// Not for rigid rods.
+    Explicit {
+        /// One grid of so many segments a rod, without extrapolation; `None`: as
+        /// fine as the tolerance needs.
+        segments: Option<usize>,
+    },
+    /// The boundary-value problem in one piece (module `shooting`), from arcs by
+    /// continuation. Finds equilibria, stable or not.
+    SingleShooting,
+    /// The boundary-value problem by multiple shooting, from arcs by continuation.
+    /// Finds equilibria, stable or not.
+    Shooting {
+        /// Number of intervals; `None`: as many as the growth of perturbations
+        /// needs.
+        intervals: Option<usize>,
+    },
+    /// The boundary-value problem by multiple shooting, from the leaf relaxed to a
+    /// coarse tolerance.
+    ShootingFromRest {
+        /// Number of intervals; `None`: as many as the growth of perturbations
+        /// needs.
+        intervals: Option<usize>,
+    },
+}
+
+/// Options of the semi-implicit method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SemiImplicit {
+    /// One grid of so many segments a rod, without extrapolation; `None`: as fine
+    /// as the tolerance needs.
+    pub segments: Option<usize>,
+    /// Whether to stop at a saddle instead of leaving it. Newton's method then converges to
+    /// equilibria of any kind.
+    pub keep_unstable: bool,
+    /// Whether to solve for the whole leaf even where symmetry allows half of it.
+    pub full_model: bool,
+    /// Start from the state of this number in an unlimited series of disturbed ones: each
+    /// displaces the leaf out of its plane in a different pattern, consecutive numbers to
+    /// opposite sides.
+    pub disturbance: Option<usize>,
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Method::SemiImplicit(SemiImplicit::default())
+    }
+}
+
+impl Method {
+    /// All of them, with default options.
+    pub const ALL: [Method; 5] = [
+        Method::SemiImplicit(SemiImplicit {
+            segments: None,
+            keep_unstable: false,
+            full_model: false,
+            disturbance: None,
+        }),
+        Method::Explicit { segments: None },
+        Method::SingleShooting,
+        Method::Shooting { intervals: None },
+        Method::ShootingFromRest { intervals: None },
+    ];
+
+    /// Its name on the command line and in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Method::SemiImplicit(_) => "semi-implicit",
+            Method::Explicit { .. } => "explicit",
+            Method::SingleShooting => "single-shooting",
+            Method::Shooting { .. } => "shooting",
+            Method::ShootingFromRest { .. } => "shooting-from-rest",
+        }
+    }
+
+    /// Segments per rod of a fixed grid, if the method has one.
+    pub fn segments(self) -> Option<usize> {
+        match self {
+            Method::SemiImplicit(SemiImplicit { segments, .. }) | Method::Explicit { segments } => {
+                segments
+            }
+            _ => None,
+        }
+    }
+
+    /// The same method on one grid of `segments` segments a rod or, with `None`, on as many
+    /// grids as it needs; no change for a method without grids.
+    pub fn on_grid(self, segments: Option<usize>) -> Method {
+        match self {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit { segments, ..how }),
+            Method::Explicit { .. } => Method::Explicit { segments },
+            shooting => shooting,
+        }
+    }
+
+    /// The same method with the given settings.
+    pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
+        let Settings {
+            segments,
+            intervals,
+            keep_unstable,
+            full_model,
+            route,
+        } = settings;
+        let shooting = matches!(
+            self,
+            Method::Shooting { .. } | Method::ShootingFromRest { .. }
+        );
+        let unfit = |setting, value, why| Unfit {
+            setting,
+            value,
+            why,
+        };
+        if intervals.is_some() && !shooting {
+            let why = "only the method shooting has intervals";
+            return Err(unfit("intervals", intervals, why));
+        }
+        if route == Route::Release && self.is_shooting() {
+            let why = "shooting follows no motion; use the method semi-implicit or explicit";
+            return Err(unfit("path", None, why));
+        }
+        if segments.is_some() && self.is_shooting() {
+            let why = "shooting has no grid; leave it out, or set the number of intervals";
+            return Err(unfit("segments", segments, why));
+        }
+        Ok(match self {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
+                segments,
+                keep_unstable,
+                full_model,
+                ..how
+            }),
+            Method::Explicit { .. } if keep_unstable => {
+                let why = "explicit motion leaves unstable equilibria; \
+                    use the method semi-implicit or shooting";
+                return Err(unfit("keep_unstable", None, why));
+            }
+            Method::Explicit { .. } => Method::Explicit { segments },
+            Method::SingleShooting => Method::SingleShooting,
+            Method::Shooting { .. } => Method::Shooting { intervals },
+            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        })
+    }
+
+    /// Whether it solves the boundary-value problem.
+    pub fn is_shooting(self) -> bool {
+        !matches!(self, Method::SemiImplicit(_) | Method::Explicit { .. })
+    }
+}
+
+impl From<SemiImplicit> for Method {
+    fn from(how: SemiImplicit) -> Self {
+        Method::SemiImplicit(how)
+    }
+}
+
+read_and_write!(Method);
+
+/// Settings by name, whatever the method.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Settings {
+    /// One grid of so many segments a rod.
+    pub segments: Option<usize>,
+    /// Number of intervals of shooting.
+    pub intervals: Option<usize>,
+    /// Whether to stop at a saddle.
+    pub keep_unstable: bool,
+    /// Whether to solve for the whole leaf.
+    pub full_model: bool,
+    /// Which equilibrium is meant.
+    pub route: Route,
+}
+
+/// A setting that a method does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unfit {
+    /// The setting's name among [`Settings`].
+    pub setting: &'static str,
+    /// Its value, if it is a number.
+    pub value: Option<usize>,
+    /// Why, and what to change.
+    pub why: &'static str,
+}
+
+/// Options of a relaxation.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+    /// Which equilibrium is meant, where there are several (semi-implicit and explicit method).
+    pub route: Route,
+    /// A force along the lab axes, of any size, that decides to which side a slowly loaded leaf
+    /// turns where both are equally open; zero: down, then to the left, then forward.
+    pub leaning: DVec3,
+    /// Replaces the scenario's tolerance.
+    pub tolerance: Option<f64>,
+    /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];
+    /// their time is not measured. 0: none. The signs of their eigenvalues are compared with
+    /// the Morse index, and finer grids decide where they differ.
+    pub modes: usize,
+    /// Whether their shapes are requested. Without them modes of large leaves are left out,
+    /// and eigenvalues are slightly less accurate.
+    pub mode_shapes: bool,
+    /// Whether the leaf is requested at the nodes of the finest grid, not only at those of the
+    /// coarsest (semi-implicit and explicit method).
+    pub every_node: bool,
+    /// The number of equal parts of a vein at whose ends the tolerance must be kept, too: where
+    /// interpolation loses more, the leaf is solved with a smaller tolerance.
+    pub stations: Option<usize>,
+    /// Time limit and cancellation: a run that is stopped ends not at rest.
+    pub limit: Limit,
+}
+
+/// Progress of a run.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress {
+    /// Of a relaxation.
+    Relaxing {
+        /// Segments per rod of the present grid.
+        grid: usize,
+        /// Step on that grid.
+        step: usize,
+        /// Size of that step: largest rotation or displacement, in radians or
+        /// lengths of the leaf. It goes to zero as the leaf comes to rest.
+        residual: f64,
+    },
+    /// Of a shooting.
+    Shooting(shooting::Correction),
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Progress::Relaxing {
+                grid,
+                step,
+                residual,
+            } => write!(
+                f,
+                "{grid} segments a vein, step {step}, residual {residual:.1e}"
+            ),
+            Progress::Shooting(now) if now.way < 1.0 => write!(
+                f,
+                "shooting, {:.0} % of the way, correction {:.1e}",
+                100.0 * now.way,
+                now.size
+            ),
+            Progress::Shooting(now) if now.linearized < 1.0 => write!(
+                f,
+                "shooting, step {}, {:.0} % of its linearisation",
+                now.iteration,
+                100.0 * now.linearized
+            ),
+            Progress::Shooting(now) => write!(
+                f,
+                "shooting, step {}, correction {:.1e}",
+                now.iteration, now.size
+            ),
+        }
+    }
+}
+
+/// Smallest tolerance that double precision can keep.
+pub const SMALLEST_TOLERANCE: f64 = 1e-12;
+
+/// Largest meaningful tolerance.
+pub const LARGEST_TOLERANCE: f64 = 0.1;
+
+/// What a tolerance must be.
+const TOLERANCES: &str = "allowed are 1e-12 to 0.1 (relative to the largest rod length; double \
+     precision does not carry more)";
+
+/// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
+pub const MAX_NODES: usize = 4_000_000;
+
+/// Largest number of modes.
+pub const MOST_MODES: usize = 100;
+
+/// Largest number of intervals of a shooting.
+pub const MAX_INTERVALS: usize = 4096;
+
+/// Checks that a tolerance is in range.
+pub fn check_tolerance(tolerance: f64) -> Result<(), RefusedOption> {
+    match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+        true => Ok(()),
+        false => Err(RefusedOption::new("tolerance", tolerance, TOLERANCES)),
+    }
+}
+
+/// A request that cannot be met.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RelaxError {
+    /// An option has a value that it cannot have.
+    #[error("{0}")]
+    Option(#[from] RefusedOption),
+    /// Too many nodes.
+    #[error(
+        "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (7 to 24 GB); use fewer rods or segments"
+    )]
+    TooManyNodes {
+        /// Number of rods.
+        rods: usize,
+        /// Segments per rod.
+        segments: usize,
+        /// Their product.
+        nodes: usize,
+    },
+    /// Too much memory.
+    #[error("{0}")]
+    Memory(#[from] TooMuch),
+    /// The scenario has what this method or question does not take into account.
+    #[error("{0}")]
+    Unmodelled(#[from] Unmodelled),
+    /// Wind that changes, in which nothing rests.
+    #[error(
+        "wind.velocity: a leaf comes to rest in steady wind only: give one velocity, or follow the leaf with simulate"
+    )]
+    ChangingWind,
+    /// Hinges in one place, about which an unloaded leaf turns to anywhere.
+    #[error(
+        "leaf.base_held: without a load nothing holds the leaf against turning about its hinge: give it a load or another hinge, hold its tip, or clamp its base"
+    )]
+    TurnsFreely,
+    /// Dead moments about the line about which a leaf on hinges turns freely.
+    #[error(
+        "leaf.base_held: no equilibrium exists: the leaf turns freely about {line}, and nothing balances the moments on it, \
+         which sum up to {moment:e} there: let them sum up to zero, add a force across this line, or clamp the base"
+    )]
+    UnbalancedMoment {
+        /// The line.
+        line: &'static str,
+        /// The sum of the moments about it, in the units of the scenario.
+        moment: f64,
+    },
+}
+
+/// Refuses scenarios with wind for what does not take it into account.
+pub fn without_wind(scenario: &Scenario, what: &'static str) -> Result<(), RelaxError> {
+    match scenario.wind {
+        None => Ok(()),
+        Some(_) => Err(Unmodelled::Wind { what }.into()),
+    }
+}
+
+/// Refuses a leaf on hinges that may point anywhere, or that nothing keeps from turning for ever.
+pub fn points_somewhere(scenario: &Scenario) -> Result<(), RelaxError> {
+    match (scenario.turns_freely(), scenario.unbalanced_moment()) {
+        (true, _) => Err(RelaxError::TurnsFreely),
+        (false, Some(UnbalancedMoment { line, moment })) => {
+            Err(RelaxError::UnbalancedMoment { line, moment })
+        }
+        (false, None) => Ok(()),
+    }
+}
+
+/// Refuses a leaf in wind unless it is released, to move to rest by the semi-implicit method.
+pub fn rests_in_wind(scenario: &Scenario, options: &Options) -> Result<(), RelaxError> {
+    let Some(wind) = &scenario.wind else {
+        return Ok(());
+    };
+    let what = match options.method {
+        Method::SemiImplicit(how) if how.keep_unstable => {
+            "the search for an equilibrium of any index"
+        }
+        Method::SemiImplicit(how) if how.disturbance.is_some() => "a disturbed start",
+        Method::SemiImplicit(_) if options.route == Route::Loading => "slow loading",
+        Method::SemiImplicit(_) if options.mode_shapes => "a list of modes",
+        Method::SemiImplicit(_) if !wind.velocity.is_constant() => {
+            return Err(RelaxError::ChangingWind);
+        }
+        Method::SemiImplicit(_) if scenario.has_moments() => {
+            "a leaf under load.tip_moment or load.point.moment"
+        }
+        Method::SemiImplicit(_) => return Ok(()),
+        Method::Explicit { .. } => "explicit relaxation",
+        _ => "shooting",
+    };
+    Err(Unmodelled::Wind { what }.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_has_its_own_word() {
+        for method in Method::ALL {
+            assert_eq!(method.word().parse(), Ok(method));
+        }
+        let error = "newton".parse::<Method>().unwrap_err().to_string();
+        assert!(error.starts_with("newton: must be one of semi-implicit, "));
+    }
+}

@@ -1,0 +1,331 @@
+//! What a leaf exerts on what holds it, and how accurate that is.
+//!
+//! The largest stresses along the veins.
+
+use crate::leaf::{DiscreteLeaf, Scale};
+use crate::numbers::{larger, largest};
+use crate::relax::accuracy::defect::Estimate;
+use crate::relax::accuracy::richardson::Richardson;
+use crate::relax::accuracy::{Level, NestedEquilibrium, transfer};
+use crate::scenario::{Grip, Hold, Moduli, Scenario, Stress};
+use crate::shape::{RodShape, SAME_STATION};
+use glam::DVec3;
+use serde::Serialize;
+
+/// Rounding error of a strain, per segment of a rod.
+const STRAIN_ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// The reaction at a held tip: what the leaf exerts on its holder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reaction {
+    /// The force.
+    #[serde(rename = "tip_reaction")]
+    pub force: DVec3,
+    /// For a clamp, the moments of the rods about the tip.
+    #[serde(
+        rename = "tip_reaction_moments",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub moments: Option<Vec<DVec3>>,
+    /// Bound on the error of the force; `None` on a single grid.
+    #[serde(rename = "tip_reaction_error", skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Bound on the error of the moments.
+    #[serde(
+        rename = "tip_reaction_moments_error",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub moments_error: Option<f64>,
+}
+
+/// What the leaf exerts on a grip.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GripReaction {
+    /// The force.
+    pub force: DVec3,
+    /// For a clamp, the moment about the middle of what it holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moment: Option<DVec3>,
+    /// Bound on the error of the force; `None` on a single grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Bound on the error of the moment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moment_error: Option<f64>,
+}
+
+/// Largest number of grids that are extrapolated: on those before errors of forces, which the
+/// finest have no more, need not be small.
+const GRIDS: usize = 4;
+
+/// Numbers of a leaf on nested grids as vectors, extrapolated as far as their own series shows, with
+/// the error; `relative` is that of each of them by unfinished iterations, `rounding` that by
+/// rounding. The error is unknown on a single grid.
+pub(in crate::relax) fn extrapolated(
+    levels: &[Level],
+    on: impl Fn(&Level) -> Vec<DVec3>,
+    [relative, rounding]: [f64; 2],
+) -> (Vec<DVec3>, Option<f64>) {
+    let levels = &levels[levels.len().saturating_sub(GRIDS)..];
+    let values: Vec<Vec<DVec3>> = levels.iter().map(on).collect();
+    let all = values.iter().flatten().map(|vector| vector.length());
+    let size = largest(all);
+    let scale = if size > 0.0 { size } else { 1.0 };
+    let grids = levels.iter().zip(&values);
+    let table: Richardson = grids
+        .map(|(level, vectors)| {
+            let numbers = vectors.iter().flat_map(|it| (*it / scale).to_array());
+            (level.leaf.segments(), numbers.collect())
+        })
+        .collect();
+    let table = table.with_noise(rounding / scale);
+    let best = table.error_of_few();
+    let found = table.column(best.map_or(0, |best| best.columns));
+    let error = best.map(|best| (best.error + relative) * scale + rounding);
+    let vectors = found.chunks(3).map(|it| DVec3::from_slice(it) * scale);
+    (vectors.collect(), error)
+}
+
+impl NestedEquilibrium {
+    /// The part of forces by which unfinished iterations, and the size by which rounding of
+    /// positions, may change them.
+    pub fn unfinished_forces(&self) -> [f64; 2] {
+        let rounding = |leaf: &DiscreteLeaf| {
+            STRAIN_ROUNDING * leaf.segments() as f64 * leaf.largest_finite_stiffness()
+        };
+        let held = self.levels.last().filter(|level| level.leaf.leaf.is_held());
+        let rounding = held.map_or(0.0, |level| rounding(&level.leaf));
+        [self.history.remaining, rounding]
+    }
+
+    /// The reaction at a held tip.
+    pub fn reaction(&self) -> Option<Reaction> {
+        let leaf = &self.levels[0].leaf.leaf;
+        let held = leaf.held.as_ref()?;
+        let unfinished = self.unfinished_forces();
+        let clamped = held.clamps.is_some();
+        let force = |level: &Level| vec![level.leaf.reaction(&level.state).0];
+        let moments = |level: &Level| level.leaf.reaction(&level.state).1;
+        let (forces, mut error) = extrapolated(&self.levels, force, unfinished);
+        let (mut moments, mut moments_error) = extrapolated(&self.levels, moments, unfinished);
+        let mut force = forces[0];
+        if let Some((estimate, safety)) = self.field_errors() {
+            let tips = || estimate.rods.iter().filter_map(|rod| rod.last());
+            let level = &self.levels[0].leaf;
+            let off = |k: usize| {
+                let tips = estimate.errors.iter().filter_map(|rod| rod.last());
+                tips.map(move |tip| safety * tip[k].length())
+            };
+            let bar = |error: f64, size: f64| error + unfinished[0] * size + unfinished[1];
+            let largest_moment = largest(tips().map(|tip| tip.m.length()));
+            let own = bar(off(2).sum(), force.length());
+            let own_of_moments = bar(largest(off(3)), largest_moment);
+            // Of nearly rigid rods the response to a jump by rounding is a force that is none.
+            if error.is_none_or(|error| own < error) {
+                let forces = tips().enumerate();
+                force = forces.map(|(j, tip)| level.tip_force(j) - tip.n).sum();
+                error = Some(own);
+            }
+            if moments_error.is_none_or(|error| own_of_moments < error) {
+                moments = tips().map(|tip| level.moment_at(1.0) - tip.m).collect();
+                moments_error = Some(own_of_moments);
+            }
+        }
+        let of = |all: Vec<DVec3>| all.iter().map(|it| *it * leaf.scale.moment()).collect();
+        Some(Reaction {
+            force: force * leaf.scale.force(),
+            error: error.map(|error| error * leaf.scale.force()),
+            moments: clamped.then(|| of(moments)),
+            moments_error: moments_error
+                .filter(|_| clamped)
+                .map(|error| error * leaf.scale.moment()),
+        })
+    }
+
+    /// What the leaf exerts on its grips.
+    pub fn grip_reactions(&self) -> Vec<GripReaction> {
+        let leaf = &self.levels[0].leaf;
+        if !leaf.has_grips() {
+            return Vec::new();
+        }
+        let unfinished = self.unfinished_forces();
+        let on = |which: usize| {
+            move |level: &Level| -> Vec<DVec3> {
+                let reactions = level.leaf.grip_reactions(&level.state);
+                reactions.iter().map(|it| it[which]).collect()
+            }
+        };
+        let (forces, error) = extrapolated(&self.levels, on(0), unfinished);
+        let (moments, moment_error) = extrapolated(&self.levels, on(1), unfinished);
+        let (scenario, scale) = (leaf.leaf.scenario(), leaf.leaf.scale);
+        let both = forces.iter().zip(&moments).zip(&scenario.grips);
+        let reaction = |((force, moment), grip): ((&DVec3, &DVec3), &Grip)| {
+            let clamped = grip.held == Hold::Clamped;
+            GripReaction {
+                force: *force * scale.force(),
+                error: error.map(|error| error * scale.force()),
+                moment: clamped.then(|| *moment * scale.moment()),
+                moment_error: moment_error
+                    .filter(|_| clamped)
+                    .map(|error| error * scale.moment()),
+            }
+        };
+        both.map(reaction).collect()
+    }
+}
+
+/// The largest stresses of a leaf in each of its sections, at its stations. As JSON the place where
+/// the equivalent stress is largest of all: `stress` in `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stresses {
+    /// The vein with the largest one, from 1.
+    pub vein: usize,
+    /// The place along it, a fraction of its length.
+    pub sigma: f64,
+    /// The stresses there.
+    #[serde(flatten)]
+    pub largest: Stress,
+    /// Bound on the error of any of them; `None` on a single grid.
+    pub error: Option<f64>,
+    /// Those at all stations, a list per rod.
+    #[serde(skip)]
+    pub rods: Vec<Vec<Stress>>,
+}
+
+impl Stresses {
+    /// Of rods at these stations; `None` if stiffnesses are given in place of sections.
+    pub fn of(scenario: &Scenario, stations: &[f64], rods: &[RodShape]) -> Option<Self> {
+        let stress = |(j, rod): (usize, &RodShape)| -> Option<Vec<Stress>> {
+            let nodes = stations.iter().zip(&rod.nodes);
+            let at = |(sigma, node): (&f64, &crate::shape::NodeState)| {
+                Some(scenario.moduli(j, *sigma)?.stress(node.n, node.m))
+            };
+            nodes.map(at).collect()
+        };
+        let rods: Vec<_> = rods.iter().enumerate().map(stress).collect::<Option<_>>()?;
+        let each = rods.iter().zip(1..);
+        let all = each.flat_map(|(rod, vein)| {
+            let here = stations.iter().zip(rod);
+            here.map(move |(sigma, stress)| (vein, *sigma, *stress))
+        });
+        // The first of those that are equal.
+        let larger = |one: (usize, f64, Stress), other: (usize, f64, Stress)| {
+            if other.2.equivalent > one.2.equivalent {
+                other
+            } else {
+                one
+            }
+        };
+        let (vein, sigma, largest) = all.reduce(larger)?;
+        Some(Stresses {
+            vein,
+            sigma,
+            largest,
+            error: None,
+            rods,
+        })
+    }
+
+    /// With the error by those of forces and moments anywhere: a stress is a norm of both.
+    pub fn within(self, scenario: &Scenario, errors: Option<[f64; 2]>) -> Self {
+        let Some([force, moment]) = errors else {
+            return self;
+        };
+        let moduli = scenario.moduli(self.vein - 1, self.sigma);
+        let along_all = |size: f64| DVec3::splat(size);
+        let error = moduli.map(|it| it.stress(along_all(force), along_all(moment)).equivalent);
+        Stresses { error, ..self }
+    }
+
+    /// With the error of a leaf that was integrated along its rods to these stations, from those of its
+    /// forces and moments: a stress is a norm of both, and may be the largest at another station.
+    fn integrated(
+        self,
+        (scenario, stations): (&Scenario, &[f64]),
+        (estimate, safety): (&Estimate, f64),
+        scale: Scale,
+    ) -> Self {
+        let places = estimate.errors[0].len() - 1;
+        let (nodes, sigma) = (estimate.grid.segments(), estimate.grid.sigma());
+        let error = |j: usize, station: f64| -> Option<f64> {
+            let i = sigma
+                .partition_point(|at| *at < station - SAME_STATION)
+                .min(nodes);
+            let fields = &estimate.rods[j][i];
+            let along = |it: DVec3| fields.q.conjugate() * it;
+            let moduli = scenario.moduli(j, station)?;
+            let at = |place: usize| {
+                let [_, turn, n, m] = estimate.errors[j][place];
+                let force = along(n - turn.cross(fields.n)) * scale.force();
+                let moment = along(m - turn.cross(fields.m)) * scale.moment();
+                safety * moduli.stress(force, moment).equivalent
+            };
+            let place = i * places / nodes;
+            let next = (i * places).div_ceil(nodes);
+            Some(larger(at(place), at(next)))
+        };
+        let mut most = error(self.vein - 1, self.sigma);
+        for (j, rod) in self.rods.iter().enumerate() {
+            for (&station, stress) in stations.iter().zip(rod) {
+                let reached = error(j, station).map(|error| stress.equivalent + error);
+                let above = reached.map(|reached| reached - self.largest.equivalent);
+                most = most.zip(above).map(|(most, above)| larger(most, above));
+            }
+        }
+        Stresses {
+            error: most,
+            ..self
+        }
+    }
+
+    /// With the error of a leaf on nested grids at these stations: where it was not integrated that of
+    /// the stresses at the nodes of the coarsest, and the distance of these from their extrapolation.
+    pub(in crate::relax) fn on_grids(
+        self,
+        scenario: &Scenario,
+        stations: &[f64],
+        found: &NestedEquilibrium,
+    ) -> Self {
+        let scale = found.levels[0].leaf.leaf.scale;
+        if let Some(errors) = found
+            .field_errors()
+            .filter(|_| found.integrated().is_some())
+        {
+            return self.integrated((scenario, stations), errors, scale);
+        }
+        let sigma = found.levels[0].leaf.grid.sigma();
+        let rods = self.rods.len();
+        let moduli: Option<Vec<Moduli>> = (0..rods)
+            .flat_map(|j| sigma.iter().map(move |at| scenario.moduli(j, *at)))
+            .collect();
+        let Some(moduli) = moduli else {
+            return self;
+        };
+        let stress = |k: usize, [n, m]: [DVec3; 2]| {
+            let stress = moduli[k].stress(n * scale.force(), m * scale.moment());
+            DVec3::new(stress.normal, stress.shear, stress.equivalent)
+        };
+        let nodes = || (0..rods).flat_map(|j| (0..sigma.len()).map(move |i| (j, i)));
+        let on = |level: &Level| -> Vec<DVec3> {
+            let stride = level.leaf.segments() / (sigma.len() - 1);
+            let resultants =
+                |(j, i)| transfer::resultants(&level.leaf, &level.state, j, i * stride);
+            nodes()
+                .enumerate()
+                .map(|(k, at)| stress(k, resultants(at)))
+                .collect()
+        };
+        let (extrapolated, error) = extrapolated(&found.levels, on, [found.history.remaining, 0.0]);
+        let told = self.largest.equivalent;
+        let peak = largest(extrapolated.iter().map(|it| it.z));
+        // Between the nodes of the coarsest grid stresses may be larger, but not those at a node.
+        let off = match sigma.contains(&self.sigma) {
+            true => (told - peak).abs(),
+            false => 0.0,
+        };
+        Stresses {
+            error: error.map(|error| error + off),
+            ..self
+        }
+    }
+}

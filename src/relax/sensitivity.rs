@@ -1,0 +1,713 @@
+//! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
+//! scenario, from the linearised equations on each grid, extrapolated like the results
+//! themselves.
+//!
+//! Derivatives of eigenvalues, and of the moments on clamps, by finite differences between
+//! neighbouring equilibria, which are known to first order from the response.
+//!
+//! A parameter of a scenario, and finite differences of the scenario with respect to it.
+//!
+//! The linear response of a settled leaf to forces, and to changes of its parameters.
+//!
+//! Derivatives on successively refined grids.
+
+use crate::leaf::{
+    DirectSolver, DiscreteLeaf, Factors, Field, Forces, Leaf, LeafRate, Response, Solved, State,
+    System, shift, turn,
+};
+use crate::modes::Eigenpair;
+use crate::motion::Physics;
+use crate::relax::accuracy::Level;
+use crate::relax::accuracy::richardson::{Best, Richardson};
+use crate::relax::result::Sensitivity;
+use crate::relax::result::forces::{GripReaction, Reaction};
+use crate::rod::Segment;
+use crate::scenario::{Grip, Hold, Scenario};
+use crate::{modes, rotation};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Up to this many numbers the equations are solved for each, which gives all derivatives; for
+/// more of them adjoint solutions give those of tips and energy alone.
+const MOST_DIRECT: usize = 100;
+
+/// Grids with fewer unknowns than this have their eigenvalues differentiated, and the coarsest
+/// in any case.
+const FEW_UNKNOWNS: usize = 4_000;
+
+/// A number with its name, the derivative of the scenario, and neighbouring scenarios if they
+/// are needed.
+type Known<'n, 'a> = (
+    &'n String,
+    &'n Parameter<'a>,
+    Vec<(f64, Scenario)>,
+    Vec<(f64, f64, Arc<Scenario>)>,
+);
+
+/// Derivatives on one grid, in the leaf's units: of the tips, the energy, the eigenvalues (numbers
+/// as x), the reaction (force, then moments), the positions, and the grips' reactions (of each the
+/// force and the moment).
+type Changes = [Vec<DVec3>; 6];
+
+/// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
+/// are its grids from coarse to fine. Left out are numbers for which the scenario has no
+/// admissible differences, and all numbers if the leaf is at a singular point.
+pub(crate) fn sensitivities(
+    levels: &[Level],
+    numbers: &[(String, Parameter)],
+    tolerance: f64,
+    modes: usize,
+) -> Vec<Sensitivity> {
+    let (Some(coarsest), Some(finest)) = (levels.first(), levels.last()) else {
+        return Vec::new();
+    };
+    let leaf = &finest.leaf.leaf;
+    let differences = modes > 0 || is_clamped(leaf) || has_clamped_grips(leaf);
+    let known: Vec<Known> = (numbers.iter())
+        .filter_map(|(key, number)| {
+            let near = if differences { number.nearby() } else { None };
+            Some((key, number, number.rate()?, near.unwrap_or_default()))
+        })
+        .collect();
+    let rates: Vec<LeafRate> = (known.iter())
+        .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
+        .collect();
+    let mut found: Vec<[Series; 6]> = rates.iter().map(|_| Default::default()).collect();
+    let mut eigenvalues = Series::default();
+    for (k, level) in levels.iter().enumerate() {
+        let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
+        let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
+        let grid = Grid {
+            level,
+            tolerance,
+            modes: if with_modes { modes } else { 0 },
+            stride: level.leaf.segments() / coarsest.leaf.segments(),
+        };
+        let Some((squared, changes)) = grid.changes(&known, &rates) else {
+            return Vec::new();
+        };
+        let segments = level.leaf.segments();
+        let squared = squared.into_iter().map(|value| DVec3::X * value);
+        eigenvalues.push(segments, squared.collect());
+        for (series, changes) in found.iter_mut().zip(changes) {
+            for (series, values) in series.iter_mut().zip(changes) {
+                series.push(segments, values);
+            }
+        }
+    }
+    let stations = coarsest.leaf.grid.sigma();
+    let (eigenvalues, _) = eigenvalues.extrapolated(tolerance);
+    (known.iter().zip(found))
+        .map(|((key, number, ..), series)| {
+            let all = series.map(|series| series.extrapolated(tolerance));
+            sensitivity((key, number.value), (leaf, stations), all, &eigenvalues)
+        })
+        .collect()
+}
+
+/// Extrapolated derivatives with respect to a number, at these stations, in the scenario's units;
+/// the eigenvalues themselves are `squared` frequencies.
+fn sensitivity(
+    (key, value): (&str, f64),
+    (leaf, stations): (&Leaf, &[f64]),
+    [tips, energy, eigenvalues, reaction, positions, grips]: [(Vec<DVec3>, Option<f64>); 6],
+    squared: &[DVec3],
+) -> Sensitivity {
+    let scale = leaf.scale;
+    let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
+        values.iter().map(|value| *value * unit).collect()
+    };
+    let lowest = eigenvalues.0.first().map(|value| value.x);
+    let lowest = lowest.filter(|it| it.is_finite());
+    // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
+    let frequency = |(change, squared): (&DVec3, &DVec3)| {
+        let known = squared.x > 0.0 && change.x.is_finite();
+        known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.x.sqrt()))
+    };
+    let places = positions.0.chunks(stations.len());
+    let held = reaction.0.split_first().map(|(force, moments)| Reaction {
+        force: *force * scale.force(),
+        moments: is_clamped(leaf).then(|| of(moments, scale.moment())),
+        error: None,
+        moments_error: None,
+    });
+    let grip = |(change, grip): (&[DVec3], &Grip)| GripReaction {
+        force: change[0] * scale.force(),
+        moment: (grip.held == Hold::Clamped).then(|| change[1] * scale.moment()),
+        error: None,
+        moment_error: None,
+    };
+    let on_grips = grips.0.chunks(2).zip(&leaf.scenario().grips).map(grip);
+    Sensitivity {
+        key: key.to_owned(),
+        value,
+        tips: of(&tips.0, scale.length),
+        tip_error: tips.1.map(|error| error * scale.length),
+        energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
+        energy_error: energy.1.map(|error| error * scale.moment()),
+        lowest_eigenvalue: lowest,
+        lowest_eigenvalue_error: lowest.and(eigenvalues.1),
+        frequencies: eigenvalues.0.iter().zip(squared).map(frequency).collect(),
+        tip_reaction_error: (reaction.1)
+            .filter(|_| held.is_some())
+            .map(|error| error * scale.force()),
+        reaction: held,
+        grip_reactions: on_grips.collect(),
+        grip_reactions_error: (grips.1)
+            .filter(|_| !grips.0.is_empty())
+            .map(|error| error * scale.force()),
+        positions: places.map(|rod| of(rod, scale.length)).collect(),
+        positions_error: positions.1.map(|error| error * scale.length),
+        stations: stations.to_vec(),
+    }
+}
+
+fn is_clamped(leaf: &Leaf) -> bool {
+    (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some())
+}
+
+fn has_clamped_grips(leaf: &Leaf) -> bool {
+    let mut grips = leaf.scenario().grips.iter();
+    grips.any(|grip| grip.held == Hold::Clamped)
+}
+
+/// A grid on which derivatives are computed.
+struct Grid<'l> {
+    level: &'l Level,
+    tolerance: f64,
+    modes: usize,
+    /// Segments between neighbouring nodes of the coarsest grid.
+    stride: usize,
+}
+
+impl Grid<'_> {
+    /// The squared frequencies, and the derivatives with respect to each number.
+    fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
+        let (leaf, state) = (&self.level.leaf, &self.level.state);
+        let mut linear = Linearized::new(self.level, self.tolerance);
+        let forces = linear.forces(self.level, rates);
+        // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
+        let physics = Physics::new(&leaf.leaf);
+        let modes = match self.modes > 0 && !leaf.has_moments() {
+            true => modes::loaded(leaf, state, self.modes),
+            false => None,
+        };
+        let modes = modes.unwrap_or_default();
+        // In the scenario's unit of time, as their derivatives are.
+        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
+        let eigenvalues = modes.iter().map(squared).collect();
+        let (tip_held, held) = (leaf.leaf.held.is_some(), leaf.leaf.is_held());
+        if forces.len() > MOST_DIRECT && modes.is_empty() && !leaf.has_moments() && !held {
+            return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
+        }
+        let responses = linear.responses(self.level, &forces)?;
+        let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
+        let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
+            let change = (rate, response);
+            let differences = !near.is_empty() && (held || !modes.is_empty());
+            let near = differences.then(|| Nearby::new(self.level, near, change));
+            let of_modes = (near.iter())
+                .filter(|_| !rate.changes_moments())
+                .flat_map(|near| near.eigenvalue_rates(&modes));
+            let n = leaf.segments();
+            let tip = |j: usize| shift(&response.of_node(leaf, j, n));
+            // The work of dead moments is not part of the energy.
+            let works = leaf
+                .moments()
+                .map(|(node, moment)| moment.dot(turn(&response.of_node(leaf, 0, node))));
+            let work: f64 = works.sum();
+            [
+                self.tips().map(tip).collect(),
+                vec![DVec3::X * (forces.energy + work)],
+                of_modes.map(|value| DVec3::X * value).collect(),
+                match tip_held {
+                    true => self.reaction(near.as_ref(), change),
+                    false => Vec::new(),
+                },
+                self.positions(rate, response),
+                self.on_grips(near.as_ref(), change),
+            ]
+        });
+        Some((eigenvalues, changes.collect()))
+    }
+
+    fn tips(&self) -> std::ops::Range<usize> {
+        let leaf = &self.level.leaf;
+        0..if leaf.leaf.joined() { 1 } else { leaf.rods() }
+    }
+
+    fn reaction(&self, near: Option<&Nearby>, change: (&LeafRate, &Response)) -> Vec<DVec3> {
+        let leaf = &self.level.leaf;
+        let mut all = vec![leaf.reaction_rate(change.0, change.1)];
+        if is_clamped(&leaf.leaf) {
+            all.extend(
+                near.iter()
+                    .flat_map(|near| near.clamp_moment_rates(self.level)),
+            );
+        }
+        all
+    }
+
+    /// The changes of force and moment on every grip.
+    fn on_grips(
+        &self,
+        near: Option<&Nearby>,
+        (rate, response): (&LeafRate, &Response),
+    ) -> Vec<DVec3> {
+        let Level { leaf, state } = self.level;
+        if !leaf.has_grips() {
+            return Vec::new();
+        }
+        let forces = leaf.grip_force_rates(state, rate, response);
+        let clamped = near.filter(|_| has_clamped_grips(&leaf.leaf));
+        let moments = clamped.map_or(vec![DVec3::ZERO; forces.len()], |near| {
+            near.grip_moment_rates(self.level)
+        });
+        forces
+            .into_iter()
+            .zip(moments)
+            .flat_map(<[_; 2]>::from)
+            .collect()
+    }
+
+    /// Displacements of the nodes that all grids have, rod after rod.
+    fn positions(&self, rate: &LeafRate, response: &Response) -> Vec<DVec3> {
+        let rods = response.nodes.iter().enumerate();
+        let of = |(j, rod): (usize, &Vec<[f64; 6]>)| -> Vec<DVec3> {
+            // A clamped base has no equations; a hinged one moves with its hinge.
+            let (bases, nodes) = rod.split_at(1 - self.level.leaf.first_node());
+            let base = bases.first().map_or(rate.of_base(j)[0], shift);
+            let nodes = nodes.iter().skip(self.stride - 1).step_by(self.stride);
+            [base].into_iter().chain(nodes.map(shift)).collect()
+        };
+        rods.flat_map(of).collect()
+    }
+
+    /// Derivatives of the tips and of the energy alone, by one adjoint solution for each
+    /// component of a tip.
+    fn tips_by_adjoint(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
+        let units = unit_forces(&self.level.leaf, self.tips().len());
+        let adjoint = linear.responses(self.level, &units)?;
+        let linear = &*linear;
+        let component = |forces: &Forces, k: usize| linear.work(self.level, forces, &adjoint[k]);
+        let tip = |forces: &Forces, tip: usize| {
+            DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
+        };
+        let changes = |forces: &Forces| -> Changes {
+            let tips = self.tips().map(|k| tip(forces, k)).collect();
+            let energy = vec![DVec3::X * forces.energy];
+            [tips, energy, Vec::new(), Vec::new(), Vec::new(), Vec::new()]
+        };
+        Some(forces.iter().map(changes).collect())
+    }
+}
+
+/// A unit force on every tip along every axis.
+pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
+    let n = leaf.moving_nodes().len();
+    let force = |(tip, axis): (usize, usize)| {
+        let mut unit = Forces::zeros(leaf.rods());
+        unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;
+        unit
+    };
+    let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));
+    all.map(force).collect()
+}
+
+/// The leaf for neighbouring values of a number, at rest to first order, with
+/// finite-difference weights.
+pub(crate) struct Nearby(Vec<Near>);
+
+struct Near {
+    offset: f64,
+    weight: f64,
+    leaf: DiscreteLeaf,
+    state: State,
+}
+
+/// Relative differences below which two eigenvalues, and their derivatives, count as equal;
+/// the third number bounds the error of eigenvalues by rounding, as a part of the first.
+const EQUAL: f64 = 1e-6;
+
+const SAME: f64 = 1e-3;
+
+const NOISE: f64 = 1e-3;
+
+impl Nearby {
+    /// From scenarios nearby, with their offsets and weights.
+    pub fn new(
+        level: &Level,
+        scenarios: &[(f64, f64, Arc<Scenario>)],
+        (rate, response): (&LeafRate, &Response),
+    ) -> Nearby {
+        let leaf = &level.leaf;
+        let near = |(offset, weight, scenario): &(f64, f64, Arc<Scenario>)| {
+            let near = Leaf::in_units(Arc::clone(scenario), leaf.leaf.scale);
+            let near = DiscreteLeaf::new(&near, leaf.grid.clone());
+            Near {
+                offset: *offset,
+                weight: *weight,
+                leaf: near,
+                state: moved(level, rate, response, *offset),
+            }
+        };
+        Nearby(scenarios.iter().map(near).collect())
+    }
+
+    /// The derivative of the eigenvalue of a mode: that of its Rayleigh quotient between
+    /// neighbouring equilibria, as changes of its shape enter in second order only.
+    pub fn eigenvalue_rate(&self, mode: &Eigenpair) -> f64 {
+        let term = |near: &Near| near.weight * modes::eigenvalue(&near.leaf, &near.state, mode);
+        self.0.iter().map(term).sum()
+    }
+
+    /// The same for several modes. NaN where a multiple eigenvalue splits: its modes change
+    /// differently, and the lower one is another mode on either side.
+    pub fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
+        let mut rates: Vec<f64> = modes
+            .iter()
+            .map(|mode| self.eigenvalue_rate(mode))
+            .collect();
+        let offsets = self.0.iter().map(|near| near.offset.abs());
+        let farthest = offsets.fold(0.0, f64::max);
+        let pairs = modes.windows(2).enumerate();
+        let equal = |pair: &[Eigenpair]| {
+            let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
+            (a - b).abs() <= EQUAL * a.abs().max(b.abs())
+        };
+        for (k, pair) in pairs.filter(|(_, pair)| equal(pair)) {
+            let [a, b] = [rates[k], rates[k + 1]];
+            let mixed = self.eigenvalue_rate(&pair[0].plus(&pair[1])) - 0.5 * (a + b);
+            let rounding = EQUAL * NOISE * pair[0].eigenvalue.abs() / farthest;
+            let same = SAME * a.abs().max(b.abs()) + rounding;
+            if !(mixed.abs() <= same && (a - b).abs() <= same) {
+                rates[k..k + 2].fill(f64::NAN);
+            }
+        }
+        rates
+    }
+
+    /// The derivatives of the moments of the rods on a clamp.
+    pub fn clamp_moment_rates(&self, level: &Level) -> Vec<DVec3> {
+        self.rates_of(level, |leaf, state| leaf.reaction(state).1)
+    }
+
+    /// The derivatives of the moments on grips about their middles.
+    pub fn grip_moment_rates(&self, level: &Level) -> Vec<DVec3> {
+        self.rates_of(level, |leaf, state| {
+            let reactions = leaf.grip_reactions(state).into_iter();
+            reactions.map(|[_, moment]| moment).collect()
+        })
+    }
+
+    fn rates_of(
+        &self,
+        level: &Level,
+        vectors: impl Fn(&DiscreteLeaf, &State) -> Vec<DVec3>,
+    ) -> Vec<DVec3> {
+        let first = vectors(&level.leaf, &level.state);
+        let mut rates = vec![DVec3::ZERO; first.len()];
+        for near in &self.0 {
+            let found = vectors(&near.leaf, &near.state);
+            for ((rate, vector), first) in rates.iter_mut().zip(found).zip(&first) {
+                *rate += near.weight * (vector - *first);
+            }
+        }
+        rates
+    }
+}
+
+/// Relative step of finite differences with respect to a parameter on which the scenario
+/// depends linearly: large, since rounding is the only error.
+const LINEAR: f64 = 0.125;
+
+/// Relative step for other parameters, with differences of fourth order.
+const NONLINEAR: f64 = 1e-3;
+
+/// Relative step of differences of eigenvalues, whose modes may be close together, and of
+/// clamp moments.
+const NEIGHBOURING: f64 = 3e-4;
+
+/// Offsets (in steps) and weights of the central and the one-sided fourth-order differences.
+const CENTRAL: [(f64, f64); 4] = [
+    (-2.0, 1.0 / 12.0),
+    (-1.0, -2.0 / 3.0),
+    (1.0, 2.0 / 3.0),
+    (2.0, -1.0 / 12.0),
+];
+
+const ONE_SIDED: [(f64, f64); 5] = [
+    (0.0, -25.0 / 12.0),
+    (1.0, 4.0),
+    (2.0, -3.0),
+    (3.0, 4.0 / 3.0),
+    (4.0, -0.25),
+];
+
+/// A numerical parameter of a scenario.
+pub(crate) struct Parameter<'a> {
+    /// The scenario with another value of the parameter, if that is admissible.
+    pub make: Box<dyn Fn(f64) -> Option<Scenario> + Send + Sync + 'a>,
+    /// Its value.
+    pub value: f64,
+    /// Size used for the step where the value is zero.
+    pub unit: f64,
+    /// Whether the scenario is linear in it.
+    pub linear: bool,
+}
+
+impl Parameter<'_> {
+    fn size(&self) -> f64 {
+        match self.value.abs() {
+            size if size > 0.0 => size,
+            _ => self.unit,
+        }
+    }
+
+    /// Scenarios with their offsets and weights by the first of these rules, in either
+    /// direction, all of whose scenarios are admissible.
+    fn differences(&self, step: f64, rules: &[&[(f64, f64)]]) -> Option<Vec<(f64, f64, Scenario)>> {
+        let signs = [1.0, -1.0];
+        let mut tried = (rules.iter()).flat_map(|rule| signs.map(|sign| (*rule, sign)));
+        tried.find_map(|(rule, sign)| {
+            let step = sign * step;
+            let at = |(steps, weight): &(f64, f64)| {
+                let offset = steps * step;
+                let scenario = (self.make)(self.value + offset)?;
+                Some((offset, weight / step, scenario))
+            };
+            rule.iter().map(at).collect()
+        })
+    }
+
+    /// The derivative of the scenario as a weighted sum of scenarios.
+    pub fn rate(&self) -> Option<Vec<(f64, Scenario)>> {
+        let found = match self.linear {
+            true => self.differences(LINEAR * self.size(), &[&[(0.0, -1.0), (1.0, 1.0)]]),
+            false => self.differences(NONLINEAR * self.size(), &[&CENTRAL, &ONE_SIDED]),
+        };
+        let terms = found?.into_iter();
+        Some(
+            terms
+                .map(|(_, weight, scenario)| (weight, scenario))
+                .collect(),
+        )
+    }
+
+    /// Neighbouring scenarios with their offsets and the finite-difference weights for a
+    /// function of the scenario.
+    pub fn nearby(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
+        let found = self.differences(NEIGHBOURING * self.size(), &[&CENTRAL, &ONE_SIDED])?;
+        let shared = |(offset, weight, scenario)| (offset, weight, Arc::new(scenario));
+        Some(found.into_iter().map(shared).collect())
+    }
+}
+
+/// Relative accuracy of the conjugate gradients, as a part of the tolerance, and its lower
+/// limit.
+const SOLUTION: f64 = 3e-3;
+
+const BEST_SOLUTION: f64 = 1e-11;
+
+/// A settled leaf (all rods, in space) with its equations linearised and factorised once for
+/// all right-hand sides.
+pub(crate) struct Linearized {
+    system: System,
+    segments: Vec<Segment>,
+    /// Relative accuracy of the conjugate gradients.
+    accuracy: f64,
+    /// Whether the matrix is factorised rod by rod; otherwise a sparse direct factorisation is
+    /// used.
+    factorized: bool,
+    /// Linear solutions so far.
+    pub solves: usize,
+    /// Factorisations so far.
+    pub factorizations: usize,
+}
+
+impl Linearized {
+    /// Linearises about the state of a level.
+    pub fn new(level: &Level, tolerance: f64) -> Linearized {
+        let (leaf, state) = (&level.leaf, &level.state);
+        let mut system = System::new(leaf);
+        leaf.assemble(state, &mut system);
+        leaf.hold_turn(state, &mut system);
+        let factorized = match leaf.has_moments() {
+            false => system.factorize(0.0),
+            true => system.factorize_indefinite(),
+        };
+        Linearized {
+            system,
+            segments: leaf.all_segments(state),
+            accuracy: (SOLUTION * tolerance).clamp(BEST_SOLUTION, 1e-4),
+            factorized,
+            solves: 0,
+            factorizations: 1,
+        }
+    }
+
+    /// The forces by which parameter changes of the leaf unbalance that state.
+    pub fn forces(&self, level: &Level, rates: &[LeafRate]) -> Vec<Forces> {
+        let force = |rate| level.leaf.rate(&level.state, &self.segments, rate);
+        rates.iter().map(force).collect()
+    }
+
+    /// The responses to forces. `None` if the matrix is singular.
+    pub fn responses(&mut self, level: &Level, loads: &[Forces]) -> Option<Vec<Response>> {
+        self.responses_to(level, loads, self.accuracy)
+    }
+
+    /// The same to another relative accuracy.
+    pub fn responses_to(
+        &mut self,
+        level: &Level,
+        loads: &[Forces],
+        accuracy: f64,
+    ) -> Option<Vec<Response>> {
+        let (leaf, segments, solves) = (&level.leaf, &self.segments, &mut self.solves);
+        if self.factorized {
+            let system = &mut self.system;
+            let mut by_rods = |rhs: &Field| {
+                *solves += 1;
+                system.set_rhs(rhs);
+                match system.solve(None, accuracy) {
+                    Solved::Yes(_) => Some(system.solution()),
+                    _ => None,
+                }
+            };
+            let found: Option<Vec<_>> = (loads.iter())
+                .map(|load| response(leaf, segments, load, &mut by_rods))
+                .collect();
+            if found.is_some() {
+                return found;
+            }
+            self.factorized = false;
+        }
+        leaf.assemble(&level.state, &mut self.system);
+        leaf.hold_turn(&level.state, &mut self.system);
+        self.factorizations += 1;
+        let pattern = DirectSolver::new(&self.system).ok()?;
+        let mut factor: Factors = pattern.factorize(&self.system, 0.0).ok()?;
+        let mut direct = |rhs: &Field| {
+            *solves += 1;
+            Some(factor.solve_bordered(rhs, &[]).increments)
+        };
+        (loads.iter())
+            .map(|load| response(leaf, segments, load, &mut direct))
+            .collect()
+    }
+
+    /// The work of forces on the response to others: by symmetry also that of the others on
+    /// the response to these.
+    pub fn work(&self, level: &Level, forces: &Forces, response: &Response) -> f64 {
+        level.leaf.work(&self.segments, forces, response)
+    }
+}
+
+fn response(
+    leaf: &DiscreteLeaf,
+    segments: &[Segment],
+    load: &Forces,
+    solve: &mut dyn FnMut(&Field) -> Option<Field>,
+) -> Option<Response> {
+    let (mut rhs, mut gaps) = load.dense(leaf);
+    let mut response = Response {
+        nodes: Field::new(),
+        carried: vec![DVec3::ZERO; gaps.len()],
+    };
+    leaf.condense_gaps(segments, &gaps, &mut rhs);
+    response.nodes = solve(&rhs)?;
+    leaf.carried(segments, &response.nodes, &mut gaps, &mut response.carried);
+    leaf.complete_law(segments, &mut response, &mut gaps, true, solve);
+    // Held nodes move with their holders.
+    for (rod, moved) in response.nodes.iter_mut().zip(&load.moved) {
+        let nodes = rod.iter_mut().flatten().zip(moved.iter().flatten());
+        nodes.for_each(|(sum, value)| *sum += value);
+    }
+    let mut numbers = response.nodes.iter().flatten().flatten();
+    let finite = numbers.all(|value| value.is_finite());
+    finite.then_some(response)
+}
+
+/// The state, moved along a response.
+pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f64) -> State {
+    let mut state = level.state.clone();
+    for j in 0..state.rods() {
+        let base = state.base(j);
+        let [shift, turn] = rate.of_base(j);
+        state.x[base] += step * shift;
+        state.q[base] = (rotation::exp(step * turn) * state.q[base]).normalize();
+    }
+    response.advance(&mut state, step);
+    state
+}
+
+/// Safety factor on the error estimate: errors of derivatives decrease less regularly than
+/// those of positions.
+const SAFETY: f64 = 3.0;
+
+/// Relative errors by rounding, and by unfinished iterations as a part of the tolerance.
+const ROUNDING: f64 = 1e-10;
+
+const UNFINISHED: f64 = 0.1;
+
+/// Values on successively refined grids, extrapolated together.
+#[derive(Default)]
+pub(super) struct Series(Vec<(usize, Vec<DVec3>)>);
+
+impl Series {
+    /// Adds the values on a grid of so many segments, if there are as many as before: not all
+    /// are known on every grid.
+    pub fn push(&mut self, segments: usize, values: Vec<DVec3>) {
+        let last = self.0.last();
+        let alike = last.is_none_or(|(_, last)| last.len() == values.len());
+        if !values.is_empty() && alike {
+            self.0.push((segments, values));
+        }
+    }
+
+    /// The extrapolated values, and a common error bound.
+    pub fn extrapolated(&self, tolerance: f64) -> (Vec<DVec3>, Option<f64>) {
+        let all = self.0.iter().flat_map(|(_, values)| values);
+        let unit = all.fold(0.0_f64, |m, v| m.max(v.abs().max_element()));
+        let count = self.0.last().map_or(0, |(_, values)| values.len());
+        if unit == 0.0 || count == 0 {
+            let error = (self.0.len() > 1).then_some(0.0);
+            return (vec![DVec3::ZERO; count], error);
+        }
+        let on = |(segments, values): &(usize, Vec<DVec3>)| {
+            let numbers = values.iter().flat_map(|v| (*v / unit).to_array());
+            (*segments, numbers.collect())
+        };
+        let table: Richardson = self.0.iter().map(on).collect();
+        let values = table.extrapolated().chunks(3);
+        let error = |best: Best| (SAFETY * best.error + ROUNDING + UNFINISHED * tolerance) * unit;
+        (
+            values.map(|v| DVec3::from_slice(v) * unit).collect(),
+            table.best().map(error),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::{Options, relax_on_grids};
+    use crate::scenario::Scenario;
+
+    /// A derivative costs one solution on each grid, and no factorisation of its own.
+    #[test]
+    fn a_number_costs_one_solution_on_a_grid() {
+        let text = include_str!("../../scenarios/paper/fig04.toml");
+        let scenario = Scenario::from_toml(text).unwrap();
+        let options = Options::default();
+        let (_, found) = relax_on_grids(&scenario, &options, false, &mut |_| {}).unwrap();
+        for level in &found.levels {
+            let mut linear = Linearized::new(level, 1e-6);
+            let units = super::unit_forces(&level.leaf, 1);
+            let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();
+            assert_eq!(linear.responses(level, &loads).unwrap().len(), 10);
+            assert_eq!((linear.solves, linear.factorizations), (10, 1));
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! The explicit method: dynamic relaxation.
+//!
+//! First the leaf moves with the true masses and damping of a relaxation, every motion
+//! resolved, until it is in a valley (basin of attraction) of its energy: that decides which
+//! equilibrium it finds. Then only the descent to the minimum matters, and masses and damping
+//! are chosen for speed: fictitious masses that equalise the highest frequencies of all
+//! segments ([`crate::motion`]), and damping at the rate 3/t, restarted whenever the leaf
+//! moves uphill. (Such damping makes the motion an accelerated gradient descent, without
+//! knowledge of its lowest frequency: Su, Boyd and Candes, J. Mach. Learn. Res. 17, 2016;
+//! O'Donoghue and Candes, Found. Comput. Math. 15, 2015.) Measured on the paper's leaves it
+//! takes fewer steps than kinetic damping, up to six times fewer, and as many as constant
+//! damping when that was chosen best.
+
+use crate::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
+use crate::motion::{Explicit, Physics, Snapshot, Stopped, TimeIntegrator};
+use crate::newton::{Stop, Work};
+use crate::relax::request::RelaxError;
+use crate::relax::saddle;
+use crate::relax::solve_on_grid::Relaxation;
+use crate::run::{Limit, RefusedOption};
+use crate::scenario::Rod;
+
+/// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
+const CHECK_INTERVAL: f64 = 0.25;
+
+/// It is in a valley if its energy is convex in this many consecutive checks and its kinetic
+/// energy is at most this part of the maximum.
+const CONVEX: usize = 3;
+
+const SLOW: f64 = 1e-2;
+
+/// Time after which the descent begins in any case: soft modes take longer to decide.
+const LONGEST_MOTION: f64 = 100.0;
+
+/// Time step with fictitious masses, as a part of the stability limit.
+const STEP: f64 = 0.95;
+
+/// Steps between evaluations of the residual.
+const STEPS_PER_CHECK: usize = 200;
+
+/// Steps of the motion into the valley between checks of the time limit.
+const STEPS_PER_PIECE: f64 = 2000.0;
+
+/// Limit on nodes times steps in between: a tenth of a second.
+const NODES_PER_PIECE: f64 = 5e6;
+
+/// Best accuracy that rounding allows.
+const LEAST_ACCURACY: f64 = 1e-10;
+
+/// Residual at which the remaining distance is first measured, over the accuracy required.
+const FIRST_BALANCE: f64 = 0.1;
+
+/// Evaluations without progress after which only rounding is left, if the remaining distance
+/// is no longer than this.
+const STAGNATION: usize = 50;
+
+const LONGEST_REMAINING: f64 = 1e-6;
+
+/// Limit on nodes times steps: some ten seconds.
+const BUDGET: usize = 600_000_000;
+
+const RIGID: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
+     give a number, or use semi-implicit";
+
+const FOLLOWS: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
+     need not come to rest; use semi-implicit, or shooting";
+
+/// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
+/// which may drive a motion forever.
+pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
+    let refuse = |why| Err(RefusedOption::new("method", "explicit", why).into());
+    let rigid = |rod: &Rod| {
+        let stiffest = (rod.force_stiffness.iter()).fold(0.0_f64, |m, h| m.max(h.max_abs()));
+        stiffest.is_infinite()
+    };
+    if leaf.scenario().rods.iter().any(rigid) {
+        return refuse(RIGID);
+    }
+    if leaf.loads.has_moments() {
+        return refuse(FOLLOWS);
+    }
+    Ok(())
+}
+
+/// Lets the leaf come to rest.
+pub fn settle(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    request: &mut Relaxation,
+) -> Result<f64, Stop> {
+    let physics = Physics::at_rest(&leaf.leaf);
+    let motion = Explicit::new(leaf.clone(), physics, &request.state, None);
+    let mut motion = motion.map_err(|_| Stop::Stuck)?;
+    let most_steps = BUDGET / (leaf.rods() * leaf.segments());
+    let settled = match request.near_rest {
+        true => Ok(()),
+        false => find_valley(leaf, &mut motion, system, most_steps, request),
+    };
+    let settled = settled.and_then(|()| descend(leaf, &mut motion, system, most_steps, request));
+    request.work.steps += motion.steps();
+    request.work.force_evaluations += motion.steps();
+    request.state = motion.now();
+    settled
+}
+
+/// Damped motion into the valley of the equilibrium.
+fn find_valley(
+    leaf: &DiscreteLeaf,
+    motion: &mut Explicit,
+    system: &mut System,
+    most_steps: usize,
+    request: &mut Relaxation,
+) -> Result<(), Stop> {
+    let (mut fastest, mut convex) = (0.0_f64, 0);
+    while motion.time() < LONGEST_MOTION {
+        let now = move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
+        fastest = fastest.max(now.energy.kinetic);
+        let slow = now.energy.kinetic <= SLOW * fastest;
+        let shift = leaf.neutral_shift();
+        let valley = saddle::index(leaf, &now.state, system, shift, request.work) == Some(0);
+        convex = if valley { convex + 1 } else { 0 };
+        request.moved |= !valley;
+        if slow && convex >= CONVEX {
+            break;
+        }
+        if motion.steps() > most_steps || request.limit.reached() {
+            return Err(Stop::StepLimit);
+        }
+        (request.progress)(motion.steps(), leaf.residual(&now.state));
+    }
+    Ok(())
+}
+
+/// Moves to the time of the next check. On fine grids of stiff rods that takes long: if there
+/// is a time limit, it is checked in between.
+fn move_to_next_check(
+    motion: &mut Explicit,
+    nodes: usize,
+    limit: &Limit,
+) -> Result<Snapshot, Stop> {
+    let begin = motion.time();
+    let steps = STEPS_PER_PIECE.min((NODES_PER_PIECE / nodes as f64).max(1.0));
+    let pieces = match limit.is_none() {
+        false => (CHECK_INTERVAL / (steps * motion.longest_step())).ceil(),
+        true => 1.0,
+    };
+    let mut piece = 0.0;
+    loop {
+        piece += 1.0;
+        let now = motion
+            .advance(begin + CHECK_INTERVAL * (piece / pieces))
+            .map_err(|stopped| match stopped {
+                Stopped::Unresolved { .. } => Stop::Unresolved,
+                _ => Stop::Stuck,
+            })?;
+        if limit.reached() {
+            return Err(Stop::StepLimit);
+        }
+        if piece >= pieces {
+            return Ok(now);
+        }
+    }
+}
+
+/// Descends to the minimum; returns the remaining distance.
+fn descend(
+    leaf: &DiscreteLeaf,
+    motion: &mut Explicit,
+    system: &mut System,
+    most_steps: usize,
+    request: &mut Relaxation,
+) -> Result<f64, Stop> {
+    let accuracy = request.accuracy.max(LEAST_ACCURACY);
+    let large = (leaf.rods() * leaf.segments()) as f64 > NODES_PER_PIECE / STEPS_PER_PIECE;
+    motion.use_fictitious_masses();
+    let mut balanced = FIRST_BALANCE * accuracy;
+    let (mut since, mut before) = (0, 0.0);
+    let (mut best, mut checks_since_best) = (f64::INFINITY, 0);
+    loop {
+        for _ in 0..STEPS_PER_CHECK {
+            if large && request.limit.reached() {
+                return Err(Stop::StepLimit);
+            }
+            let rate = 3.0 / (STEP * (since + 2) as f64);
+            motion.set_damping(rate);
+            let moving = motion.step(STEP);
+            // Power of the forces: rate of kinetic energy plus damping loss.
+            let downhill = 0.5 * (moving - before) / STEP + rate * moving;
+            (since, before) = (since + 1, moving);
+            if downhill < 0.0 && since > 3 {
+                motion.stop();
+                (since, before) = (0, 0.0);
+            }
+        }
+        let state = motion.now();
+        let residual = leaf.residual(&state);
+        if !(residual.is_finite() && state.x.iter().all(|x| x.is_finite())) {
+            return Err(Stop::Stuck);
+        }
+        (request.progress)(motion.steps(), residual);
+        checks_since_best += 1;
+        if residual < 0.5 * best {
+            (best, checks_since_best) = (residual, 0);
+        }
+        if residual <= balanced || checks_since_best > STAGNATION {
+            let remaining = remaining(leaf, &state, system, request.work);
+            let stagnates = checks_since_best > STAGNATION;
+            if remaining <= accuracy || stagnates && remaining <= LONGEST_REMAINING {
+                return Ok(remaining);
+            }
+            if stagnates {
+                return Err(Stop::StepLimit);
+            }
+            balanced *= (0.5 * accuracy / remaining).max(1e-3);
+        }
+        if motion.steps() > most_steps || request.limit.reached() {
+            return Err(Stop::StepLimit);
+        }
+    }
+}
+
+/// Distance to equilibrium, measured by a Newton step that is not taken.
+fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> f64 {
+    leaf.assemble(state, system);
+    leaf.hold_turn(state, system);
+    work.force_evaluations += 1;
+    work.factorizations += 1;
+    let Ok(pattern) = DirectSolver::new(system) else {
+        return f64::INFINITY;
+    };
+    let Ok(mut factor) = pattern.factorize(system, leaf.neutral_shift()) else {
+        return f64::INFINITY;
+    };
+    factor.solve(system, None);
+    let (turn, shift) = system.largest();
+    turn.max(shift)
+}

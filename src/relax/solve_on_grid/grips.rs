@@ -1,0 +1,405 @@
+//! From a free start to held tips: the grips are moved quasi-statically.
+//!
+//! A leaf with a held tip may have many equilibria, and the one it reaches depends on the
+//! loading path. The path here is that of a testing machine: the leaf is gripped where a free
+//! start has its tips, and the grips move and rotate uniformly to their final positions, with
+//! the leaf at rest at every step. A step after which it is not near is shortened: where the
+//! shortest does not help, the leaf has lost its stability.
+
+use crate::homotopy::Homotopy;
+use crate::leaf::{DiscreteLeaf, Gripped, State, System};
+use crate::newton::{Definite, Equations, Newton, Stop};
+use crate::relax::path::{Event, Happening, Stage};
+use crate::relax::rest::{Effort, Problem};
+use crate::relax::saddle;
+use crate::relax::solve_on_grid::{FAR_FROM_REST, Relaxation};
+use crate::rotation;
+use glam::{DQuat, DVec3};
+use std::f64::consts::{PI, TAU};
+
+/// Largest displacement (lengths) and rotation (radians) of the grips in a step.
+const SHIFT: f64 = 0.1;
+
+const TURN: f64 = 0.4;
+
+/// The shortest step, as a part of the longest; the factor on a step that failed, and that on one
+/// after a step that did not.
+const SHORTEST: f64 = 1.0 / 32.0;
+
+const SHORTENED: f64 = 0.25;
+
+const GROWTH: f64 = 2.0;
+
+/// The largest change of a leaf in a step beside that of its holders (radians, lengths), in the valley
+/// of its energy and elsewhere: one that moves farther may have left its equilibrium.
+const LARGEST_DRIFT: f64 = 0.5;
+
+const LARGEST_DRIFT_OUTSIDE: f64 = 0.05;
+
+/// Accuracy of the equilibria along the path.
+const ACCURACY: f64 = 1e-2;
+
+/// Newton iterations of a step, and the largest increment (radians, lengths).
+const ITERATIONS: usize = 8;
+
+const LARGEST_INCREMENT: f64 = 1.0;
+
+/// Saddles that are left in a step.
+const PUSHES: i32 = 3;
+
+/// How a leaf came to where it is held.
+pub struct Moved {
+    pub state: State,
+    /// Whether it rests there.
+    pub near_rest: bool,
+    /// Whether its energy was not convex along the path.
+    pub moved: bool,
+    /// Where the path lost its stability.
+    pub events: Vec<Event>,
+}
+
+/// Moves tips and other nodes from their positions in `state` to those where they are held.
+pub fn move_grips(
+    problem: &Problem,
+    leaf: &DiscreteLeaf,
+    state: State,
+    effort: &mut Effort,
+) -> Moved {
+    let holders = Holders {
+        tips: paths(leaf, &state).unwrap_or_default(),
+        grips: (0..leaf.rods())
+            .flat_map(|j| leaf.grips_of(j).map(|held| GripPath::of(*held, &state)))
+            .collect(),
+    };
+    let longest = 1.0 / holders.steps();
+    let mut path = Homotopy::new(longest, [SHORTEST * longest, longest]);
+    let (limit, begun) = (&problem.options.limit, effort.work.force_evaluations);
+    let ignored: &mut dyn FnMut(usize, f64) = &mut |_, _| {};
+    let mut walk = HeldWalk {
+        leaf,
+        system: System::new(leaf),
+        held: Relaxation::new(state, ACCURACY, (&mut effort.work, ignored), limit),
+        keeps_unstable: problem.keeps_unstable(),
+        events: Vec::new(),
+    };
+    walk.begin(&holders);
+    while path.part < 1.0 && !limit.reached() {
+        if walk.step(&holders, path.next(), path.is_shortest()) {
+            path.advance(GROWTH * path.length());
+        } else {
+            path.shorten(SHORTENED);
+        }
+    }
+    let HeldWalk { held, events, .. } = walk;
+    let (mut state, near_rest, moved) = (held.state, held.near_rest, held.moved);
+    effort.spent += leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
+    leaf.hold(&mut state);
+    Moved {
+        state,
+        near_rest,
+        moved: moved || !events.is_empty(),
+        events,
+    }
+}
+
+/// A leaf at rest while its holders are moved.
+struct HeldWalk<'a> {
+    leaf: &'a DiscreteLeaf,
+    system: System,
+    held: Relaxation<'a>,
+    keeps_unstable: bool,
+    events: Vec<Event>,
+}
+
+impl HeldWalk<'_> {
+    /// Brings the leaf to rest where its holders take it.
+    fn begin(&mut self, holders: &Holders) {
+        holders.carry(self.leaf, 0.0, &mut self.held.state);
+        let rest = self.settle();
+        self.held.near_rest = match rest {
+            Err(Stop::Saddle) if !self.keeps_unstable => self.turn_aside(0.0).is_ok(),
+            _ => rest.is_ok(),
+        };
+    }
+
+    /// Makes a step to a part of the path. False, with the leaf as it was, if it should be shorter, as
+    /// no equilibrium near the last one was found; the `shortest` is made in any case.
+    fn step(&mut self, holders: &Holders, part: f64, shortest: bool) -> bool {
+        let (before, moved, near_rest) = (
+            self.held.state.clone(),
+            self.held.moved,
+            self.held.near_rest,
+        );
+        holders.carry(self.leaf, part, &mut self.held.state);
+        let carried = self.held.state.clone();
+        self.held.moved = false;
+        let rest = match shortest || !near_rest {
+            true => self.settle(),
+            false => self.correct(),
+        };
+        let drift = carried.distance(&self.held.state);
+        let jumped = drift > LARGEST_DRIFT || self.held.moved && drift > LARGEST_DRIFT_OUTSIDE;
+        if !shortest && near_rest && (rest.is_err() || jumped) {
+            (self.held.state, self.held.moved) = (before, moved);
+            return false;
+        }
+        self.held.moved |= moved;
+        let rest = match rest {
+            Err(Stop::Saddle) if !self.keeps_unstable => self.turn_aside(part),
+            rest => {
+                if jumped && near_rest {
+                    self.note(part, Happening::Snapped);
+                }
+                rest.map(|_| ())
+            }
+        };
+        self.held.near_rest = rest.is_ok();
+        true
+    }
+
+    /// From the saddle to which the leaf came it turns to one of its sides.
+    fn turn_aside(&mut self, part: f64) -> Result<(), Stop> {
+        let (leaf, saddle) = (self.leaf, self.held.state.clone());
+        let system = &mut self.system;
+        if !saddle::find_unstable_mode(leaf, &saddle, system, DVec3::ZERO, self.held.work) {
+            return Err(Stop::Saddle);
+        }
+        let mode = self.system.solution();
+        let sides = [1.0, -1.0].map(|sign| {
+            self.held.state.clone_from(&saddle);
+            self.system.set_solution(&mode);
+            saddle::displace(leaf, &mut self.held.state, &self.system, sign);
+            self.leave_saddles().ok()?;
+            Some((leaf.energy(&self.held.state), self.held.state.clone()))
+        });
+        let (state, equally_open) = saddle::lower_side(sides).ok_or(Stop::Saddle)?;
+        self.held.state = state;
+        self.note(part, Happening::Branched { equally_open });
+        Ok(())
+    }
+
+    /// Brings a leaf that was pushed off a saddle to rest, off others, too.
+    fn leave_saddles(&mut self) -> Result<f64, Stop> {
+        for pushes in 1..PUSHES {
+            self.held.pushes = pushes;
+            let rest = self.settle();
+            self.held.pushes = 0;
+            if rest != Err(Stop::Saddle) {
+                return rest;
+            }
+            let (system, state) = (&mut self.system, &mut self.held.state);
+            saddle::push_off(self.leaf, state, system, DVec3::ZERO, self.held.work);
+        }
+        Err(Stop::Saddle)
+    }
+
+    /// Newton's method from where the leaf was carried to the equilibrium nearby, through convex states
+    /// only.
+    fn correct(&mut self) -> Result<f64, Stop> {
+        let newton = Newton {
+            accuracy: ACCURACY,
+            iterations: ITERATIONS,
+            work: self.held.work,
+            progress: self.held.progress,
+        };
+        self.held.solver = Definite::default();
+        let equations = Equations::Definite {
+            solver: &mut self.held.solver,
+            largest: LARGEST_INCREMENT,
+            shifted: false,
+            cg_tolerance: FAR_FROM_REST,
+        };
+        let (leaf, state, system) = (self.leaf, &mut self.held.state, &mut self.system);
+        let rest = newton.solve(leaf, state, system, equations)?;
+        // The last matrix was that of the state before.
+        let shift = leaf.neutral_shift();
+        match saddle::index(leaf, state, system, shift, self.held.work) {
+            Some(0) => Ok(rest),
+            _ => Err(Stop::Saddle),
+        }
+    }
+
+    /// Brings the leaf roughly to rest with its holders fixed.
+    fn settle(&mut self) -> Result<f64, Stop> {
+        self.held.solver = Definite::default();
+        self.held.settle(self.leaf, &mut self.system)
+    }
+
+    fn note(&mut self, part: f64, happening: Happening) {
+        self.events.push(Event {
+            stage: Stage::Moving,
+            part,
+            happening,
+        });
+    }
+}
+
+/// The paths of all that is held.
+struct Holders {
+    tips: Vec<Path>,
+    grips: Vec<GripPath>,
+}
+
+impl Holders {
+    /// The number of the longest steps along the path, at least one.
+    fn steps(&self) -> f64 {
+        let tips = self.tips.iter().map(Path::steps);
+        tips.chain(self.grips.iter().map(GripPath::steps))
+            .fold(1.0, f64::max)
+    }
+
+    /// Carries what is held to a part of the path, and the nodes between in proportion.
+    fn carry(&self, leaf: &DiscreteLeaf, part: f64, state: &mut State) {
+        for (j, path) in self.tips.iter().enumerate() {
+            path.move_tip(leaf, j, part, state);
+        }
+        carry(leaf, &self.grips, part, state);
+    }
+}
+
+/// The path of the tip of a rod from a free start to its holder.
+struct Path {
+    from: DVec3,
+    to: DVec3,
+    /// Of a clamp: the angle of d1 about e3 at both ends, the final twist about d1, and the
+    /// rest of the start's rotation, which is removed along the path.
+    clamp: Option<([f64; 2], f64, DVec3)>,
+}
+
+/// The paths of all tips; `None` if they are free.
+fn paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<Path>> {
+    let held = leaf.leaf.held.as_ref()?;
+    let path = |j: usize| Path {
+        from: start.tip(j),
+        to: held.position,
+        clamp: held.clamps.as_ref().map(|clamps| {
+            let rod = &start.q[start.base(j)..=start.base(j) + leaf.segments()];
+            let tip = rod[leaf.segments()];
+            let heading = heading(rod);
+            let other = DQuat::from_rotation_z(heading).conjugate() * tip;
+            (
+                [heading, clamps[j].angle],
+                clamps[j].twist,
+                rotation::log(other),
+            )
+        }),
+    };
+    Some((0..leaf.rods()).map(path).collect())
+}
+
+/// The angle of d1 about e3 at the last of these nodes, continued from the first: full turns
+/// count.
+fn heading(rod: &[DQuat]) -> f64 {
+    let angle = |q: &DQuat| {
+        let d1 = *q * DVec3::X;
+        d1.y.atan2(d1.x)
+    };
+    let turns = rod.windows(2).map(|ends| {
+        let turn = angle(&ends[1]) - angle(&ends[0]);
+        (turn + PI).rem_euclid(TAU) - PI
+    });
+    angle(&rod[0]) + turns.sum::<f64>()
+}
+
+impl Path {
+    /// The number of steps along the path.
+    fn steps(&self) -> f64 {
+        let turn = self.clamp.map_or(0.0, |([from, to], twist, other)| {
+            (to - from).abs() + twist.abs() + other.length()
+        });
+        (self.from.distance(self.to) / SHIFT)
+            .max(turn / TURN)
+            .ceil()
+    }
+
+    /// Moves the tip of rod `j` to the fraction `part` of the path, and every node with it in
+    /// proportion to its distance from the base.
+    fn move_tip(&self, leaf: &DiscreteLeaf, j: usize, part: f64, state: &mut State) {
+        let base = state.base(j);
+        let tip = base + leaf.segments();
+        let shift = self.from.lerp(self.to, part) - state.x[tip];
+        let turn = self.clamp.map(|([from, to], twist, other)| {
+            let heading = DQuat::from_rotation_z(from + part * (to - from));
+            let rotation = heading
+                * DQuat::from_rotation_x(part * twist)
+                * rotation::exp((1.0 - part) * other);
+            rotation::log(rotation * state.q[tip].conjugate())
+        });
+        for (i, &sigma) in leaf.grid.sigma().iter().enumerate().skip(1) {
+            state.x[base + i] += sigma * shift;
+            if let Some(turn) = turn {
+                state.q[base + i] = (rotation::exp(sigma * turn) * state.q[base + i]).normalize();
+            }
+        }
+    }
+}
+
+/// The path of a node from where it is to where a grip holds it.
+struct GripPath {
+    held: Gripped,
+    from: DVec3,
+    turn: DVec3,
+}
+
+impl GripPath {
+    fn of(held: Gripped, start: &State) -> Self {
+        let k = start.base(held.rod) + held.node;
+        let turn = |to: DQuat| rotation::log(to * start.q[k].conjugate());
+        GripPath {
+            held,
+            from: start.x[k],
+            turn: held.rotation.map_or(DVec3::ZERO, turn),
+        }
+    }
+
+    /// The number of steps along the path.
+    fn steps(&self) -> f64 {
+        let distance = self.from.distance(self.held.position);
+        (distance / SHIFT).max(self.turn.length() / TURN).ceil()
+    }
+}
+
+/// Carries gripped nodes to the fraction `part` of their paths. The nodes between two of them, or
+/// one and the end of the vein, are displaced in proportion to their distances.
+fn carry(leaf: &DiscreteLeaf, paths: &[GripPath], part: f64, state: &mut State) {
+    let (n, sigma) = (leaf.segments(), leaf.grid.sigma());
+    for j in 0..leaf.rods() {
+        let (base, mut before) = (state.base(j), (0, DVec3::ZERO));
+        let fixed_tip = leaf.leaf.held.is_some() || leaf.tips_move_together();
+        let of_rod: Vec<&GripPath> = paths.iter().filter(|path| path.held.rod == j).collect();
+        for path in &of_rod {
+            let node = path.held.node;
+            let shift = path.from.lerp(path.held.position, part) - state.x[base + node];
+            between(sigma, [before, (node, shift)], |i, shift| {
+                state.x[base + i] += shift
+            });
+            state.x[base + node] += shift;
+            if let Some(rotation) = path.held.rotation {
+                let left = rotation::exp((part - 1.0) * path.turn);
+                state.q[base + node] = (left * rotation).normalize();
+            }
+            before = (node, shift);
+        }
+        if !of_rod.is_empty() && before.0 < n {
+            let end = if fixed_tip { DVec3::ZERO } else { before.1 };
+            between(sigma, [before, (n, end)], |i, shift| {
+                state.x[base + i] += shift
+            });
+            if !fixed_tip {
+                state.x[base + n] += end;
+            }
+        }
+    }
+}
+
+/// Passes the nodes between two nodes, with their displacements interpolated.
+fn between(
+    sigma: &[f64],
+    [(a, from), (b, to)]: [(usize, DVec3); 2],
+    mut each: impl FnMut(usize, DVec3),
+) {
+    for i in a + 1..b {
+        let part = (sigma[i] - sigma[a]) / (sigma[b] - sigma[a]);
+        each(i, from.lerp(to, part));
+    }
+}

@@ -1,0 +1,613 @@
+//! How a leaf comes to rest on one grid: the start, held tips that are moved to their places, the
+//! methods, and pushes off saddles.
+//!
+//! The iteration to equilibrium on one grid.
+//!
+//! The count of negative eigenvalues of a leaf at rest, and pushes off saddles.
+//!
+//! The equilibrium that a leaf reaches from a given state, on one grid.
+//!
+//! Segments of the coarsest grid, as requested or as needed.
+//!
+//! The solution methods, each on one grid or without a grid.
+
+pub(crate) mod explicit;
+pub(crate) mod grips;
+pub(crate) mod no_potential;
+pub(crate) mod semi_implicit;
+pub(crate) mod start;
+
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Solved, State, System, half_of};
+use crate::memory;
+use crate::newton::{Definite, Newton, Stop, Work};
+use crate::relax::accuracy::{
+    FINEST, Failure, History, Level, NestedEquilibrium, complete, is_large,
+};
+use crate::relax::path::Event;
+use crate::relax::request::{MAX_NODES, Method, Options, Progress, RelaxError, SemiImplicit};
+use crate::relax::rest::{BUDGET, COARSEST, Effort, Problem};
+use crate::relax::saddle;
+use crate::relax::saddle::saddle_of;
+use crate::relax::solve_on_grid::grips::move_grips;
+pub use crate::relax::solve_on_grid::semi_implicit::softens;
+use crate::relax::solve_on_grid::start::{disturb, start};
+use crate::run::{Limit, RefusedOption};
+use glam::DVec3;
+
+/// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
+/// coarse, a looser one saves a step on the finest. On a grid that may be the only one it is
+/// estimated, and subtracted, with the error of the grid.
+const ITERATION_PART: f64 = 1e-3;
+
+const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+
+const ITERATION_PART_ALONE: f64 = 5e-2;
+
+/// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
+const FIXED_ACCURACY: f64 = 1e-12;
+
+/// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
+/// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
+const LEAST_EVALUATIONS: (usize, usize) = (600, 100);
+
+const COARSE: usize = 64;
+
+/// Newton iterations towards an equilibrium of any kind.
+const MAX_ITERATIONS: usize = 200;
+
+/// Saddles that are left before the run fails.
+pub const MAX_SADDLES: i32 = 10;
+
+/// Accuracy, in the energy norm, of the effects of shear and stretch: stretch dominates this
+/// norm, to which displacements contribute little.
+const EFFECT_ACCURACY: f64 = 1e-5;
+
+/// The initial guess of the iteration on a grid.
+pub enum InitialGuess {
+    /// The start of the scenario, disturbed if requested.
+    Start,
+    /// The equilibrium of the next coarser grid, prolonged.
+    Coarser(State),
+    /// The equilibrium predicted from those on several coarser grids.
+    Predicted(State),
+    /// A state displaced from a saddle along its unstable mode.
+    Pushed(State),
+}
+
+/// The end of the iteration on a grid, converged or not.
+pub struct Settled {
+    pub level: Level,
+    /// The remaining iteration error.
+    pub rest: Result<f64, Stop>,
+    /// Whether it had to move through states of non-convex energy, instead of settling in the
+    /// valley of the initial guess.
+    pub moved: bool,
+    /// Where a leaf that was moved to its holders lost its stability; `None` if it was not.
+    pub events: Option<Vec<Event>>,
+}
+
+/// Settles on one grid; leaves saddles unless they are accepted. A leaf that can turn without
+/// resistance leans down. The `history` is that on the grids before, and goes on here.
+pub fn settle(
+    problem: &Problem,
+    history: &mut History,
+    (grid, guess): (Grid, InitialGuess),
+    effort: &mut Effort,
+) -> Settled {
+    let mut settled = settle_upright(problem, history, (grid, guess), effort);
+    let Level { leaf, state } = &mut settled.level;
+    leaf.lean_down(state);
+    settled
+}
+
+/// The same without leaning.
+fn settle_upright(
+    problem: &Problem,
+    history: &mut History,
+    (grid, guess): (Grid, InitialGuess),
+    effort: &mut Effort,
+) -> Settled {
+    let mut leaf = DiscreteLeaf::new(problem.leaf, grid);
+    let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
+    let from_start = matches!(guess, InitialGuess::Start);
+    let grip = leaf.leaf.is_held() && from_start;
+    let cg_tolerance = match guess {
+        InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
+        InitialGuess::Coarser(_) => 1e-4,
+        // The interpolation error is dominated by stiff modes; the error to be removed is
+        // one of soft modes, a small part of the energy.
+        InitialGuess::Predicted(_) => 1e-8,
+    };
+    let mut state = match guess {
+        InitialGuess::Start => start_of(problem, &leaf),
+        InitialGuess::Coarser(state)
+        | InitialGuess::Predicted(state)
+        | InitialGuess::Pushed(state) => state,
+    };
+    let dead_moment = leaf.has_moments();
+    let mut moved = false;
+    let mut events = None;
+    if grip {
+        // Dead moments act once it is held: only without them the path has an energy to follow.
+        let held = match dead_moment {
+            true => move_grips(problem, &leaf.without_moments(), state, effort),
+            false => move_grips(problem, &leaf, state, effort),
+        };
+        (state, moved) = (held.state, held.moved);
+        near_rest = held.near_rest && !dead_moment;
+        events = Some(held.events).filter(|_| leaf.leaf.has_potential());
+    } else {
+        leaf.hold(&mut state);
+    }
+    let explicit = matches!(problem.options.method, Method::Explicit { .. });
+    let windy = leaf.leaf.in_wind();
+    // What was held without wind is not at rest in it; two grids must lead to the same place.
+    near_rest &= !(windy && from_start);
+    moved |= windy && from_start;
+    if !explicit && !dead_moment && !windy && !problem.keeps_unstable() {
+        let how = (near_rest, cg_tolerance);
+        effort.spare_system = None;
+        let mut system = System::new(&leaf);
+        let begun = from_start.then(|| (state.clone(), effort.work.steps));
+        let settled =
+            settle_semi_implicit((problem, history), (leaf, state), &mut system, how, effort);
+        if let Some((begun, steps)) = begun {
+            let distance = begun.distance(&settled.level.state);
+            history.from_start = Some((distance, effort.work.steps - steps));
+        }
+        effort.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
+        return Settled {
+            moved: moved || settled.moved,
+            events,
+            ..settled
+        };
+    }
+    let accuracy = accuracy(problem, history, &leaf);
+    let mut system = System::new(&leaf);
+    let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
+    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
+    let mut relaxation = Relaxation {
+        near_rest,
+        moved,
+        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+    };
+    let rest = match (explicit, dead_moment) {
+        _ if windy => no_potential::settle_in_wind(&mut leaf, &mut system, &mut relaxation),
+        (true, _) => explicit::settle(&leaf, &mut system, &mut relaxation),
+        (_, true) => {
+            no_potential::settle_with_dead_moments(&mut leaf, &mut system, &mut relaxation)
+        }
+        // To the next equilibrium, stable or not.
+        _ => {
+            let newton = Newton {
+                accuracy,
+                iterations: MAX_ITERATIONS,
+                work: relaxation.work,
+                progress: relaxation.progress,
+            };
+            newton.solve(&leaf, &mut relaxation.state, &mut system, saddle::ANY_SIGN)
+        }
+    };
+    let Relaxation { state, moved, .. } = relaxation;
+    if explicit || windy {
+        history.remaining = history.remaining.max(rest.unwrap_or(0.0));
+    }
+    let level = Level { leaf, state };
+    Settled {
+        level,
+        rest,
+        moved,
+        events,
+    }
+}
+
+/// The start of a leaf without an initial guess.
+pub(super) fn start_of(problem: &Problem, leaf: &DiscreteLeaf) -> State {
+    if let Some(whole) = problem.whole {
+        let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
+        return half_of(problem.leaf, &start(&whole));
+    }
+    let mut state = start(leaf);
+    if let Method::SemiImplicit(SemiImplicit {
+        disturbance: Some(number),
+        ..
+    }) = problem.options.method
+    {
+        disturb(leaf, number, &mut state);
+    }
+    state
+}
+
+/// Iteration error allowed on a grid.
+fn accuracy(problem: &Problem, history: &History, leaf: &DiscreteLeaf) -> f64 {
+    let first = history.coarsest.unwrap_or(leaf.segments());
+    match problem.segments() {
+        Some(_) => FIXED_ACCURACY,
+        None if problem.too_coarse(first) => {
+            match history.coarsest.is_none() && problem.may_be_alone() {
+                true => ITERATION_PART_ALONE * problem.tolerance,
+                false => ITERATION_PART_FROM_COARSE * problem.tolerance,
+            }
+        }
+        None => ITERATION_PART * problem.tolerance,
+    }
+}
+
+/// Settles by the semi-implicit method.
+fn settle_semi_implicit(
+    (problem, history): (&Problem, &mut History),
+    (leaf, state): (DiscreteLeaf, State),
+    system: &mut System,
+    (near_rest, cg_tolerance): (bool, f64),
+    effort: &mut Effort,
+) -> Settled {
+    let accuracy = accuracy(problem, history, &leaf);
+    let convex_only =
+        problem.whole.is_some() || problem.stays_in_valley || problem.too_coarse(leaf.segments());
+    let nodes = leaf.rods() * leaf.segments();
+    let (most, least) = LEAST_EVALUATIONS;
+    let granted = (most * COARSE / leaf.segments()).clamp(least, most);
+    let allowed = (BUDGET.saturating_sub(effort.spent) / nodes).max(granted);
+    let most_evaluations = effort.work.force_evaluations + allowed;
+    let progress = &mut step_reporter(&mut *effort.progress, leaf.segments());
+    let out = (&mut effort.work, progress as &mut dyn FnMut(usize, f64));
+    let mut relaxation = Relaxation {
+        near_rest,
+        cg_tolerance,
+        solver: Definite::after(history.contraction),
+        most_evaluations,
+        convex_only,
+        ..Relaxation::new(state, accuracy, out, &problem.options.limit)
+    };
+    let mut rest = Err(Stop::StepLimit);
+    // After earlier pushes off saddles at rest, the softened leaf returned to one.
+    for pushes in history.pushes..history.pushes + MAX_SADDLES {
+        relaxation.pushes = pushes;
+        let before = relaxation.work.force_evaluations;
+        let settled = relaxation.settle(&leaf, system);
+        effort.spent += nodes * (relaxation.work.force_evaluations - before);
+        if let Ok(remaining) = settled {
+            history.remaining = history.remaining.max(remaining);
+            if history.coarsest.is_none() && relaxation.solver.direct.is_none() {
+                history.effects = effects(&leaf, &relaxation.state, system);
+            }
+        }
+        if settled != Err(Stop::Saddle) || convex_only {
+            rest = settled;
+            break;
+        }
+        let state = &mut relaxation.state;
+        match saddle::polish(&leaf, state, system, relaxation.work) {
+            Some(0) => {
+                rest = Ok(accuracy);
+                break;
+            }
+            Some(index) => history.saddle = Some(saddle_of(&leaf, state, index)),
+            None => {}
+        }
+        let leaning = problem.options.leaning;
+        saddle::push_off(&leaf, state, system, leaning, relaxation.work);
+        relaxation.near_rest = false;
+        relaxation.cg_tolerance = FAR_FROM_REST;
+        relaxation.solver.direct = None;
+    }
+    let Relaxation { state, moved, .. } = relaxation;
+    history.contraction = relaxation.solver.contraction;
+    let level = Level { leaf, state };
+    Settled {
+        level,
+        rest,
+        moved,
+        events: None,
+    }
+}
+
+/// Reports the steps on a grid of `grid` segments.
+fn step_reporter(
+    progress: &mut dyn FnMut(&Progress),
+    grid: usize,
+) -> impl FnMut(usize, f64) + use<'_> {
+    move |step, residual| {
+        progress(&Progress::Relaxing {
+            grid,
+            step,
+            residual,
+        });
+    }
+}
+
+/// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
+/// factorisation of the last iteration.
+fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    if system.tied() {
+        return [None; 2];
+    }
+    [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
+        leaf.assemble_stiffening(state, dropped, system);
+        match system.solve(None, EFFECT_ACCURACY) {
+            Solved::Yes(_) => Some(system.largest().1),
+            _ => None,
+        }
+    })
+}
+
+/// What is known of the stability on one grid.
+struct Count {
+    /// Whether the leaf is clearly stable.
+    clearly_stable: bool,
+    /// The number of negative eigenvalues, if it is known; `None` if they were not counted.
+    index: Option<Option<usize>>,
+}
+
+/// Counts the negative eigenvalues on one grid, and whether the leaf is clearly stable. If
+/// it is not and will be `compared` with another grid nothing is counted.
+fn count_negative(
+    problem: &Problem,
+    level: &Level,
+    system: &mut System,
+    compared: bool,
+    work: &mut Work,
+) -> Count {
+    let Level { leaf, state } = level;
+    let clearly_stable = saddle::clearly_stable(leaf, state, system, work);
+    let index = match clearly_stable {
+        true => Some(0),
+        false if compared => {
+            return Count {
+                clearly_stable,
+                index: None,
+            };
+        }
+        false if leaf.neutral_shift() > saddle::NOISY => {
+            let within = saddle::index_within_rounding(leaf, state, system, work);
+            // Whatever is unstable is pushed off, however many its unstable modes.
+            let known = |&[least, most]: &[usize; 2]| {
+                least == most || (least > 0 && !problem.keeps_unstable())
+            };
+            within.filter(known).map(|[least, _]| least)
+        }
+        false => saddle::index(leaf, state, system, 0.0, work),
+    };
+    Count {
+        clearly_stable,
+        index: Some(index),
+    }
+}
+
+/// Counts the negative eigenvalues on the finest grid. On the first, unless it is the `last`,
+/// the leaf must be clearly stable. If saddles are accepted the number must be that on the
+/// grid before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
+/// equilibrium reached. Returns whether stability is known, as far as possible: if not,
+/// finer grids are needed.
+pub fn check_stability(
+    problem: &Problem,
+    found: NestedEquilibrium,
+    last: bool,
+    effort: &mut Effort,
+) -> Result<(NestedEquilibrium, bool), Box<Failure>> {
+    let level = found.levels.last().expect("the leaf has settled");
+    if !level.leaf.leaf.has_potential() {
+        return Ok((found, true));
+    }
+    let compared = !last && found.levels.len() == 1 && problem.segments().is_none();
+    if let Some(whole) = problem.whole {
+        let level = complete(problem.leaf, whole, level);
+        let mut system = System::new(&level.leaf);
+        let count = count_negative(problem, &level, &mut system, compared, &mut effort.work);
+        let index = count.index.unwrap_or(found.index);
+        let found = found.counted(count.clearly_stable, index);
+        return match (count.index, found.index) {
+            (None, _) => Ok((found, false)),
+            (_, Some(0)) => Ok((found, true)),
+            _ => found.failed(Stop::Saddle),
+        };
+    }
+    let before = found.index;
+    let (mut found, mut level) = found.split();
+    let mut spare = effort.spare_system.take();
+    if spare.is_none() && found.levels.is_empty() {
+        // Further grids have equations of their own.
+        spare = found.linear.take().map(|linear| linear.system);
+    }
+    let mut system = System::reused(spare, &level.leaf);
+    let work = &mut effort.work;
+    let mut count = count_negative(problem, &level, &mut system, compared, work);
+    if matches!(count.index, Some(Some(1..))) && !problem.keeps_unstable() {
+        let Level { leaf, state } = &mut level;
+        let exact = saddle::polish(leaf, state, &mut system, work);
+        count.index = exact.map(Some).or(count.index);
+    }
+    found = found.counted(count.clearly_stable, count.index.unwrap_or(before));
+    let Some(Some(index @ 1..)) = count.index else {
+        return Ok((found.joined(level), count.index.is_some()));
+    };
+    if problem.keeps_unstable() {
+        let known = before == found.index || problem.segments().is_some();
+        return Ok((found.joined(level), known));
+    }
+    if problem.stays_in_valley {
+        return found.joined(level).failed(Stop::Saddle);
+    }
+    found.history.saddle = Some(saddle_of(&level.leaf, &level.state, index));
+    found.history.pushes += 1;
+    if found.history.pushes > MAX_SADDLES {
+        return found.joined(level).failed(Stop::StepLimit);
+    }
+    let Level { leaf, mut state } = level;
+    let leaning = problem.options.leaning;
+    saddle::push_off(&leaf, &mut state, &mut system, leaning, work);
+    let pushed = (leaf.grid, InitialGuess::Pushed(state));
+    let Settled { level, rest, .. } = settle(problem, &mut found.history, pushed, effort);
+    let found = found.on(vec![level]);
+    match (rest, problem.segments()) {
+        (Err(stop), _) => found.failed(stop),
+        (Ok(_), Some(_)) => check_stability(problem, found, last, effort),
+        (Ok(_), None) => Ok((found, false)),
+    }
+}
+
+/// Accuracy of the equilibrium.
+const TOLERANCE: f64 = 1e-6;
+
+/// The stable equilibrium that a leaf reaches from a state on a grid without initial velocity:
+/// saddles are left. `None` if it does not come to rest.
+pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
+    let options = Options {
+        limit: limit.clone(),
+        ..Options::default()
+    };
+    let problem = Problem::new(leaf, &options, TOLERANCE);
+    let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+    let mut effort = Effort::new(ignored);
+    let mut found = NestedEquilibrium::begun(&problem);
+    let from = (grid.clone(), InitialGuess::Pushed(state));
+    let settled = settle(&problem, &mut found.history, from, &mut effort);
+    settled.rest.ok()?;
+    found = found.with(settled.level);
+    let mut known = false;
+    while !known {
+        (found, known) = check_stability(&problem, found, true, &mut effort).ok()?;
+    }
+    found.levels.pop().map(|level| level.state)
+}
+
+/// Segments of the coarsest grid for a loose tolerance: if it is at least [`LOOSE`] or only
+/// the shape is requested (forces and eigenvalues have larger errors), and the leaf settles in
+/// the valley it starts in.
+const COARSEST_OF_LOOSE: usize = 4;
+
+const LOOSE: f64 = 1e-3;
+
+/// Segments of the coarsest grid of a blade, which is narrow at its tip: where it was eight, two bars
+/// of 86 were too low by a factor of two.
+const COARSEST_OF_BLADES: usize = 16;
+
+/// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
+/// dead moments alone determine it, and the largest allowed at rest on the coarsest grid of a
+/// loose tolerance.
+pub const COARSEST_TURN: f64 = 0.8;
+
+/// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
+/// saddles, and not disturbed.
+fn settles_where_it_starts(method: Method) -> bool {
+    matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
+}
+
+/// Whether half of a leaf may be solved in place of the whole.
+pub fn reducible(method: Method) -> bool {
+    settles_where_it_starts(method)
+        && matches!(method, Method::SemiImplicit(how) if !how.full_model)
+}
+
+/// Segments of the coarsest grid, unless a leaf needs more.
+pub fn least(method: Method, tolerance: f64, shape_alone: bool) -> usize {
+    let loose = shape_alone || tolerance >= LOOSE;
+    match settles_where_it_starts(method) && loose {
+        true => COARSEST_OF_LOOSE,
+        false => COARSEST,
+    }
+}
+
+/// Segments of a grid: as requested, or at least `least` and as many as the kinks of the
+/// profiles, the rest shape and the dead moments need.
+pub fn check_segments(
+    leaf: &Leaf,
+    requested: Option<usize>,
+    least: usize,
+) -> Result<usize, RelaxError> {
+    let panels = leaf.kinks().len() + 1;
+    let found = requested.unwrap_or_else(|| coarsest(leaf, least).max(panels));
+    let (rods, segments, least) = (leaf.rods(), found, panels);
+    let nodes = rods.saturating_mul(segments);
+    if found < least {
+        let why = format!(
+            "at least {least} are needed, one for every piece between the knots of the profiles"
+        );
+        return Err(RefusedOption::new("segments", found, why).into());
+    }
+    if nodes > MAX_NODES {
+        return Err(RelaxError::TooManyNodes {
+            rods,
+            segments,
+            nodes,
+        });
+    }
+    memory::grid(rods, segments)?;
+    Ok(segments)
+}
+
+/// Segments of the coarsest grid.
+pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
+    let moment = leaf.integral_of_moments();
+    let turn = |j: usize| {
+        let section = leaf.section(j, 0.5, 1.0);
+        let bending = moment / section.couple_stiffness.min_element();
+        (section.rest_curvature.length() + bending) * leaf.length(j)
+    };
+    let turn = match no_potential::turning(leaf, FINEST) {
+        Some(rate) => rate * leaf.length(0),
+        None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
+    };
+    let mut segments = match leaf.scenario().blade {
+        Some(_) => least.max(COARSEST_OF_BLADES),
+        None => least,
+    };
+    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
+        segments *= 2;
+    }
+    segments
+}
+
+/// Accuracy of the first solutions with conjugate gradients far from rest.
+pub const FAR_FROM_REST: f64 = 1e-2;
+
+/// A relaxation on one grid: its state and its parameters.
+pub struct Relaxation<'a> {
+    pub state: State,
+    /// Of positions and rotations.
+    pub accuracy: f64,
+    pub work: &'a mut Work,
+    /// Receives the size of every step or, with the explicit method, the largest unbalanced
+    /// force or moment.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+    pub limit: &'a Limit,
+    /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
+    pub near_rest: bool,
+    /// Whether the leaf moved through states of non-convex energy.
+    pub moved: bool,
+    /// Relative accuracy of the conjugate gradients in the first step.
+    pub cg_tolerance: f64,
+    /// How often it was pushed off saddles before: each time it is softened less, since a
+    /// softened leaf may return to the saddle.
+    pub pushes: i32,
+    pub solver: Definite,
+    /// Count of force evaluations at which the iteration ends without success.
+    pub most_evaluations: usize,
+    /// Whether to fail at once where the energy is not convex.
+    pub convex_only: bool,
+}
+
+impl<'a> Relaxation<'a> {
+    /// From a state far from rest, without a limit on its work but `limit`.
+    pub fn new(
+        state: State,
+        accuracy: f64,
+        (work, progress): (&'a mut Work, &'a mut dyn FnMut(usize, f64)),
+        limit: &'a Limit,
+    ) -> Self {
+        Relaxation {
+            state,
+            accuracy,
+            work,
+            progress,
+            limit,
+            near_rest: false,
+            moved: false,
+            cg_tolerance: FAR_FROM_REST,
+            pushes: 0,
+            solver: Definite::default(),
+            most_evaluations: usize::MAX,
+            convex_only: false,
+        }
+    }
+}

@@ -1,0 +1,438 @@
+//! A single rod under dead moments, at its tip or along it.
+//!
+//! A moment fixed in space has no potential in three dimensions, so that
+//! neither energy nor signs of pivots can guide a relaxation. The rod is loaded
+//! quasi-statically instead: all loads grow together from zero, in steps of
+//! about one radian of tip rotation, each followed by Newton's method with the
+//! exact, unsymmetric tangent.
+//!
+//! Where that would take too many steps, the other loads grow from the shape under the moments
+//! alone. A free rod carries at every place the sum of those beyond it, so that this shape can be
+//! computed segment by segment from the clamp.
+//!
+//! Where the path ends at a fold, the moments are applied before the other loads, or after them. A
+//! rod that is held elsewhere than at its base is brought there under the other loads, by their
+//! energy, before the moments are applied.
+//!
+//! A leaf in steady wind, which has no potential: neither energy nor signs of pivots guide it. It
+//! moves, damped as in a relaxation, until it hardly moves any more; then Newton's method with the
+//! exact, unsymmetric matrix finds the balance of all forces with the drag. Where it rests is thus
+//! stable as that motion is.
+
+use crate::homotopy::Homotopy;
+use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, Loads, State, System, add, shift};
+use crate::motion::{Drag, Physics, SemiImplicit, Steps, TimeIntegrator, Wind};
+use crate::newton::{Equations, Following, Newton, Stop};
+use crate::numbers::{larger, largest};
+use crate::relax::solve_on_grid::Relaxation;
+use crate::rod::{RESOLVED_TURN, Section};
+use crate::rotation;
+use glam::{DMat3, DQuat, DVec3};
+
+/// Rotation of the tip (radians) in one load step.
+const TURN_PER_STEP: f64 = 1.0;
+
+/// Newton iterations of a load step before it is halved.
+const MAX_ITERATIONS: usize = 15;
+
+/// Accuracy of all load steps but the last.
+const STEP_ACCURACY: f64 = 1e-3;
+
+/// Smallest load step, as a part of the load.
+const SMALLEST_STEP: f64 = 1e-6;
+
+/// Bending of a segment (radians) of a rod at rest from which on a failure is attributed to the
+/// grid.
+const COARSE: f64 = 0.5 * RESOLVED_TURN;
+
+/// Rotation (radians) beyond which the moments on a free rod are not applied in steps, and the
+/// largest number of steps of the other loads in that case; and of the moments on a held rod.
+const LARGEST_BY_STEPS: f64 = 250.0;
+
+const MAX_STEPS: usize = 100;
+
+const MAX_STEPS_HELD: usize = 1000;
+
+/// Newton iterations for the rotation of one segment, the step (radians) at which they end,
+/// and the step of their finite differences, radians.
+const SEGMENT_ITERATIONS: usize = 20;
+
+const SEGMENT_ACCURACY: f64 = 1e-13;
+
+const DIFFERENCE: f64 = 1e-7;
+
+/// Squared half rotation below which series replace quotients that tend to 0/0.
+const SMALL: f64 = 1e-5;
+
+/// The parts of the moments and of the other loads that are applied after a part of the loading.
+type Order = fn(f64) -> [f64; 2];
+
+/// Orders of loading: the path may end at a fold in one of them, and pass it in another.
+const ORDERS: [Order; 3] = [
+    |part| [part, part],
+    |part| [2.0 * part, 2.0 * part - 1.0],
+    |part| [2.0 * part - 1.0, 2.0 * part],
+];
+
+/// That of a held rod, which the other loads act on from the beginning.
+const HELD: Order = |part| [part, 1.0];
+
+/// Loads the rod from its rest shape, or corrects a state near rest.
+pub fn settle_with_dead_moments(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+) -> Result<f64, Stop> {
+    if rod.near_rest {
+        return newton(leaf, system, rod, rod.accuracy);
+    }
+    if is_wound(&leaf.leaf) {
+        shape_by_moment(leaf, &mut rod.state)?;
+        return load(leaf, system, rod, |part| [1.0, part], (1.0, MAX_STEPS));
+    }
+    let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
+    let softest = stiffness.fold(f64::INFINITY, f64::min);
+    let turn = leaf.leaf.integral_of_moments() * leaf.leaf.length(0) / softest;
+    let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    if leaf.leaf.is_held() {
+        return load(leaf, system, rod, HELD, (step, MAX_STEPS_HELD));
+    }
+    let unloaded = rod.state.clone();
+    let mut end = Err(Stop::StepLimit);
+    for order in ORDERS {
+        rod.state.clone_from(&unloaded);
+        end = load(leaf, system, rod, order, (step, usize::MAX));
+        if end.is_ok() || end == Err(Stop::Unresolved) || rod.limit.reached() {
+            break;
+        }
+        // In the others the moments are applied in half of the loading.
+        step = 0.5 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    }
+    end
+}
+
+fn newton(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    accuracy: f64,
+) -> Result<f64, Stop> {
+    let newton = Newton {
+        accuracy,
+        iterations: MAX_ITERATIONS,
+        work: rod.work,
+        progress: rod.progress,
+    };
+    newton.solve(leaf, &mut rod.state, system, Equations::Unsymmetric)
+}
+
+/// Applies the loads in a given order and at most so many steps of the given size, which is
+/// halved where Newton's method fails. [`Stop::Unresolved`]: the grid is too coarse.
+fn load(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rod: &mut Relaxation,
+    order: Order,
+    (step, mut steps): (f64, usize),
+) -> Result<f64, Stop> {
+    let loads = leaf.loads;
+    let mut path = Homotopy::new(step, [SMALLEST_STEP, 1.0]);
+    let mut before = rod.state.clone();
+    let end = loop {
+        if steps == 0 || rod.limit.reached() {
+            break Err(Stop::StepLimit);
+        }
+        steps -= 1;
+        let part = path.next();
+        let [moments, others] = order(part).map(|part| part.clamp(0.0, 1.0));
+        leaf.loads = Loads {
+            tip_moment: moments * loads.tip_moment,
+            moments: moments * loads.moments,
+            ..loads * others
+        };
+        let wanted = match part < 1.0 {
+            true => STEP_ACCURACY,
+            false => rod.accuracy,
+        };
+        match newton(leaf, system, rod, wanted) {
+            Ok(remaining) if part == 1.0 => break Ok(remaining),
+            Ok(_) => {
+                path.advance(path.length());
+                before.clone_from(&rod.state);
+            }
+            Err(stop) => {
+                rod.state.clone_from(&before);
+                let mut coarse = || leaf.assemble(&before, system).turn > COARSE;
+                if !path.shorten(0.5) || stop == Stop::Unresolved && coarse() {
+                    break Err(match coarse() {
+                        true => Stop::Unresolved,
+                        false => Stop::Stuck,
+                    });
+                }
+            }
+        }
+    };
+    leaf.loads = loads;
+    end
+}
+
+/// Whether moments turn the tip of a free rod so far (at most, as if only the softest stiffness
+/// resisted them) that they are not applied in steps.
+fn is_wound(leaf: &Leaf) -> bool {
+    let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
+    let turn = leaf.integral_of_moments() * leaf.length(0) / softest;
+    turn > LARGEST_BY_STEPS && !leaf.is_held()
+}
+
+/// The largest curvature (radians per length) of the rod under large moments alone; `None` if
+/// these are small, or too large for a grid of `segments` segments.
+pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
+    if !is_wound(leaf) {
+        return None;
+    }
+    let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
+    let (_, mut base) = leaf.leaf.base(0);
+    let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
+    for (i, section) in leaf.sections.iter().enumerate() {
+        turn = segment_turn(section, base, leaf.moment_beyond(i), turn)?;
+        largest = larger(largest, turn.length() / section.ds);
+        base = (base * rotation::exp(turn)).normalize();
+    }
+    Some(largest)
+}
+
+/// Sets the state to the shape under the moments alone.
+fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
+    let mut turn = DVec3::ZERO;
+    for (i, section) in leaf.sections.iter().enumerate() {
+        let base = state.q[i];
+        turn = segment_turn(section, base, leaf.moment_beyond(i), turn).ok_or(Stop::Unresolved)?;
+        let next = (base * rotation::exp(turn)).normalize();
+        state.q[i + 1] = next;
+        state.x[i + 1] =
+            state.x[i] + section.ds * (rotation::midpoint(base, next) * section.rest_strain);
+        state.n[i] = DVec3::ZERO;
+    }
+    Ok(())
+}
+
+/// S a, S being the derivative of the rotation vector psi half-way:
+/// s a + sigma y (y . a), with y = psi/2, s = |y|/sin |y|, sigma = (1 - s)/|y|^2.
+fn pulled_back(psi: DVec3, a: DVec3) -> DVec3 {
+    let y = 0.5 * psi;
+    let squared = y.length_squared();
+    let (s, sigma) = match squared < SMALL {
+        true => (1.0 + squared / 6.0, -1.0 / 6.0 - 7.0 / 360.0 * squared),
+        false => {
+            let s = squared.sqrt() / squared.sqrt().sin();
+            (s, (1.0 - s) / squared)
+        }
+    };
+    s * a + sigma * y.dot(a) * y
+}
+
+/// The rotation vector of a segment that carries the moment and no force, from
+/// its neighbour's: S A (psi/ds - u0) = exp(-psi/2) R^T M in the frame half-way.
+fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> Option<DVec3> {
+    let moment = base.conjugate() * moment;
+    let unbalanced = |psi: DVec3| {
+        let couple = section.couple_stiffness * (psi / section.ds - section.rest_curvature);
+        pulled_back(psi, couple) - rotation::exp(-0.5 * psi) * moment
+    };
+    let mut psi = near;
+    for _ in 0..SEGMENT_ITERATIONS {
+        let value = unbalanced(psi);
+        let column = |axis: DVec3| (unbalanced(psi + DIFFERENCE * axis) - value) / DIFFERENCE;
+        let rate = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        let step = rate.inverse() * value;
+        psi -= step;
+        if psi.is_nan() || psi.length() > RESOLVED_TURN {
+            return None;
+        }
+        if step.length() <= SEGMENT_ACCURACY {
+            return Some(psi);
+        }
+    }
+    // The remaining error is corrected by Newton's method for the whole rod.
+    Some(psi)
+}
+
+/// Local error of the steps of the motion (lengths, radians).
+const MOTION_ERROR: f64 = 1e-3;
+
+/// Time between looks at the moving leaf, and the longest motion, in units of sqrt(rho L^4/A).
+const LOOK: f64 = 0.5;
+
+const LONGEST_MOTION: f64 = 400.0;
+
+/// Largest velocity (lengths or radians per unit of time) with which the leaf hardly moves, and the
+/// factor on it where Newton's method led elsewhere.
+const SLOW: f64 = 3e-2;
+
+const SLOWER: f64 = 0.1;
+
+/// Farther from the moving leaf (lengths, radians) than this many times the way in a unit of time
+/// is elsewhere.
+const NEAR: f64 = 10.0;
+
+/// Two balances no farther apart (lengths, radians) are one: a leaf that has come closer to it in
+/// between, however slowly, comes to rest there.
+const SAME: f64 = 1e-8;
+
+/// Newton iterations, their longest increment (radians, lengths), and their accuracy: forces are
+/// balanced to rounding, as nothing else shows that the leaf rests.
+const ITERATIONS: usize = 20;
+
+const LONGEST: f64 = 1.0;
+
+const ACCURACY: f64 = 1e-13;
+
+/// Brings the leaf to rest. The drag then acts on its nodes as dead forces, in which all sums over
+/// the leaf are balanced.
+pub fn settle_in_wind(
+    leaf: &mut DiscreteLeaf,
+    system: &mut System,
+    rest: &mut Relaxation,
+) -> Result<f64, Stop> {
+    let physics = Physics::at_rest(&leaf.leaf);
+    let air = Air::new(leaf, &physics).ok_or(Stop::Stuck)?;
+    let remaining = match rest.near_rest {
+        true => balance(leaf, system, &air, rest)?,
+        false => move_to_rest(leaf, system, (physics, &air), rest)?,
+    };
+    let mut forces = vec![DVec3::ZERO; rest.state.x.len()];
+    let still = |_| DVec3::ZERO;
+    (air.wind).set_forces(&rest.state, air.velocity, still, &mut forces);
+    leaf.load_nodes(&forces);
+    Ok(remaining)
+}
+
+/// Damped motion until Newton's method leads to rest nearby.
+fn move_to_rest(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    (physics, air): (Physics, &Air),
+    rest: &mut Relaxation,
+) -> Result<f64, Stop> {
+    let steps = Steps::Error(MOTION_ERROR);
+    let mut motion = SemiImplicit::new(leaf.clone(), physics, &rest.state, steps);
+    let (mut slow, mut until) = (SLOW, LOOK);
+    let mut end = Err(Stop::StepLimit);
+    // Where forces are balanced, as found before, and how far from there the leaf was.
+    let mut before: Option<(State, f64)> = None;
+    while until < LONGEST_MOTION && !rest.limit.reached() {
+        if motion.step_towards(until).is_err() {
+            end = Err(Stop::Stuck);
+            break;
+        }
+        if motion.time() < until {
+            continue;
+        }
+        until += LOOK;
+        let now = motion.snapshot();
+        let speeds = (now.velocity.iter()).flat_map(|v| [v.linear.length(), v.angular.length()]);
+        let speed = largest(speeds);
+        (rest.progress)(motion.steps(), speed);
+        rest.state = now.state;
+        if speed < slow {
+            let moving = rest.state.clone();
+            let balanced = balance(leaf, system, air, rest);
+            if balanced.is_ok() {
+                let away = moving.distance(&rest.state);
+                let comes_closer = |(other, then): &(State, f64)| {
+                    away < *then && other.distance(&rest.state) < SAME
+                };
+                if away < NEAR * slow || before.as_ref().is_some_and(comes_closer) {
+                    end = balanced;
+                    break;
+                }
+                before = Some((rest.state.clone(), away));
+            }
+            rest.state = moving;
+            slow *= SLOWER;
+        }
+    }
+    rest.work.steps += motion.steps();
+    rest.work.force_evaluations += motion.factorizations;
+    rest.work.factorizations += motion.factorizations;
+    end
+}
+
+/// Newton's method for the balance of forces.
+fn balance(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    air: &Air,
+    rest: &mut Relaxation,
+) -> Result<f64, Stop> {
+    let newton = Newton {
+        accuracy: ACCURACY,
+        iterations: ITERATIONS,
+        work: rest.work,
+        progress: rest.progress,
+    };
+    let equations = Equations::Following {
+        forces: air,
+        largest: LONGEST,
+    };
+    newton.solve(leaf, &mut rest.state, system, equations)
+}
+
+/// Steady wind on a leaf without velocity.
+struct Air {
+    wind: Wind,
+    velocity: DVec3,
+    /// Whether each node may be displaced, rod after rod.
+    free: Vec<bool>,
+    segments: usize,
+    /// The first node of a rod with equations.
+    first: usize,
+}
+
+impl Air {
+    fn new(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
+        let segments = leaf.segments();
+        let free = |(j, i)| leaf.moves(j, i)[1];
+        Some(Air {
+            wind: Wind::new(leaf, physics)?,
+            velocity: physics.air(0.0),
+            free: leaf.each(0..segments + 1).map(free).collect(),
+            segments,
+            first: leaf.first_node(),
+        })
+    }
+
+    /// Rod and number of every segment, and the drag on it.
+    fn drags<'a>(&'a self, state: &'a State) -> impl Iterator<Item = ((usize, usize), Drag)> + 'a {
+        self.wind.drags(state, self.velocity, |_| DVec3::ZERO)
+    }
+
+    /// The free ones among the ends of a segment.
+    fn ends(&self, j: usize, i: usize) -> impl Iterator<Item = usize> + '_ {
+        let base = j * (self.segments + 1);
+        [i, i + 1].into_iter().filter(move |i| self.free[base + i])
+    }
+}
+
+impl Following for Air {
+    fn add_forces(&self, state: &State, system: &mut System) {
+        for ((j, i), drag) in self.drags(state) {
+            for node in self.ends(j, i) {
+                system.add_load(j, node, [DVec3::ZERO, 0.5 * drag.force()]);
+            }
+        }
+    }
+
+    fn add_change(&self, state: &State, increments: &Field, forces: &mut Field) {
+        for ((j, i), drag) in self.drags(state) {
+            let moved = |i: usize| match i.checked_sub(self.first) {
+                Some(i) => shift(&increments[j][i]),
+                None => DVec3::ZERO,
+            };
+            let half = 0.5 * (drag.by_chord() * (moved(i + 1) - moved(i)));
+            for node in self.ends(j, i) {
+                add(&mut forces[j][node - self.first], DVec3::ZERO, half);
+            }
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! The semi-implicit method: linearly implicit damped motion, its time step
+//! growing as the leaf settles until it is Newton's method.
+//!
+//! With mass M (unit density, rotary inertia of a strip of blade), damping
+//! c M and K, g the Hessian and gradient of the energy, a step is
+//!
+//! ((1/dt + c)/dt M + K) Delta = -g + M v/dt,   v <- Delta/dt,
+//!
+//! the linearly implicit Euler method. Time is in units of sqrt(rho L^4/A). As long as K is
+//! positive definite the leaf is in the valley (basin of attraction) of its equilibrium, and
+//! the step may be as long as the energy allows; where it is not, the motion decides which
+//! equilibrium is reached, and the step is kept short enough to resolve it.
+//!
+//! The damped motion of the semi-implicit method: its velocities, and the choice of the next
+//! time step by the energy.
+
+use crate::leaf::{DiscreteLeaf, Field, Increment, Leaf, State, Sums, System};
+use crate::newton::{
+    Equations, ForceProgress, Newton, Stalled, Stop, Unsolved, Work, at_saddle, cg_tolerance,
+    converged, satisfies_lengths,
+};
+use crate::relax::solve_on_grid::Relaxation;
+use crate::rod::RESOLVED_TURN;
+
+/// Largest rotation of a node in one step, radians.
+const MAX_TURN: f64 = 1.0;
+
+/// Largest displacement of a node in one step, in units of length.
+const MAX_SHIFT: f64 = 1.0;
+
+/// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
+/// without a test of the energy, whose change is below rounding.
+const SMALL: f64 = 1e-3;
+
+/// Largest number of steps on one grid.
+const MAX_STEPS: usize = 2000;
+
+/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
+/// one is first settled with this compliance, which also gives its segment forces, and then
+/// with its own.
+const MOVING_COMPLIANCE: f64 = 2e-3;
+
+/// Approximate largest stretch of a softened leaf by its load.
+const MOVING_STRETCH: f64 = 0.05;
+
+/// Accuracy to which a softened leaf is settled.
+const SOFT_ACCURACY: f64 = 1e-1;
+
+/// Factor on the compliance of a softened leaf if Newton's method does not converge from it
+/// with the leaf's own stiffness, and its lower limit.
+const STIFFER: f64 = 0.1;
+
+const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
+
+/// Newton iterations of a stiff leaf before it is stiffened in steps.
+const STIFF_ITERATIONS: usize = 12;
+
+/// The least compliance of a leaf that moves after so many pushes off saddles.
+fn moving_compliance(leaf: &Leaf, pushes: i32) -> f64 {
+    let load = leaf.loads.tip_force.length() + leaf.loads.gravity.length();
+    (MOVING_COMPLIANCE * 0.1_f64.powi(pushes)).min(MOVING_STRETCH / load)
+}
+
+/// Whether a leaf is so stiff that it is softened while it moves.
+pub fn softens(leaf: &Leaf) -> bool {
+    let compliance = (0..leaf.rods()).map(|j| leaf.section(j, 0.5, 1.0).compliance.min_element());
+    compliance.fold(f64::INFINITY, f64::min) < moving_compliance(leaf, 0)
+}
+
+impl Relaxation<'_> {
+    /// Lets the leaf come to rest.
+    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
+        let stiffest = leaf.least_compliance();
+        let moving_compliance = moving_compliance(&leaf.leaf, self.pushes);
+        if stiffest >= moving_compliance {
+            return self.move_to_rest(leaf, system, self.accuracy);
+        }
+        let mut compliance = moving_compliance;
+        let mut soften = !self.near_rest;
+        loop {
+            if soften {
+                let soft = leaf.softened(compliance);
+                if self.pushes > 0 {
+                    // The segment forces at the saddle belong to a stiffer leaf.
+                    soft.strain_forces(&mut self.state);
+                }
+                self.move_to_rest(&soft, system, SOFT_ACCURACY)?;
+            }
+            let before = self.state.clone();
+            match self.newton(leaf, system, self.accuracy) {
+                Err(Stop::Stuck) if !(self.near_rest && self.convex_only) => self.state = before,
+                settled => return settled,
+            }
+            if soften {
+                // The leaf's own stiffness is too far from this one: stiffen the leaf in steps.
+                compliance *= STIFFER;
+                if compliance <= stiffest {
+                    return self.move_to_rest(leaf, system, self.accuracy);
+                }
+                if compliance < SMALLEST_MOVING_COMPLIANCE {
+                    return Err(Stop::Stuck);
+                }
+            }
+            soften = true;
+        }
+    }
+
+    /// Newton's method in the mixed form, for a leaf that is nearly at rest.
+    fn newton(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+        accuracy: f64,
+    ) -> Result<f64, Stop> {
+        let newton = Newton {
+            accuracy,
+            iterations: STIFF_ITERATIONS,
+            work: self.work,
+            progress: self.progress,
+        };
+        let equations = Equations::Definite {
+            solver: &mut self.solver,
+            largest: MAX_TURN.min(MAX_SHIFT),
+            shifted: true,
+            cg_tolerance: self.cg_tolerance,
+        };
+        newton.solve(leaf, &mut self.state, system, equations)
+    }
+
+    /// Damped motion until rest.
+    fn move_to_rest(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+        accuracy: f64,
+    ) -> Result<f64, Stop> {
+        let mut trial = self.state.clone();
+        let mut motion = Motion::new(leaf);
+        let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
+        let mut stalled = Stalled::default();
+        let mut forces = ForceProgress::new(leaf);
+        let mut sums = assembled(leaf, &self.state, system, self.work);
+        for step in 0..MAX_STEPS {
+            if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
+                break;
+            }
+            let tolerance = cg_tolerance(previous, self.cg_tolerance);
+            self.solve_shortening(leaf, system, &mut motion, tolerance)?;
+            let (mut size, mut part) = step_size(system, &motion);
+            leaf.advance(&self.state, system, part, &mut trial);
+            if forces.law_lags(leaf, &self.state, &trial) {
+                let solver = &mut self.solver;
+                let again =
+                    &mut |system: &mut System, forces: &Field| solver.solve_again(system, forces);
+                system.complete_law(leaf, &self.state, again);
+                (size, part) = step_size(system, &motion);
+                leaf.advance(&self.state, system, part, &mut trial);
+            }
+            forces.observe(size, &self.state, &trial);
+            let mut rest = None;
+            if motion.is_newton() && part == 1.0 {
+                let contraction = &mut self.solver.contraction;
+                contraction.update(size, motion.newton);
+                motion.newton = size;
+                let first = contraction.error_after_first(size, trial.force_change(&self.state));
+                let tolerances = [previous_tolerance, tolerance];
+                let rounding = stalled.rounding(leaf, &self.state, size);
+                rest = converged(size, previous, tolerances, (accuracy, rounding), first);
+            } else {
+                motion.newton = f64::INFINITY;
+            }
+            if let Some(remaining) = rest
+                && size < SMALL
+                && forces.at_rest(accuracy)
+                && satisfies_lengths(leaf, &trial, accuracy)
+            {
+                if sums.turn > RESOLVED_TURN {
+                    return Err(Stop::Unresolved);
+                }
+                std::mem::swap(&mut self.state, &mut trial);
+                self.work.steps += 1;
+                (self.progress)(step, size);
+                return Ok(remaining);
+            }
+            let next = assembled(leaf, &trial, system, self.work);
+            (self.progress)(step, size);
+            if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
+                if !motion.shorten() {
+                    return Err(Stop::Stuck);
+                }
+                sums = assembled(leaf, &self.state, system, self.work);
+                continue;
+            }
+            if next.turn > RESOLVED_TURN {
+                return Err(Stop::Unresolved);
+            }
+            std::mem::swap(&mut self.state, &mut trial);
+            sums = next;
+            self.work.steps += 1;
+            if let Some(remaining) = rest
+                && forces.at_rest(accuracy)
+                && satisfies_lengths(leaf, &self.state, accuracy)
+            {
+                return Ok(remaining);
+            }
+            match motion.is_newton() {
+                true => motion.accept_newton(),
+                false => {
+                    motion.accept(at_saddle(leaf, &self.state, size), part);
+                }
+            }
+            previous = size;
+            if system.coupled() {
+                previous_tolerance = tolerance;
+            }
+        }
+        Err(Stop::StepLimit)
+    }
+
+    /// Factorises and solves for the next step, with as long a time step as makes the matrix
+    /// positive definite. A small shift keeps modes that are neutral up to rounding from
+    /// moving.
+    fn solve_shortening(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+        motion: &mut Motion,
+        tolerance: f64,
+    ) -> Result<(), Stop> {
+        if motion.inertia().is_none() {
+            leaf.hold_turn(&self.state, system);
+        }
+        loop {
+            let (shift, inertia) = match motion.inertia() {
+                Some([shift, per_step]) => (shift, Some((motion.velocity.as_slice(), per_step))),
+                None => (leaf.neutral_shift(), None),
+            };
+            let (solver, work) = (&mut self.solver, &mut *self.work);
+            match solver.solve(system, shift, inertia, tolerance, work) {
+                Ok(()) => return Ok(()),
+                Err(Unsolved::Memory) => return Err(Stop::Memory),
+                Err(Unsolved::Indefinite) => {}
+            }
+            if motion.resting {
+                return Err(Stop::Saddle);
+            }
+            self.moved = true;
+            if self.convex_only || !motion.shorten_in_time() {
+                return Err(Stop::Stuck);
+            }
+        }
+    }
+}
+
+/// The size of the next step, and the part of it that is taken.
+fn step_size(system: &System, motion: &Motion) -> (f64, f64) {
+    let (turn, shift) = system.largest();
+    let part = (MAX_TURN / turn).min(MAX_SHIFT / shift);
+    (turn.max(shift), part.min(motion.longest_part()))
+}
+
+/// Assembles the equations in a state.
+fn assembled(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> Sums {
+    work.force_evaluations += 1;
+    leaf.assemble(state, system)
+}
+
+/// Damping c: critical for the lowest bending mode of a single rod, whose
+/// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
+const DAMPING: f64 = 2.0 * 3.516;
+
+/// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
+const FIRST_STEP: f64 = 0.06;
+
+/// Shortest time step; a leaf that needs a shorter one is not settling.
+const SHORTEST_STEP: f64 = 1e-7;
+
+/// Beyond this time step inertia is negligible: the step becomes Newton's.
+const LONGEST_STEP: f64 = 1e3;
+
+/// Largest growth factor of the time step.
+const MAX_GROWTH: f64 = 4.0;
+
+/// Smallest part of a Newton step near rest that is tried if the whole step raises the energy.
+const SMALLEST_PART: f64 = 1e-3;
+
+/// Relative growth of the energy that is attributed to rounding.
+const ENERGY_SLACK: f64 = 1e-9;
+
+/// Velocities, and the time step; an infinite time step is Newton's method.
+pub(in crate::relax) struct Motion {
+    dt: f64,
+    /// Growth factor of the time step after an accepted step.
+    growth: f64,
+    pub(in crate::relax) velocity: Vec<Vec<Increment>>,
+    next_velocity: Vec<Vec<Increment>>,
+    /// Size of the last step if it was one of Newton's method.
+    pub(in crate::relax) newton: f64,
+    /// The part of Newton's step that the energy allows near rest: close to a bifurcation the
+    /// whole step may leave a curved valley.
+    newton_part: f64,
+    /// Whether it was at a possible saddle, or at rest, before the next step of Newton's method.
+    pub(in crate::relax) resting: bool,
+}
+
+impl Motion {
+    /// At rest, with the longest step.
+    pub(in crate::relax) fn new(leaf: &DiscreteLeaf) -> Self {
+        let velocity = vec![vec![[0.0; 6]; leaf.moving_nodes().len()]; leaf.rods()];
+        Motion {
+            dt: f64::INFINITY,
+            growth: MAX_GROWTH,
+            next_velocity: velocity.clone(),
+            velocity,
+            newton: f64::INFINITY,
+            newton_part: 1.0,
+            resting: false,
+        }
+    }
+
+    pub(in crate::relax) fn is_newton(&self) -> bool {
+        self.dt.is_infinite()
+    }
+
+    /// Factors (1/dt + c)/dt on the mass in the matrix of the next step, and 1/dt on the momenta;
+    /// `None` if it is Newton's.
+    pub(in crate::relax) fn inertia(&self) -> Option<[f64; 2]> {
+        let dt = self.dt;
+        (!self.is_newton()).then_some([(1.0 / dt + DAMPING) / dt, 1.0 / dt])
+    }
+
+    /// The longest part of the next step that may be taken.
+    pub(in crate::relax) fn longest_part(&self) -> f64 {
+        if self.is_newton() {
+            self.newton_part
+        } else {
+            1.0
+        }
+    }
+
+    /// Shortens a step that raises the energy: near rest a part of Newton's step is taken,
+    /// otherwise a shorter time step. False if there is none.
+    pub(in crate::relax) fn shorten(&mut self) -> bool {
+        let near_rest = self.is_newton() && (self.resting || self.newton_part < 1.0);
+        if near_rest && self.newton_part > SMALLEST_PART {
+            self.newton_part /= 2.0;
+            return true;
+        }
+        self.shorten_in_time()
+    }
+
+    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
+    pub(in crate::relax) fn shorten_in_time(&mut self) -> bool {
+        self.dt = match self.dt.is_finite() {
+            true => self.dt / 4.0,
+            false => FIRST_STEP,
+        };
+        self.growth = 1.0;
+        self.dt >= SHORTEST_STEP
+    }
+
+    /// Whether the total energy does not grow in a step, of which the fraction `part` is
+    /// taken, with these potential energies before and after it.
+    pub(in crate::relax) fn energy_does_not_grow(
+        &mut self,
+        system: &System,
+        part: f64,
+        potential: [f64; 2],
+    ) -> bool {
+        let [mut energy, mut next_energy] = potential;
+        if !self.is_newton() {
+            energy += system.kinetic_energy(&self.velocity);
+            system.velocity(part, self.dt, &mut self.next_velocity);
+            next_energy += system.kinetic_energy(&self.next_velocity);
+        }
+        let slack = ENERGY_SLACK * (1.0 + energy.abs());
+        next_energy.is_finite() && next_energy <= energy + slack
+    }
+
+    /// Updates velocity and time step after an accepted step. At a possible saddle the next
+    /// step is Newton's, without inertia or damping: it leaves the saddle, or shows that the
+    /// leaf is at rest.
+    pub(in crate::relax) fn accept(&mut self, at_saddle: bool, part: f64) {
+        std::mem::swap(&mut self.velocity, &mut self.next_velocity);
+        self.resting |= at_saddle;
+        if at_saddle {
+            self.dt = f64::INFINITY;
+        } else if part == 1.0 {
+            // The factor doubles up to the largest.
+            self.dt *= self.growth;
+            self.growth = (2.0 * self.growth).min(MAX_GROWTH);
+            if self.dt > LONGEST_STEP {
+                self.dt = f64::INFINITY;
+            }
+        }
+    }
+
+    /// After an accepted step of Newton's method.
+    pub(in crate::relax) fn accept_newton(&mut self) {
+        self.resting = false;
+        self.newton_part = (2.0 * self.newton_part).min(1.0);
+    }
+}

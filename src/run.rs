@@ -1,0 +1,234 @@
+//! The clock that measures the time of runs, and ends those that have a deadline.
+//!
+//! On `wasm32-unknown-unknown`, which has none, it is the one that the host has set by `set`; without it,
+//! no time passes.
+//!
+//! Limits of the time of a run, and its cancellation.
+//!
+//! Refused options, and what methods do not model, as data: what reads them writes them as its
+//! users do.
+//!
+//! Words for the variants of an enum, such as a method or an outcome.
+
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+pub use crate::run::host::{Instant, set};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+pub use std::time::Instant;
+
+/// When a run gives up, at rest or not: at a deadline, or when it is cancelled. It is
+/// checked in every step, so that a run may end slightly later.
+#[derive(Clone, Debug, Default)]
+pub struct Limit {
+    /// The run ends at this time.
+    pub deadline: Option<Instant>,
+    /// The run ends as soon as this is `true`.
+    pub cancel: Option<Arc<AtomicBool>>,
+}
+
+impl Limit {
+    /// A limit at a time.
+    pub fn at(deadline: Instant) -> Self {
+        Limit {
+            deadline: Some(deadline),
+            cancel: None,
+        }
+    }
+
+    /// Whether the run is unlimited.
+    pub(crate) fn is_none(&self) -> bool {
+        self.deadline.is_none() && self.cancel.is_none()
+    }
+
+    /// Whether the run has to give up.
+    pub(crate) fn reached(&self) -> bool {
+        let cancelled = |cancel: &Arc<AtomicBool>| cancel.load(Ordering::Relaxed);
+        self.deadline.is_some_and(|time| Instant::now() >= time)
+            || self.cancel.as_ref().is_some_and(cancelled)
+    }
+}
+
+/// An option that cannot have the value it was given: `--step 0` of a program, `step=0` of a
+/// function.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{option} = {value}: {reason}")]
+pub struct RefusedOption {
+    /// Its name, words with `_` between them.
+    pub option: &'static str,
+    /// The value.
+    pub value: String,
+    /// What it must be, or what to change.
+    pub reason: String,
+}
+
+impl RefusedOption {
+    /// An option with this value, for this reason.
+    pub fn new(option: &'static str, value: impl ToString, reason: impl Into<String>) -> Self {
+        RefusedOption {
+            option,
+            value: value.to_string(),
+            reason: reason.into(),
+        }
+    }
+}
+
+/// What a scenario has and a method or a question does not take into account: an answer to it would
+/// be that of another scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unmodelled {
+    /// Grips along veins.
+    #[error(
+        "[[grip]]: {what} does not take grips along veins into account, as relaxation and following do; leave them out, or hold the tip by [tip]"
+    )]
+    Grips {
+        /// The method or the question.
+        what: &'static str,
+    },
+    /// Wind.
+    #[error(
+        "[wind]: {what} does not take wind into account: simulate does, and relax --path release in a steady one; leave it out"
+    )]
+    Wind {
+        /// The method or the question.
+        what: &'static str,
+    },
+    /// A leaf to which no continuation leads from the arcs that shooting starts from.
+    #[error("{why}; use shooting-from-rest")]
+    FromArcs {
+        /// What the leaf has, and what leads it to rest instead.
+        why: &'static str,
+    },
+}
+
+/// A word that is not among those allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{found}: must be one of {}", allowed.join(", "))]
+pub struct UnknownWord {
+    /// The word.
+    pub found: String,
+    /// The allowed words.
+    pub allowed: Vec<&'static str>,
+}
+
+/// Declares an enum by the words for its variants, with `ALL` and `word()`, on which everything
+/// else is based.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! words {
+    ($(
+        $(#[$about:meta])*
+        pub enum $type:ident {
+            $($(#[$of:meta])* $variant:ident = $word:literal,)*
+        }
+    )*) => {$(
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $type {
+            $($(#[$of])* $variant,)*
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: [$type; [$($word),*].len()] = [$($type::$variant),*];
+
+            /// The word for it on the command line and in files.
+            pub fn word(self) -> &'static str {
+                match self {
+                    $($type::$variant => $word),*
+                }
+            }
+        }
+
+        $crate::read_and_write!($type);
+    )*};
+}
+
+/// Implements writing and parsing by word for types with `ALL` and `word()`.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! read_and_write {
+    ($type:ty) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(self.word())
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = $crate::study::UnknownWord;
+
+            fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
+                let found = Self::ALL.into_iter().find(|it| it.word() == text);
+                found.ok_or_else(|| $crate::study::UnknownWord {
+                    found: text.into(),
+                    allowed: Self::ALL.map(|it| it.word()).to_vec(),
+                })
+            }
+        }
+
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(
+                &self,
+                serializer: S,
+            ) -> std::result::Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.word())
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(
+                deserializer: D,
+            ) -> std::result::Result<Self, D::Error> {
+                let word = <String as serde::Deserialize>::deserialize(deserializer)?;
+                word.parse().map_err(serde::de::Error::custom)
+            }
+        }
+    };
+}
+
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+mod host {
+    use std::ops::{Add, Sub};
+    use std::sync::OnceLock;
+    use std::time::Duration;
+
+    static CLOCK: OnceLock<fn() -> f64> = OnceLock::new();
+
+    /// Sets the clock of this process, once: seconds since any moment.
+    pub fn set(clock: fn() -> f64) {
+        let _ = CLOCK.set(clock);
+    }
+
+    /// A moment of the host's clock, as `std::time::Instant`.
+    #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+    pub struct Instant(f64);
+
+    impl Instant {
+        /// This moment.
+        pub fn now() -> Instant {
+            Instant(CLOCK.get().map_or(0.0, |clock| clock()))
+        }
+
+        /// The time since this moment.
+        pub fn elapsed(&self) -> Duration {
+            Instant::now() - *self
+        }
+    }
+
+    impl Add<Duration> for Instant {
+        type Output = Instant;
+
+        fn add(self, time: Duration) -> Instant {
+            Instant(self.0 + time.as_secs_f64())
+        }
+    }
+
+    impl Sub for Instant {
+        type Output = Duration;
+
+        fn sub(self, earlier: Instant) -> Duration {
+            Duration::try_from_secs_f64(self.0 - earlier.0).unwrap_or_default()
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! Serializes a checked scenario as JSON of the same form as the TOML, which can be read
+//! in place of it.
+
+#[cfg(test)]
+mod tests;
+
+use crate::scenario::format::split;
+use crate::scenario::outline::Outline;
+use crate::scenario::photo::axis_of;
+use crate::scenario::section::{Hollow, Property, Section};
+use crate::scenario::{Grip, Key, PointLoad, Profile, Rod, Scenario, Schedule, Tissue, ascending};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// The sections of a scenario, and what else is theirs.
+struct Sections<'a> {
+    sections: &'a [Arc<Section>],
+    density: bool,
+    rotary_inertia: bool,
+}
+
+/// All entries with their values, including defaults, but not those that `[section]` or `[blade]` gives: a JSON object from which
+/// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
+/// `"inf"`.
+impl Serialize for Scenario {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let sections = self.sections();
+        let entry = |key: Key| match key {
+            // All tables of a name stand where the first of its keys does.
+            Key::PointVein | Key::GripVein => {
+                let (table, _) = key.parts();
+                Some((split(table), self.rows(key)?))
+            }
+            _ if key.is_repeated() => None,
+            _ => Some((key.parts(), self.written(key, sections.as_ref())?)),
+        };
+        let entries: Vec<_> = Key::all().filter_map(entry).collect();
+        let mut top = serializer.serialize_map(None)?;
+        for entries in entries.chunk_by(|(one, _), (other, _)| one.0 == other.0) {
+            match &entries[0] {
+                (("", name), value) => top.serialize_entry(name, value)?,
+                ((table, _), _) => top.serialize_entry(table, &Table(entries))?,
+            }
+        }
+        top.end()
+    }
+}
+
+/// The entries of a table, in the order of the format.
+struct Table<'e>(&'e [((&'static str, &'static str), Value)]);
+
+impl Serialize for Table<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|((_, name), value)| (name, value)))
+    }
+}
+
+impl Scenario {
+    /// All points that are loaded, or all grips, by the first of their keys.
+    fn rows(&self, first: Key) -> Option<Value> {
+        let point = |point: &PointLoad| {
+            json!({
+                "vein": point.vein + 1, "at": point.at, "mass": point.mass,
+                "force": list(point.force), "moment": list(point.moment),
+            })
+        };
+        let grip = |grip: &Grip| {
+            let [from, to] = grip.at;
+            json!({
+                "vein": grip.vein + 1, "held": grip.held, "move": list(grip.displacement),
+                "at": if from == to { json!(from) } else { list(grip.at) },
+            })
+        };
+        let rows: Vec<Value> = match first {
+            Key::PointVein => self.points.iter().map(point).collect(),
+            _ => self.grips.iter().map(grip).collect(),
+        };
+        (!rows.is_empty()).then(|| rows.into())
+    }
+
+    /// The value of a key; `None` if other keys determine it.
+    fn written(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
+        if let Some(blade) = &self.blade {
+            match (key, blade.curvature()) {
+                _ if key.follows_from_blade() => return None,
+                (Key::RestTwist, Some(_)) => return None,
+                (Key::RestBend2, Some((at, value))) => return Some(along(at, value)),
+                _ => {}
+            }
+        }
+        match key.parts().0 {
+            "blade" => return self.of_blade(key),
+            "section" => return sections?.written(key),
+            "stiffness" if sections.is_some() => return None,
+            "tip" => return self.of_tip(key),
+            "photo" => return self.of_photo(key),
+            "tissue" => return self.of_tissue(key),
+            "wind" => return self.of_wind(key),
+            "dynamics" => return self.of_dynamics(key, sections),
+            _ if key == Key::Elevation && self.blade.is_some() => {
+                return Some(number(self.blade.as_ref()?.elevation));
+            }
+            _ => {}
+        }
+        type Triple = fn(&Rod) -> &[Profile; 3];
+        let triples: [([Key; 3], Triple); 3] = [
+            (Key::COUPLE, |rod| &rod.couple_stiffness),
+            (Key::FORCE, |rod| &rod.force_stiffness),
+            (Key::REST, |rod| &rod.rest_curvature),
+        ];
+        for (keys, of) in triples {
+            if let Some(which) = keys.iter().position(|one| *one == key) {
+                return Some(quantity(self.rods.iter().map(|rod| &of(rod)[which])));
+            }
+        }
+        Some(match key {
+            Key::Name => json!(self.name),
+            Key::UnitLength => json!(self.units.length.as_deref()?),
+            Key::UnitForce => json!(self.units.force.as_deref()?),
+            Key::UnitTime => json!(self.units.time.as_deref()?),
+            Key::Rods => json!(self.rods.len()),
+            Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
+            Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
+            Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
+            Key::BaseHeld => json!(self.base_held),
+            Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
+            Key::Joined => json!(self.joined),
+            Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
+            Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
+                // A single rod has no gaps: any number will do.
+                let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
+                number_or_list(self.coupling.iter().map(|gap| gap[axis]))
+            }
+            Key::Gravity => {
+                let veins = 0..self.rods.len();
+                vector_or_list(veins.map(|vein| self.weight(vein).even))
+            }
+            Key::G => list(self.g),
+            Key::Distributed => vector_quantity(self.distributed.as_deref()?),
+            Key::TipForce => list(self.tip_force),
+            Key::TipMoment => list(self.tip_moment),
+            Key::Tolerance => number(self.tolerance),
+            _ => return None,
+        })
+    }
+
+    fn of_tissue(&self, key: Key) -> Option<Value> {
+        let tissue = self.tissue.as_ref()?;
+        if key == Key::TissueGrown {
+            return Some(json!(self.tissue_grown));
+        }
+        let which = Key::TISSUE.iter().position(|one| *one == key)?;
+        let of = |gap: &Tissue| gap.profiles()[which].at(0.0);
+        Some(number_or_list(tissue.iter().map(of)))
+    }
+
+    fn of_blade(&self, key: Key) -> Option<Value> {
+        let blade = self.blade.as_ref()?;
+        let materials = blade.materials.iter();
+        let (at, value) = blade.points();
+        Some(match key {
+            Key::BladeLength => number(blade.length()),
+            Key::BladeWidth => along(at, value),
+            Key::BladeThickness => quantity(materials.map(|of| &of.thickness)),
+            Key::BladeYoung => quantity(materials.map(|of| &of.young)),
+            Key::YoungAcross => optional(materials.map(|of| of.young_across.as_ref()))?,
+            Key::ShearModulus => optional(materials.map(|of| of.shear_modulus.as_ref()))?,
+            Key::BladePoisson => quantity(materials.map(|of| &of.poisson)),
+            Key::BladeMassDensity => optional(materials.map(|of| of.mass_density.as_ref()))?,
+            Key::Edges => json!(blade.edges),
+            _ => number(blade.least_part()),
+        })
+    }
+
+    /// Whether the blade has a mass.
+    fn has_blade_mass(&self) -> bool {
+        self.blade.as_ref().is_some_and(|blade| blade.has_mass())
+    }
+
+    fn of_wind(&self, key: Key) -> Option<Value> {
+        let wind = self.wind.as_ref()?;
+        Some(match key {
+            Key::WindVelocity if wind.velocity.is_constant() => list(wind.velocity.at(0.0)),
+            Key::WindVelocity => schedule_value(&wind.velocity, "value", list),
+            Key::WindDensity => number(wind.density),
+            Key::WindDrag => number(wind.drag),
+            _ => quantity(wind.width.iter()),
+        })
+    }
+
+    /// A ruler is told as the scale that follows from it.
+    fn of_photo(&self, key: Key) -> Option<Value> {
+        let photo = self.photo.as_ref()?;
+        match key {
+            Key::PhotoScale => Some(number(photo.scale)),
+            Key::PhotoX => Some(number(photo.origin[0])),
+            Key::PhotoY => Some(number(photo.origin[1])),
+            Key::PhotoRotation => Some(number(photo.rotation)),
+            Key::PhotoRight => Some(json!(axis_of(photo.right))),
+            Key::PhotoUp => Some(json!(axis_of(photo.up))),
+            _ => None,
+        }
+    }
+
+    fn of_tip(&self, key: Key) -> Option<Value> {
+        let held = self.held_tip.as_ref()?;
+        let clamps = held.clamps.as_deref();
+        Some(match key {
+            Key::TipHeld if clamps.is_some() => json!("clamped"),
+            Key::TipHeld => json!("pinned"),
+            Key::TipPosition => list(held.position),
+            Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
+            _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
+        })
+    }
+
+    fn of_dynamics(&self, key: Key, sections: Option<&Sections>) -> Option<Value> {
+        let dynamics = &self.dynamics;
+        Some(match key {
+            Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
+            Key::Density if sections.is_some_and(|it| it.density) => return None,
+            Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
+            Key::Density => quantity(dynamics.density.iter()),
+            // If given, it would be larger about d1.
+            Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
+            Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
+            Key::ExternalDamping => number(dynamics.external_damping),
+            Key::InternalDamping => number(dynamics.internal_damping),
+            Key::Duration => number(dynamics.duration),
+            Key::OutputInterval => number(dynamics.output_interval),
+            Key::Clamped => json!(dynamics.clamped),
+            Key::Start => json!(dynamics.start),
+            Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
+            Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
+            Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
+            Key::RestInTime => in_time(&dynamics.rest, 1.0, "factor", number)?,
+            _ => return None,
+        })
+    }
+
+    /// The sections, if they give the stiffnesses.
+    fn sections(&self) -> Option<Sections<'_>> {
+        let sections = self.radii.sections();
+        let gives = |(rod, section): (&Rod, &Arc<Section>)| {
+            (0..3).all(|axis| {
+                rod.couple_stiffness[axis] == section.profile(Property::Couple(axis))
+                    && rod.force_stiffness[axis] == section.profile(Property::Force(axis))
+            })
+        };
+        if sections.len() != self.rods.len() || !self.rods.iter().zip(sections).all(gives) {
+            return None;
+        }
+        let give = |profiles: &[Profile], property| {
+            let mut pairs = profiles.iter().zip(sections);
+            pairs.all(|(profile, section)| *profile == section.profile(property))
+        };
+        let density = give(&self.dynamics.density, Property::Density);
+        let inertia = give(&self.dynamics.rotary_inertia, Property::RotaryInertia);
+        Some(Sections {
+            sections,
+            density,
+            rotary_inertia: density && inertia,
+        })
+    }
+}
+
+impl Sections<'_> {
+    fn written(&self, key: Key) -> Option<Value> {
+        let outline = self.sections.first()?.outline;
+        let of = |of: fn(&Section) -> &Profile| {
+            quantity(self.sections.iter().map(|section| of(section)))
+        };
+        Some(match key {
+            Key::SectionShape => json!(outline),
+            Key::Diameter if outline == Outline::Circle => of(|section| &section.width),
+            Key::Width | Key::Thickness if outline == Outline::Circle => return None,
+            Key::Width => of(|section| &section.width),
+            Key::Thickness => of(|section| &section.thickness),
+            Key::InnerDiameter | Key::Wall => {
+                let hollow = |section: &'_ Arc<Section>| section.hollow.clone();
+                let hollow: Vec<Hollow> =
+                    self.sections.iter().map(hollow).collect::<Option<_>>()?;
+                let is_bore = matches!(hollow.first()?, Hollow::Bore(_));
+                if is_bore != (key == Key::InnerDiameter) {
+                    return None;
+                }
+                quantity(hollow.iter().map(Hollow::profile))
+            }
+            Key::Young => of(|section| &section.young),
+            Key::Poisson => of(|section| &section.poisson),
+            Key::MassDensity if self.density => of(|section| &section.mass_density),
+            _ => return None,
+        })
+    }
+}
+
+/// A number; JSON has no infinity: `"inf"`.
+fn number(number: f64) -> Value {
+    match number.is_infinite() {
+        true => json!("inf"),
+        false => json!(number),
+    }
+}
+
+fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
+    numbers.into_iter().map(number).collect()
+}
+
+/// A single number if all are the same.
+fn number_or_list(numbers: impl Iterator<Item = f64>) -> Value {
+    let numbers: Vec<f64> = numbers.collect();
+    let first = numbers.first().copied().unwrap_or(0.0);
+    match numbers.iter().all(|number| *number == first) {
+        true => number(first),
+        false => list(numbers),
+    }
+}
+
+/// A single vector if all are the same.
+fn vector_or_list(vectors: impl Iterator<Item = [f64; 3]>) -> Value {
+    let vectors: Vec<[f64; 3]> = vectors.collect();
+    match vectors.first() {
+        Some(first) if vectors.iter().all(|vector| vector == first) => list(*first),
+        _ => vectors.into_iter().map(list).collect(),
+    }
+}
+
+/// Vectors along all rods, in the shortest form.
+fn vector_quantity(rods: &[[Profile; 3]]) -> Value {
+    let mut profiles = rods.iter().flatten();
+    if profiles.all(|it| matches!(it, Profile::Constant(_))) {
+        let constant = |rod: &[Profile; 3]| rod.each_ref().map(|profile| profile.at(0.0));
+        return vector_or_list(rods.iter().map(constant));
+    }
+    let kinks = rods.iter().flatten().flat_map(Profile::kinks);
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let values = |rod: &[Profile; 3]| -> Value {
+        let knot = |&sigma: &f64| list(rod.each_ref().map(|profile| profile.at(sigma)));
+        at.iter().map(knot).collect()
+    };
+    let value = match rods.iter().all(|rod| *rod == rods[0]) {
+        true => values(&rods[0]),
+        false => rods.iter().map(values).collect(),
+    };
+    json!({ "at": at, "value": value })
+}
+
+/// A quantity of all rods, in the shortest form.
+fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Value {
+    let profiles: Vec<&Profile> = profiles.collect();
+    if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
+        return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
+    }
+    let kinks = profiles.iter().flat_map(|profile| profile.kinks());
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
+    let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
+    let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
+        true => values(profiles[0]),
+        false => profiles.iter().map(|profile| values(profile)).collect(),
+    };
+    json!({ "at": at, "value": value })
+}
+
+/// A quantity along a leaf.
+fn along(at: &[f64], value: &[f64]) -> Value {
+    match value.iter().all(|one| *one == value[0]) {
+        true => number(value[0]),
+        false => json!({ "at": at, "value": value }),
+    }
+}
+
+/// A quantity of all rods; `None` if it is left out.
+fn optional<'p>(profiles: impl Iterator<Item = Option<&'p Profile>>) -> Option<Value> {
+    let profiles: Option<Vec<&Profile>> = profiles.collect();
+    Some(quantity(profiles?.into_iter()))
+}
+
+/// A quantity in time; `None` if it is always the one at rest.
+fn in_time<T: Copy + PartialEq>(
+    schedule: &Schedule<T>,
+    at_rest: T,
+    name: &str,
+    written: impl Fn(T) -> Value,
+) -> Option<Value> {
+    let constant = *schedule == Schedule::constant(at_rest);
+    (!constant).then(|| schedule_value(schedule, name, written))
+}
+
+fn schedule_value<T: Copy>(of: &Schedule<T>, name: &str, written: impl Fn(T) -> Value) -> Value {
+    let values: Value = of.value.iter().map(|&value| written(value)).collect();
+    json!({ "at": of.at, name: values })
+}

@@ -1,0 +1,132 @@
+//! The JSON schema of scenarios, generated from the table of keys.
+
+use crate::scenario::format::{Form, Key, LeftOut, Range, split};
+use serde_json::{Map, Value, json};
+
+/// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
+/// them. Rules between entries are checked only by the program.
+pub fn schema() -> Value {
+    let mut schema = table("");
+    schema["$schema"] = json!("http://json-schema.org/draft-07/schema#");
+    schema["title"] = json!("a leaf, as leafdyn reads it");
+    schema
+}
+
+/// The schema of a table, which has no name at the top, with those in it.
+fn table(name: &str) -> Value {
+    let (mut properties, mut required) = (Map::new(), Vec::new());
+    for key in Key::all().filter(|key| key.parts().0 == name) {
+        let (_, within) = key.parts();
+        properties.insert(within.into(), entry(key));
+        // Alternatives, such as stiffnesses, sections and blades, are not required here.
+        let alone = matches!(name, "" | "leaf") && !key.follows_from_blade() || key.is_repeated();
+        if alone && matches!(key.left_out(), LeftOut::Required(_)) {
+            required.push(within);
+        }
+    }
+    for inner in Key::tables() {
+        let (outer, within) = split(inner);
+        if outer != name {
+            continue;
+        }
+        let one = table(inner);
+        let repeated = Key::REPEATED.contains(&inner);
+        if !repeated && !one["required"].is_null() {
+            required.push(within);
+        }
+        properties.insert(within.into(), if repeated { list(one) } else { one });
+    }
+    let mut object = json!({
+        "type": "object", "properties": properties, "additionalProperties": false,
+    });
+    if !required.is_empty() {
+        object["required"] = json!(required);
+    }
+    object
+}
+
+/// The schema of a key's value, with its description.
+fn entry(key: Key) -> Value {
+    let mut entry = match key.form() {
+        Form::Text => json!({ "type": "string" }),
+        Form::Switch => json!({ "type": "boolean" }),
+        Form::Whole => json!({ "type": "integer", "minimum": 1 }),
+        Form::Number(range) => number(range),
+        Form::PerRod(range) | Form::PerGap(range) => {
+            json!({ "anyOf": [number(range), list(number(range))] })
+        }
+        Form::Quantity(range) => {
+            let values = list(number(range));
+            let profile = knots(
+                "value",
+                json!({ "anyOf": [values, list(list(number(range)))] }),
+            );
+            json!({ "anyOf": [number(range), list(number(range)), profile] })
+        }
+        Form::Outline(range) => {
+            json!({ "anyOf": [number(range), knots("value", list(number(range)))] })
+        }
+        Form::Vector => vector(),
+        Form::VectorPerRod => json!({ "anyOf": [vector(), list(vector())] }),
+        Form::VectorQuantity => {
+            let vectors = list(vector());
+            let profile = knots("value", json!({ "anyOf": [vectors, list(list(vector()))] }));
+            json!({ "anyOf": [vector(), list(vector()), profile] })
+        }
+        Form::Stretch => {
+            let ends =
+                json!({ "type": "array", "items": fraction(), "minItems": 2, "maxItems": 2 });
+            json!({ "anyOf": [fraction(), ends] })
+        }
+        Form::Pixel => {
+            json!({ "type": "array", "items": number(Range::Finite), "minItems": 2, "maxItems": 2 })
+        }
+        Form::Fan => json!({ "anyOf": [
+            { "enum": ["paper", "symmetric"] }, list(number(Range::Finite)),
+        ] }),
+        Form::VectorInTime => knots("value", list(vector())),
+        Form::VectorOrInTime => json!({ "anyOf": [vector(), knots("value", list(vector()))] }),
+        Form::FactorInTime => knots("factor", list(number(Range::Finite))),
+    };
+    entry["description"] = json!(key.description());
+    // Defaults are TOML; those that are also JSON are included.
+    if let LeftOut::Default(text) = key.left_out()
+        && let Ok(value) = serde_json::from_str::<Value>(text)
+    {
+        entry["default"] = value;
+    }
+    entry
+}
+
+/// A number. JSON has no infinity; editors accept TOML's `inf` as a number.
+fn number(range: Range) -> Value {
+    match range {
+        Range::Finite => json!({ "type": "number" }),
+        Range::NotNegative => json!({ "type": "number", "minimum": 0 }),
+        Range::Positive | Range::PositiveOrInfinite => {
+            json!({ "type": "number", "exclusiveMinimum": 0 })
+        }
+    }
+}
+
+fn fraction() -> Value {
+    json!({ "type": "number", "minimum": 0, "maximum": 1 })
+}
+
+fn list(of: Value) -> Value {
+    json!({ "type": "array", "items": of })
+}
+
+fn vector() -> Value {
+    json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
+}
+
+/// Knots or times, and the values there.
+fn knots(name: &str, values: Value) -> Value {
+    json!({
+        "type": "object",
+        "properties": { "at": list(number(Range::Finite)), name: values },
+        "required": ["at", name],
+        "additionalProperties": false,
+    })
+}

@@ -1,0 +1,536 @@
+//! Initial-value problems by the method DOP853 with step control.
+//!
+//! A leaf along sigma: the start or the result of a boundary-value
+//! solution.
+
+use crate::natural::{A, B, C, E3, E5, STAGES};
+use crate::numbers::{larger, largest};
+use crate::shape::{NodeState, RodShape};
+use crate::shooting::equations::{Equations, RodState, SAME_PLACE, STATE};
+use glam::DVec3;
+
+/// Largest number of steps of an initial-value problem.
+const MAX_STEPS: usize = 20_000;
+
+/// Solutions larger than this count as unbounded.
+const MAX_STATE: f64 = 1e9;
+
+/// Longest step at the tolerance 1e-13, in units of the length over which a
+/// perturbation grows or turns. Where the leaf is straight its own error would
+/// allow any step, and the sensitivities, integrated with the same steps, would
+/// be inaccurate. Like all steps it grows with the tolerance, since otherwise solutions at
+/// two tolerances would share their errors, but not beyond the last number.
+const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
+
+/// The solution of an initial-value problem could not be continued beyond
+/// `sigma`: it grows without bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbounded {
+    /// How far it went.
+    pub sigma: f64,
+}
+
+/// Integration of an initial-value problem from one sigma to the next.
+pub struct Integrator<'e, 'a> {
+    equations: &'e Equations<'a>,
+    tolerance: f64,
+    pub sigma: f64,
+    pub y: Vec<f64>,
+    /// Where it passed the last loads on points.
+    passed: f64,
+    /// Proposed size of the next step.
+    step: f64,
+    /// Width of the last step.
+    pub width: f64,
+    /// States at the stages of the last step.
+    pub stages: Vec<Vec<f64>>,
+    slopes: Vec<Vec<f64>>,
+    next: Vec<f64>,
+    steps: usize,
+    pub evaluations: usize,
+}
+
+impl<'e, 'a> Integrator<'e, 'a> {
+    /// Starts at `sigma` with the state `y`; local errors of the dimensionless
+    /// state are kept below `tolerance` per step.
+    pub fn new(equations: &'e Equations<'a>, sigma: f64, y: Vec<f64>, tolerance: f64) -> Self {
+        let blank = || vec![vec![0.0; y.len()]; STAGES];
+        let mut integrator = Integrator {
+            equations,
+            tolerance,
+            sigma,
+            passed: f64::NEG_INFINITY,
+            step: 0.0,
+            width: 0.0,
+            stages: blank(),
+            slopes: blank(),
+            next: y.clone(),
+            y,
+            steps: 0,
+            evaluations: 1,
+        };
+        equations.slopes(sigma, &integrator.y, &mut integrator.slopes[0]);
+        integrator.step = 0.1 * tolerance.powf(0.125) / integrator.slope().max(1e-3);
+        integrator
+    }
+
+    /// Largest slope relative to the magnitude of its unknown.
+    fn slope(&self) -> f64 {
+        norm(self.equations, &self.y, &self.y, |i| self.slopes[0][i])
+    }
+
+    /// Bound on the step due to the growth of perturbations.
+    fn longest_step(&self) -> f64 {
+        let force = |j| RodState::read(&self.y, j).n.length();
+        let rate = (0..self.equations.rods())
+            .map(|j| self.equations.rate(j, force(j)))
+            .fold(1.0, f64::max);
+        let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
+        longest.min(LONGEST_STEP[1]) / rate
+    }
+
+    /// Integrates to `end`; `after_step` is called after each step.
+    pub fn run(&mut self, end: f64, mut after_step: impl FnMut(&Self)) -> Result<(), Unbounded> {
+        while self.sigma < end {
+            self.step(end)?;
+            after_step(self);
+        }
+        Ok(())
+    }
+
+    /// One step towards `until`, never beyond it or a kink.
+    pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
+        let failed = Unbounded { sigma: self.sigma };
+        // States are those just before a load on a point, which the first step beyond it passes; a
+        // second stop within rounding of it does not.
+        let beyond = self.sigma - self.passed > SAME_PLACE;
+        if beyond && self.equations.pass_points(self.sigma, &mut self.y) {
+            self.passed = self.sigma;
+            self.equations
+                .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+        }
+        let until = self.equations.stop(self.sigma, until);
+        loop {
+            self.steps += 1;
+            let left = until - self.sigma;
+            // A remainder too small for a step of its own is added to this one.
+            let step = self.step.min(self.longest_step());
+            let last = step > 0.99 * left;
+            let h = if last { left } else { step };
+            // Two stops may differ by a rounding error: that is not a failure of step control.
+            if self.steps > MAX_STEPS || (!last && h < 1e-13) {
+                return Err(failed);
+            }
+            self.attempt(h);
+            let error = self.error(h);
+            let mut state = self.next[..self.next.len() - 1].iter();
+            if !state.all(|value| value.abs() < MAX_STATE) || !error.is_finite() {
+                self.step = 0.1 * h;
+                continue;
+            }
+            let factor = 0.9 * error.max(1e-16).powf(-0.125);
+            if error > 1.0 {
+                self.step = h * factor.clamp(0.1, 0.9);
+                continue;
+            }
+            let proposed = h * factor.clamp(0.2, 5.0);
+            // A step cut short by `until` does not limit the next.
+            self.step = proposed.max(if last { self.step } else { 0.0 });
+            self.width = h;
+            self.sigma = if last { until } else { self.sigma + h };
+            self.accept();
+            return Ok(());
+        }
+    }
+
+    /// All stages and the result of a step, not yet accepted.
+    fn attempt(&mut self, h: f64) {
+        self.stages[0].copy_from_slice(&self.y);
+        for i in 1..STAGES {
+            let (before, after) = self.slopes.split_at_mut(i);
+            combine(&self.y, h, A[i], before, &mut self.stages[i]);
+            let sigma = self.sigma + C[i] * h;
+            self.equations.slopes(sigma, &self.stages[i], &mut after[0]);
+        }
+        self.evaluations += STAGES - 1;
+        combine(&self.y, h, &B, &self.slopes, &mut self.next);
+    }
+
+    /// Error of the attempted step relative to the tolerance.
+    fn error(&self, h: f64) -> f64 {
+        let weighted = |weights: &[f64; STAGES]| {
+            norm(self.equations, &self.y, &self.next, |i| {
+                let terms = weights.iter().zip(&self.slopes);
+                h * terms.map(|(w, slopes)| w * slopes[i]).sum::<f64>()
+            })
+        };
+        let (fifth, third) = (weighted(&E5), weighted(&E3));
+        if fifth == 0.0 {
+            return 0.0;
+        }
+        fifth * fifth / (fifth * fifth + 0.01 * third * third).sqrt() / self.tolerance
+    }
+
+    /// Accepts the step and normalises the quaternions.
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.y, &mut self.next);
+        for j in 0..self.equations.rods() {
+            RodState::read(&self.y, j).write(&mut self.y, j);
+        }
+        self.equations
+            .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+        self.evaluations += 1;
+    }
+}
+
+/// y + h sum of weights times slopes.
+pub fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut [f64]) {
+    result.copy_from_slice(y);
+    for (weight, slopes) in weights.iter().zip(slopes) {
+        if *weight != 0.0 {
+            for (sum, slope) in result.iter_mut().zip(slopes) {
+                *sum += h * weight * slope;
+            }
+        }
+    }
+}
+
+/// Root mean square of a rod's numbers, the maximum over all rods. Positions and
+/// rotations are not scaled; moments are in units of what bends the softest
+/// direction by one radian, unless they are larger; forces likewise.
+fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+    let mut largest: f64 = 0.0;
+    for j in 0..equations.rods() {
+        let (a, b) = (RodState::read(y, j), RodState::read(next, j));
+        let soft = equations.softest[j];
+        let unit = |a: glam::DVec3, b: glam::DVec3| soft + a.length().max(b.length());
+        let (force, moment) = (unit(a.n, b.n), unit(a.m, b.m));
+        let sum: f64 = (0..STATE)
+            .map(|i| {
+                let scale = match i {
+                    0..7 => 1.0,
+                    7..10 => force,
+                    _ => moment,
+                };
+                (value(STATE * j + i) / scale).powi(2)
+            })
+            .sum();
+        largest = larger(largest, (sum / STATE as f64).sqrt());
+    }
+    largest
+}
+
+/// Ends of the intervals: 0 = sigma_0 < ... < sigma_K = 1, and the
+/// states at the K beginnings.
+#[derive(Clone, Debug)]
+pub struct Nodes {
+    /// K + 1 fractions of the length.
+    pub sigma: Vec<f64>,
+    /// K flat states.
+    pub states: Vec<Vec<f64>>,
+}
+
+/// Flat states at some sigmas, with cubic Hermite interpolation between them.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    sigma: Vec<f64>,
+    states: Vec<Vec<f64>>,
+    slopes: Vec<Vec<f64>>,
+}
+
+impl Trajectory {
+    /// From states of the equations in their present form.
+    pub fn new(equations: &Equations, sigma: Vec<f64>, mut states: Vec<Vec<f64>>) -> Self {
+        for i in 1..states.len() {
+            let (before, after) = states.split_at_mut(i);
+            for j in 0..equations.rods() {
+                let a = RodState::read(&before[i - 1], j);
+                let mut b = RodState::read(&after[0], j);
+                // The sign of a quaternion is chosen by continuity.
+                if a.q.dot(b.q) < 0.0 {
+                    b.q = -b.q;
+                    b.write(&mut after[0], j);
+                }
+            }
+        }
+        let slopes = (sigma.iter().zip(&states))
+            .map(|(&sigma, y)| {
+                let mut slopes = vec![0.0; y.len()];
+                equations.slopes(sigma, y, &mut slopes);
+                slopes
+            })
+            .collect();
+        Trajectory {
+            sigma,
+            states,
+            slopes,
+        }
+    }
+
+    /// From the shape of a leaf in the units of the scenario.
+    pub fn of_leaf(equations: &Equations, stations: &[f64], rods: &[RodShape]) -> Self {
+        let states = (0..stations.len())
+            .map(|i| {
+                let mut y = vec![0.0; equations.size()];
+                for (j, rod) in rods.iter().enumerate() {
+                    let node = &rod.nodes[i];
+                    RodState {
+                        r: node.position / equations.length,
+                        q: node.rotation,
+                        n: node.rotation * node.n / equations.force,
+                        m: node.rotation * node.m / (equations.force * equations.length),
+                    }
+                    .write(&mut y, j);
+                }
+                y
+            })
+            .collect();
+        Trajectory::new(equations, stations.to_vec(), states)
+    }
+
+    /// The leaf without stress: rods in their rest shapes.
+    pub fn unstressed(equations: &Equations, tolerance: f64) -> Result<Self, Unbounded> {
+        let mut integrator = Integrator::new(equations, 0.0, equations.clamped(), tolerance);
+        let (mut sigma, mut states) = (vec![0.0], vec![integrator.y.clone()]);
+        integrator.run(1.0, |integrator| {
+            sigma.push(integrator.sigma);
+            states.push(integrator.y.clone());
+        })?;
+        Ok(Trajectory::new(equations, sigma, states))
+    }
+
+    /// The solution at the stations, integrated from the nodes before them.
+    pub fn sampled(
+        equations: &Equations,
+        nodes: &Nodes,
+        stations: &[f64],
+        tolerance: f64,
+    ) -> Result<Self, Unbounded> {
+        let mut states: Vec<Vec<f64>> = Vec::new();
+        let mut energy = 0.0;
+        let slot = equations.size() - 1;
+        let mut wanted = stations.iter().copied().peekable();
+        for (k, begin) in nodes.states.iter().enumerate() {
+            let (from, to) = (nodes.sigma[k], nodes.sigma[k + 1]);
+            let mut y = begin.clone();
+            y[slot] = energy;
+            let mut integrator = Integrator::new(equations, from, y, tolerance);
+            let last = k + 1 == nodes.states.len();
+            while let Some(station) = wanted.next_if(|s| *s < to || last) {
+                integrator.run(station.clamp(from, to), |_| ())?;
+                states.push(integrator.y.clone());
+            }
+            integrator.run(to, |_| ())?;
+            energy = integrator.y[slot];
+        }
+        Ok(Trajectory::new(equations, stations.to_vec(), states))
+    }
+
+    /// Straight, untwisted rods without stress.
+    pub fn straight(equations: &Equations) -> Self {
+        let at = |sigma: f64| {
+            let mut y = vec![0.0; equations.size()];
+            for j in 0..equations.rods() {
+                let mut rod = equations.base(j, DVec3::ZERO, DVec3::ZERO);
+                rod.r = rod.q * DVec3::X * equations.grown(j, sigma);
+                rod.write(&mut y, j);
+            }
+            y
+        };
+        Trajectory::new(equations, vec![0.0, 1.0], vec![at(0.0), at(1.0)])
+    }
+
+    /// The state at the tip.
+    pub fn tip(&self) -> &[f64] {
+        &self.states[self.states.len() - 1]
+    }
+
+    /// The last of its stations that is not beyond `sigma`.
+    pub fn last_station(&self, sigma: f64) -> Option<f64> {
+        self.sigma.iter().copied().rfind(|s| *s <= sigma)
+    }
+
+    pub fn at(&self, sigma: f64) -> Vec<f64> {
+        let last = self.sigma.len() - 1;
+        let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);
+        let h = self.sigma[i] - self.sigma[i - 1];
+        let t = (sigma - self.sigma[i - 1]) / h;
+        let (a, b) = (&self.states[i - 1], &self.states[i]);
+        let (da, db) = (&self.slopes[i - 1], &self.slopes[i]);
+        let rise = t * t * (3.0 - 2.0 * t);
+        let (left, right) = (h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0));
+        (0..a.len())
+            .map(|k| a[k] + rise * (b[k] - a[k]) + left * da[k] + right * db[k])
+            .collect()
+    }
+
+    /// Extrapolates this trajectory by `step` times its difference from an earlier one.
+    pub fn beyond(&self, equations: &Equations, earlier: &Trajectory, step: f64) -> Self {
+        let states = (self.sigma.iter().zip(&self.states))
+            .map(|(&sigma, now)| {
+                let pairs = now.iter().zip(earlier.at(sigma));
+                let moved = pairs.map(|(now, before)| now + step * (now - before));
+                moved.collect()
+            })
+            .collect();
+        Trajectory::new(equations, self.sigma.clone(), states)
+    }
+
+    /// Largest force and moment of rod `j`.
+    pub fn largest(&self, j: usize) -> (f64, f64) {
+        self.states.iter().fold((0.0, 0.0), |(n, m), y| {
+            let rod = RodState::read(y, j);
+            (larger(n, rod.n.length()), larger(m, rod.m.length()))
+        })
+    }
+
+    /// Largest angle by which the directors of a rod turn along it.
+    pub fn turn(&self, equations: &Equations) -> f64 {
+        let turn = |j: usize| {
+            let q = |y: &[f64]| RodState::read(y, j).q;
+            let turns = self.states.windows(2);
+            turns.map(|y| q(&y[0]).angle_between(q(&y[1]))).sum::<f64>()
+        };
+        largest((0..equations.rods()).map(turn))
+    }
+
+    /// The shape in the units of the scenario, at its stations.
+    pub fn shape(&self, equations: &Equations) -> Vec<RodShape> {
+        (0..equations.rods())
+            .map(|j| RodShape {
+                length: equations.lengths[j] * equations.length,
+                nodes: (self.sigma.iter().zip(&self.states))
+                    .map(|(&sigma, y)| node(equations, j, sigma, y))
+                    .collect(),
+            })
+            .collect()
+    }
+}
+
+fn node(equations: &Equations, j: usize, sigma: f64, y: &[f64]) -> NodeState {
+    let rod = RodState::read(y, j);
+    let directors = rod.q.conjugate();
+    let (n, m) = (directors * rod.n, directors * rod.m);
+    let (v, u) = equations.strains(j, sigma, n, m);
+    NodeState {
+        position: rod.r * equations.length,
+        rotation: rod.q,
+        v,
+        u: u / equations.length,
+        n: n * equations.force,
+        m: m * (equations.force * equations.length),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scenario::Scenario;
+
+    fn pair() -> Scenario {
+        let text = r#"
+            name = "pair"
+            leaf = { rods = 2, length = [1.0, 1.2], fan = [-0.5, 0.4] }
+            stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.5, axial = 20.0, shear_2 = inf, shear_3 = 30.0 }
+            rest = { twist = 0.5, bend_2 = [1.0, -0.5], bend_3 = { at = [0.0, 1.0], value = [0.0, 2.0] } }
+            coupling = { x = 1.0, y = 3.0, z = 2.0 }
+            load = { gravity = [0.2, -0.3, -2.0] }
+        "#;
+        Scenario::from_toml(text).unwrap()
+    }
+
+    /// A state at the clamp that is far from equilibrium.
+    fn clamped(equations: &Equations, strength: f64) -> Vec<f64> {
+        let mut y = vec![0.0; equations.size()];
+        for (j, side) in [1.0, -0.7].into_iter().enumerate() {
+            let (n, m) = (DVec3::new(2.0, side, -1.0), DVec3::new(0.5, -side, 2.0));
+            let base = equations.base(j, strength * n, strength * m);
+            base.write(&mut y, j);
+        }
+        y
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// The result of so many equal steps.
+    fn in_steps(equations: &Equations, strength: f64, count: usize) -> Vec<f64> {
+        let begin = clamped(equations, strength);
+        let mut integrator = Integrator::new(equations, 0.0, begin, 1e-10);
+        for k in 1..=count {
+            integrator.attempt(1.0 / count as f64);
+            integrator.sigma = k as f64 / count as f64;
+            integrator.accept();
+        }
+        integrator.y
+    }
+
+    fn to(equations: &Equations, end: f64, tolerance: f64) -> (Vec<f64>, usize) {
+        let mut integrator = Integrator::new(equations, 0.0, clamped(equations, 1.0), tolerance);
+        integrator.run(end, |_| ()).unwrap();
+        assert_eq!(integrator.sigma, end);
+        (integrator.y, integrator.evaluations)
+    }
+
+    #[test]
+    fn fixed_steps_converge_with_order_8() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let exact = in_steps(&equations, 3.0, 512);
+        let errors = [8, 12, 18, 27].map(|count| apart(&in_steps(&equations, 3.0, count), &exact));
+        assert!(errors[0] < 1e-3 && errors[3] > 1e-12, "{errors:?}");
+        let order = (errors[0] / errors[3]).ln() / (27.0_f64 / 8.0).ln();
+        assert!((order - 8.0).abs() < 0.5, "{errors:?}: order {order}");
+    }
+
+    /// Step control keeps the error near the tolerance, with work that grows no
+    /// faster than its power -1/8, and quaternions stay at unit length.
+    #[test]
+    fn the_error_follows_the_tolerance() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let exact = in_steps(&equations, 1.0, 512);
+        let mut work = Vec::new();
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
+            let (end, evaluations) = to(&equations, 1.0, tolerance);
+            let error = apart(&end, &exact);
+            assert!(error < 30.0 * tolerance, "{tolerance:e}: {error:.1e}");
+            for q in [3, STATE + 3].map(|at| &end[at..at + 4]) {
+                let squares: f64 = q.iter().map(|c| c * c).sum();
+                assert!((squares - 1.0).abs() < 1e-15, "{squares}");
+            }
+            work.push(evaluations as f64);
+        }
+        let growth = (work[4] / work[0]).log10() / 8.0;
+        assert!((0.07..0.14).contains(&growth), "{work:?}");
+    }
+
+    /// A stop at the distance of a rounding error is reached by a step as small.
+    #[test]
+    fn stops_may_lie_a_rounding_error_apart() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-10);
+        for stop in [0.3, 0.1 + 0.2, 0.3 + 1e-15, 1.0] {
+            integrator.run(stop, |_| ()).unwrap();
+            assert_eq!(integrator.sigma, stop);
+        }
+        let straight = to(&equations, 1.0, 1e-10).0;
+        assert!(apart(&integrator.y, &straight) < 1e-8);
+    }
+
+    /// Strongly coupled rods that begin to separate.
+    #[test]
+    fn what_grows_out_of_bounds_is_given_up() {
+        let mut scenario = pair();
+        scenario.coupling = vec![[1e9; 3]];
+        let equations = Equations::new(&scenario);
+        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-8);
+        let failed = integrator.run(1.0, |_| ()).expect_err("it was to grow");
+        assert!(failed.sigma > 0.0 && failed.sigma < 0.5, "{failed:?}");
+    }
+}

@@ -1,0 +1,820 @@
+//! Tables of numbers, as instruments, spreadsheets and people write them.
+//!
+//! The lines of a table, divided into cells, and which of them is the header.
+//!
+//! Decimal points and decimal commas.
+//!
+//! The text of a table from its bytes.
+//!
+//! The row of units below a header.
+
+use crate::scenario::MOST_BYTES;
+use crate::study::fit::FitError;
+use crate::study::fit::data::{NAME, Reading, RowChoice, is_known};
+
+/// A parsed table.
+pub(super) struct Table<'t> {
+    pub file: &'t str,
+    /// Line of the header, counted from 1.
+    pub header_line: usize,
+    /// Names of the columns here.
+    pub header: Vec<String>,
+    /// Names of all columns in the file.
+    pub names: Vec<String>,
+    /// Number of lines that are comments, and of those among them below the header.
+    pub comments: [usize; 2],
+    /// What the file was taken for, where that is not the usual CSV.
+    pub taken: Vec<String>,
+    /// What was left out.
+    pub left_out: Vec<String>,
+    sources: Vec<Source>,
+    rows: Vec<Line>,
+    decimals: Decimals,
+}
+
+/// Where a column stands, and what makes its numbers those of the scenario.
+struct Source {
+    at: usize,
+    factor: f64,
+    offset: f64,
+}
+
+impl Source {
+    fn plain(at: usize) -> Self {
+        Source {
+            at,
+            factor: 1.0,
+            offset: 0.0,
+        }
+    }
+}
+
+fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+    (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
+}
+
+/// Whether a name stands there twice.
+fn has_repeated(header: &Line) -> bool {
+    let names: Vec<&str> = header.cells().filter(|name| !name.is_empty()).collect();
+    (1..names.len()).any(|k| names[..k].contains(&names[k]))
+}
+
+/// The names of columns, each behind that of its group if there are groups, as in `Vein X`. A
+/// group's name stands above its first column.
+fn names_of(header: &Line, groups: Option<&Line>) -> Vec<String> {
+    let mut group = "";
+    let names = header.cells().enumerate().map(|(at, name)| {
+        let above = groups.map_or("", |groups| groups.cell(at));
+        group = if above.is_empty() { group } else { above };
+        let words = if name.is_empty() { "" } else { group }.split_whitespace();
+        words
+            .chain(name.split_whitespace())
+            .collect::<Vec<_>>()
+            .join(" ")
+    });
+    names.collect()
+}
+
+impl<'t> Table<'t> {
+    pub fn of(bytes: &[u8], file: &'t str, reading: &Reading) -> Result<Self, FitError> {
+        let decoded = decode(bytes, file)?;
+        let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
+        let known = |name: &str| is_known(name) || mapped(name).is_some();
+        let named = |name: &str| match mapped(name) {
+            Some(map) => map.quantity == NAME,
+            None => name == NAME,
+        };
+        let Some(lines) = Lines::of(&decoded.text, &known, &named) else {
+            let why = "is empty: give a header, and a row for each datum";
+            return Err(refuse(file, 1, why));
+        };
+        let (above, below) = lines.lines.split_at(lines.header);
+        let (header, below) = (&below[0], &below[1..]);
+        let names_columns = |line: &&Line| {
+            let mut names = line.cells().filter(|name| !name.is_empty());
+            !line.is_blank() && names.all(known)
+        };
+        if let Some(other) = above.iter().find(names_columns) {
+            let why = format!(
+                "names columns, and so does line {}: write each table to a file of its own",
+                header.number
+            );
+            return Err(refuse(file, other.number, why));
+        }
+        let groups = above
+            .last()
+            .filter(|line| !line.is_blank() && has_repeated(header));
+        let names = names_of(header, groups);
+        let mut table = Table {
+            file,
+            header_line: header.number,
+            header: Vec::new(),
+            names,
+            comments: lines.comments,
+            taken: Vec::new(),
+            left_out: Vec::new(),
+            sources: Vec::new(),
+            rows: Vec::new(),
+            decimals: Decimals::of(std::iter::empty(), file)?,
+        };
+        table.check_header(header)?;
+        let above = above.iter().filter(|line| !line.is_blank()).count();
+        let above = above - usize::from(groups.is_some());
+        table.rows = below
+            .iter()
+            .filter(|line| !line.is_blank())
+            .cloned()
+            .collect();
+        let units = table.take_units();
+        table.check_cells()?;
+        let unused = table.choose_columns(reading)?;
+        let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
+        table
+            .rows
+            .retain(|row| ats.iter().any(|at| !row.cell(*at).is_empty()));
+        let blank = below.len() - table.rows.len() - usize::from(units.is_some());
+        table.check_rows()?;
+        table.decimals = table.read_decimals()?;
+        let all = table.rows.len();
+        let every = reading.every.get();
+        table.rows = std::mem::take(&mut table.rows)
+            .into_iter()
+            .step_by(every)
+            .collect();
+        table.taken = table.notation(lines.separator, decoded.encoding);
+        let before = table.rows.len();
+        table.choose_rows(&reading.rows)?;
+        let not_chosen = before - table.rows.len();
+        if every > 1 {
+            let [second, third] = [1, 2].map(|k| every.saturating_mul(k).saturating_add(1));
+            let thinned = format!("rows 1, {second}, {third} and so on of {all}");
+            table.taken.push(thinned);
+        }
+        let comments = table.comments[0];
+        table.left_out = [
+            counted(
+                comments,
+                "line that is a comment",
+                "lines that are comments",
+            ),
+            counted(above, "line before the header", "lines before the header"),
+            units.map(|units| format!("a row of units ({units}; nothing is converted)")),
+            counted(blank, "blank row", "blank rows"),
+            counted(
+                not_chosen,
+                "row that was not chosen",
+                "rows that were not chosen",
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .chain(unused)
+        .collect();
+        Ok(table)
+    }
+
+    /// How the numbers of all columns that are used are written.
+    fn read_decimals(&self) -> Result<Decimals, FitError> {
+        let columns = self.sources.iter().zip(&self.header);
+        let numbers = columns.filter(|(_, name)| *name != NAME);
+        let numbers: Vec<usize> = numbers.map(|(source, _)| source.at).collect();
+        let rows = self.rows.iter();
+        let cells = rows.flat_map(|row| numbers.iter().map(|at| (row.number, row.cell(*at))));
+        Decimals::of(cells, self.file)
+    }
+
+    /// What the file was taken for, where that is not the usual CSV.
+    fn notation(&self, separator: &str, encoding: Option<&str>) -> Vec<String> {
+        let divided = separator != "commas" && self.names.len() > 1;
+        let group = match self.decimals.mark {
+            Mark::Point => "thousands divided by commas",
+            Mark::Comma => "thousands divided by points",
+        };
+        let said = [
+            divided.then(|| format!("cells divided by {separator}")),
+            (self.decimals.mark == Mark::Comma).then(|| "decimal commas".into()),
+            self.decimals.grouped.then(|| group.into()),
+            encoding.map(|encoding| format!("text in {encoding}")),
+        ];
+        said.into_iter().flatten().collect()
+    }
+
+    fn check_header(&self, header: &Line) -> Result<(), FitError> {
+        if header.cells().any(is_number) {
+            let why = "has no header: the first line names the columns, such as \
+                       load.tip_force[0],tip_x,sd_tip_x, or rod,sigma,x,y,z";
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        if let [name] = self.names.as_slice()
+            && name
+                .split_whitespace()
+                .filter(|word| is_known(word))
+                .count()
+                > 1
+        {
+            let why = "columns are divided by blanks: divide them by commas, semicolons or tabs";
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        Ok(())
+    }
+
+    /// Removes the row of units below the header, and returns it.
+    fn take_units(&mut self) -> Option<String> {
+        let first = self.rows.first().filter(|row| are_units(row.cells()))?;
+        let units: Vec<&str> = first.cells().filter(|cell| !cell.is_empty()).collect();
+        let units = units.join(", ");
+        self.rows.remove(0);
+        Some(units)
+    }
+
+    /// Rows are on one line. They may have more cells than the header, or fewer, where these are
+    /// empty and have no names.
+    fn check_cells(&self) -> Result<(), FitError> {
+        let broken = |row: &&Line| row.cells().any(|cell| cell.contains('\n'));
+        if let Some(row) = self.rows.iter().find(broken) {
+            let why = "a quotation mark is not closed in this line: close it, and write a name \
+                       on one line";
+            return Err(refuse(self.file, row.number, why));
+        }
+        let wanted = self.names.len();
+        let last = self.names.iter().rposition(|name| !name.is_empty());
+        let least = last.map_or(0, |last| last + 1);
+        for row in &self.rows {
+            let found = row.len();
+            if found < least || row.cells().skip(wanted).any(|cell| !cell.is_empty()) {
+                let why = format!(
+                    "has {found} cells, and the header {wanted}: cells that are divided by commas \
+                     have numbers with a decimal point; with decimal commas divide them by \
+                     semicolons or tabs"
+                );
+                return Err(refuse(self.file, row.number, why));
+            }
+        }
+        Ok(())
+    }
+
+    /// Chooses the columns that are used, and returns words for others.
+    fn choose_columns(&mut self, reading: &Reading) -> Result<Vec<String>, FitError> {
+        let (mut unnamed, mut unused) = (None, Vec::new());
+        let maps_of = |name: &str| {
+            let maps = reading.columns.iter();
+            maps.filter(|map| map.name == name).collect::<Vec<_>>()
+        };
+        // With names given for columns of a file, others that mean nothing here are not meant.
+        let some_given = self.names.iter().any(|name| !maps_of(name).is_empty());
+        let means_nothing = |name: &&String| !name.is_empty() && !is_known(name);
+        if !some_given
+            && !reading.columns.is_empty()
+            && self.names.iter().any(|name| means_nothing(&name))
+        {
+            let given = reading.columns.iter().map(|map| map.name.as_str());
+            let given = given.collect::<Vec<_>>().join(", ");
+            let why = format!(
+                "has none of the columns that were said to be quantities ({given}): its columns are {}",
+                self.names.join(", ")
+            );
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        for (at, name) in self.names.iter().enumerate() {
+            let maps = maps_of(name);
+            if name.is_empty() {
+                let is_used = self.rows.iter().any(|row| !row.cell(at).is_empty());
+                if is_used && at > 0 {
+                    let why = format!(
+                        "column {} has no name, and cells below: name it, or leave it out",
+                        at + 1
+                    );
+                    return Err(refuse(self.file, self.header_line, why));
+                }
+                unnamed = unnamed.or(is_used.then(|| "the first column, without a name".into()));
+            } else if maps.is_empty() && some_given && !is_known(name) {
+                unused.push(name.as_str());
+            } else if maps.is_empty() {
+                self.header.push(name.clone());
+                self.sources.push(Source::plain(at));
+            }
+            for map in maps {
+                self.header.push(map.quantity.clone());
+                self.sources.push(Source {
+                    at,
+                    factor: map.factor,
+                    offset: map.offset,
+                });
+            }
+        }
+        for (k, name) in self.header.iter().enumerate() {
+            if let Some(first) = self.header[..k].iter().position(|other| other == name) {
+                let [first, second] = [first, k].map(|k| self.sources[k].at);
+                let [one, other] = [first, second].map(|at| &self.names[at]);
+                let why = match one == other {
+                    true => format!(
+                        "the column {one} stands there twice (columns {} and {}): rename one, or \
+                         leave it out",
+                        first + 1,
+                        second + 1
+                    ),
+                    false => {
+                        format!("the columns {one} and {other} both are {name}: leave one out")
+                    }
+                };
+                return Err(refuse(self.file, self.header_line, why));
+            }
+        }
+        let columns = if unused.len() == 1 {
+            "column"
+        } else {
+            "columns"
+        };
+        let unused = (!unused.is_empty()).then(|| format!("the {columns} {}", unused.join(", ")));
+        Ok(unnamed.into_iter().chain(unused).collect())
+    }
+
+    /// Leaves out rows that do not meet a condition on a column of this table.
+    fn choose_rows(&mut self, choices: &[RowChoice]) -> Result<(), FitError> {
+        let mut kept = vec![true; self.rows.len()];
+        let mut chosen = false;
+        for condition in choices.iter().flat_map(|choice| &choice.conditions) {
+            let Some(column) = self.column(&condition.column) else {
+                continue;
+            };
+            chosen = true;
+            for (row, kept) in kept.iter_mut().enumerate() {
+                let value = self.number(row, column)?;
+                *kept &= value.is_some_and(|value| condition.admits(value));
+            }
+        }
+        let mut kept = kept.into_iter();
+        self.rows.retain(|_| kept.next().unwrap_or(true));
+        if chosen && self.rows.is_empty() {
+            let why = "has no row that meets the conditions on rows: choose others".to_string();
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        Ok(())
+    }
+
+    fn check_rows(&self) -> Result<(), FitError> {
+        if self.rows.is_empty() {
+            let why = match self.comments[0] {
+                0 => "has no row below the header".into(),
+                comments => format!(
+                    "has no row below the header ({comments} lines that begin with # are comments)"
+                ),
+            };
+            return Err(refuse(self.file, self.header_line, why));
+        }
+        Ok(())
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Line of a row, counted from 1.
+    pub fn line(&self, row: usize) -> usize {
+        self.rows[row].number
+    }
+
+    /// Where a column is.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|known| known == name)
+    }
+
+    pub fn cell(&self, row: usize, column: usize) -> &str {
+        self.rows[row].cell(self.sources[column].at)
+    }
+
+    /// The number in a cell; `None` if it is empty.
+    pub fn number(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let cell = self.cell(row, column);
+        if cell.is_empty() {
+            return Ok(None);
+        }
+        let source = &self.sources[column];
+        let value = self.decimals.number(cell);
+        let value = value.map(|value| match (source.factor, source.offset) {
+            (1.0, 0.0) => value,
+            (factor, offset) => value * factor + offset,
+        });
+        if let Some(value) = value.filter(|value| value.is_finite()) {
+            return Ok(Some(value));
+        }
+        let name = &self.header[column];
+        let why = format!(
+            "{name} = {cell}: must be a finite number, or empty where nothing was measured"
+        );
+        Err(refuse(self.file, self.line(row), why))
+    }
+
+    pub fn positive(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let number = self.number(row, column)?;
+        if let Some(value) = number.filter(|value| *value <= 0.0) {
+            let name = &self.header[column];
+            let why = format!("{name} = {value}: a standard deviation is greater than 0");
+            return Err(refuse(self.file, self.line(row), why));
+        }
+        Ok(number)
+    }
+}
+
+/// What divides cells, the most usual first.
+const SEPARATORS: [(u8, &str); 3] = [(b',', "commas"), (b';', "semicolons"), (b'\t', "tabs")];
+
+/// A line that is not empty, and its cells.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Counted from 1.
+    pub number: usize,
+    cells: csv::StringRecord,
+}
+
+impl Line {
+    /// A cell, without blanks and quotes around it; empty beyond the last.
+    pub fn cell(&self, at: usize) -> &str {
+        let cell = self.cells.get(at).unwrap_or_default().trim();
+        let inner = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
+        inner.unwrap_or(cell).trim()
+    }
+
+    pub fn cells(&self) -> impl Iterator<Item = &str> {
+        (0..self.cells.len()).map(|at| self.cell(at))
+    }
+
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    pub fn is_blank(&self) -> bool {
+        self.cells().all(str::is_empty)
+    }
+
+    /// Whether it may be a comment.
+    pub fn begins_with_hash(&self) -> bool {
+        self.cell(0).starts_with('#')
+    }
+
+    /// Whether it may name columns.
+    fn is_header(&self) -> bool {
+        !self.is_blank() && !self.cells().any(is_number)
+    }
+}
+
+/// Lines, one of which is the header.
+pub struct Lines {
+    pub lines: Vec<Line>,
+    /// Index of the header.
+    pub header: usize,
+    /// What divides cells, in words.
+    pub separator: &'static str,
+    /// Lines that are comments, of all and of those below the header.
+    pub comments: [usize; 2],
+}
+
+fn is_comment(line: &str) -> bool {
+    line.trim_start().starts_with('#')
+}
+
+/// Divides lines into cells. Lines that begin with # are left out up to a line, counted from 1.
+fn divided(text: &str, separator: u8, up_to: usize) -> Vec<Line> {
+    // Lines left out stay as empty ones, so that lines keep their numbers.
+    let kept = text.lines().enumerate();
+    let kept = kept.map(|(i, line)| {
+        if i < up_to && is_comment(line) {
+            ""
+        } else {
+            line
+        }
+    });
+    let kept: String = kept.flat_map(|line| [line, "\n"]).collect();
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(kept.as_bytes());
+    let (mut lines, mut number, mut counted) = (Vec::new(), 1, 0);
+    for cells in reader.records().map_while(Result::ok) {
+        // A record begins with the empty lines before it.
+        let begin = cells.position().map_or(counted, |at| at.byte() as usize);
+        let empty = kept[begin..].len() - kept[begin..].trim_start_matches('\n').len();
+        let begin = begin + empty;
+        number += kept[counted..begin].matches('\n').count();
+        counted = begin;
+        lines.push(Line { number, cells });
+    }
+    lines
+}
+
+/// The line with most columns that are known, and how many these are.
+fn header(lines: &[Line], known: &dyn Fn(&str) -> bool) -> Option<(usize, usize)> {
+    let count = |line: &Line| line.cells().filter(|name| known(name)).count();
+    let counts = lines
+        .iter()
+        .enumerate()
+        .filter(|(_, line)| line.is_header());
+    let counts = counts.map(|(at, line)| (at, count(line)));
+    let counts = counts.filter(|(_, count)| *count > 0);
+    counts.rev().max_by_key(|(_, count)| *count)
+}
+
+/// Of the lines of words above a number the one with most of them; without such lines, the first.
+fn unknown_header(lines: &[Line]) -> usize {
+    let last = lines.iter().rposition(|line| line.cells().any(is_number));
+    let above = lines[..last.unwrap_or(0)].iter().enumerate();
+    let words = above.filter(|(_, line)| line.is_header());
+    let count = |line: &Line| line.cells().filter(|cell| !cell.is_empty()).count();
+    let most = words.rev().max_by_key(|(_, line)| count(line));
+    most.map_or(0, |(at, _)| at)
+}
+
+impl Lines {
+    /// Divides a text by the separator with which a line has most names that are `known`, and of
+    /// such separators by one with which all rows have as many cells as that line. The names in
+    /// the first column may begin with # if `named` is that column's.
+    pub fn of(
+        text: &str,
+        known: &dyn Fn(&str) -> bool,
+        named: &dyn Fn(&str) -> bool,
+    ) -> Option<Self> {
+        let mut best: Option<((usize, bool, usize), Lines, u8)> = None;
+        for (separator, word) in SEPARATORS {
+            let lines = divided(text, separator, usize::MAX);
+            let Some(first) = lines.iter().find(|line| !line.is_blank()) else {
+                continue;
+            };
+            let (at, count) = header(&lines, known).unwrap_or((unknown_header(&lines), 0));
+            let width = lines[at].len();
+            let fits = lines[at..].iter().all(|line| line.len() == width);
+            // Where no name is known, the most cells.
+            let cells = if count == 0 {
+                width.max(first.len())
+            } else {
+                0
+            };
+            let rank = (count, fits && (count > 0 || width > 1), cells);
+            if best.as_ref().is_none_or(|(best, ..)| rank > *best) {
+                let found = Lines {
+                    lines,
+                    header: at,
+                    separator: word,
+                    comments: [0; 2],
+                };
+                best = Some((rank, found, separator));
+            }
+        }
+        let (_, mut found, separator) = best?;
+        let (line, width) = (&found.lines[found.header], found.lines[found.header].len());
+        let above = line.number;
+        let comments = |lines: &[&str]| lines.iter().filter(|line| is_comment(line)).count();
+        let all: Vec<&str> = text.lines().collect();
+        let (before, below) = all.split_at(above);
+        found.comments = [comments(&all), comments(below)];
+        if named(line.cell(0)) {
+            found.lines = divided(text, separator, above);
+            let left_out =
+                |line: &Line| line.number > above && line.begins_with_hash() && line.len() != width;
+            let among = found.lines.iter().filter(|line| left_out(line)).count();
+            found.lines.retain(|line| !left_out(line));
+            found.comments = [comments(before) + among, among];
+        }
+        Some(found)
+    }
+}
+
+/// How the numbers of a file are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decimals {
+    pub mark: Mark,
+    /// Whether thousands are divided by the other mark.
+    pub grouped: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    Point,
+    Comma,
+}
+
+impl Mark {
+    fn character(self) -> char {
+        match self {
+            Mark::Point => '.',
+            Mark::Comma => ',',
+        }
+    }
+
+    fn other(self) -> Mark {
+        match self {
+            Mark::Point => Mark::Comma,
+            Mark::Comma => Mark::Point,
+        }
+    }
+}
+
+/// The number in a cell with this decimal mark; the other mark may divide thousands.
+fn read(cell: &str, mark: Mark) -> Option<f64> {
+    let group = mark.other().character();
+    // U+2212 is the minus sign of typeset numbers.
+    let mut plain = cell.replacen('\u{2212}', "-", 2);
+    if plain.contains(group) {
+        let whole = plain.split(mark.character()).next()?;
+        let mut groups = whole.trim_start_matches(['+', '-']).split(group);
+        let first = groups.next()?;
+        let leads = (1..=3).contains(&first.len()) && !first.starts_with('0');
+        if !leads || !groups.all(|group| group.len() == 3) {
+            return None;
+        }
+        let fraction = plain.split_once(mark.character());
+        let fraction = fraction.map_or("", |(_, fraction)| fraction);
+        let digits = |text: &str| text.chars().all(|digit| digit.is_ascii_digit());
+        if !digits(fraction) {
+            return None;
+        }
+        let whole = whole.replace(group, "");
+        if !digits(whole.trim_start_matches(['+', '-'])) {
+            return None;
+        }
+        plain = format!("{whole}.{fraction}");
+    } else if mark == Mark::Comma {
+        plain = plain.replace(',', ".");
+    }
+    let number = plain.parse::<f64>().ok();
+    number.filter(|number| number.is_finite())
+}
+
+/// Whether a cell is a number, with either mark.
+pub fn is_number(cell: &str) -> bool {
+    [Mark::Point, Mark::Comma]
+        .iter()
+        .any(|mark| read(cell, *mark).is_some())
+}
+
+/// Whether a number has four digits or more before its decimal mark, which nothing divides.
+fn is_long(cell: &str, mark: Mark) -> bool {
+    let end = [mark.character(), 'e', 'E'];
+    let whole = cell.split(end).next().unwrap_or(cell);
+    let digits = whole.trim_start_matches(['+', '-', '\u{2212}']);
+    digits.len() > 3 && !digits.contains(mark.other().character())
+}
+
+impl Decimals {
+    /// The marks of these cells, each with its line. A cell that is a number with one of the
+    /// marks only decides for all.
+    pub fn of<'c>(
+        cells: impl Iterator<Item = (usize, &'c str)> + Clone,
+        file: &str,
+    ) -> Result<Self, FitError> {
+        let marked = cells.filter(|(_, cell)| cell.contains(['.', ',']));
+        let reads = |cell: &str, mark| read(cell, mark).is_some();
+        let proof = |mark: Mark| {
+            let mut cells = marked.clone();
+            cells.find(|(_, cell)| reads(cell, mark) && !reads(cell, mark.other()))
+        };
+        let mark = match (proof(Mark::Point), proof(Mark::Comma)) {
+            (Some((line, point)), Some((other, comma))) => {
+                let why = format!(
+                    "{point} has a decimal point, and {comma} in line {other} a decimal comma: \
+                     write all numbers of a file with one of them"
+                );
+                return Err(refuse(file, line, why));
+            }
+            (_, Some(_)) => Mark::Comma,
+            (Some(_), None) => Mark::Point,
+            (None, None) => {
+                let mut either = marked.clone();
+                let unclear =
+                    either.find(|(_, cell)| cell.contains(',') && reads(cell, Mark::Comma));
+                if let Some((line, cell)) = unclear {
+                    let point = cell.replace(',', ".");
+                    let why = format!(
+                        "{cell} may be {point} or {}, and no other number of the file tells which: \
+                         write numbers with a decimal point, and thousands undivided",
+                        cell.replace(',', "")
+                    );
+                    return Err(refuse(file, line, why));
+                }
+                Mark::Point
+            }
+        };
+        let group = mark.other().character();
+        let mut grouped = marked.clone();
+        let grouped = grouped.find(|(_, cell)| cell.contains(group) && reads(cell, mark));
+        let mut long = marked.clone();
+        let long = long.find(|(_, cell)| reads(cell, mark) && is_long(cell, mark));
+        if let (Some((line, grouped)), Some((other, long))) = (grouped, long) {
+            let why = format!(
+                "{grouped} has its thousands divided, or another decimal mark, and {long} in line \
+                 {other} has not: write all numbers of a file alike"
+            );
+            return Err(refuse(file, line, why));
+        }
+        Ok(Decimals {
+            mark,
+            grouped: grouped.is_some(),
+        })
+    }
+
+    /// The finite number in a cell.
+    pub fn number(self, cell: &str) -> Option<f64> {
+        read(cell, self.mark)
+    }
+}
+
+/// The refusal of a line of a file.
+pub fn refuse(file: &str, line: usize, why: impl std::fmt::Display) -> FitError {
+    FitError::Data(format!("{file}:{line}: {why}"))
+}
+
+/// A text, and its encoding if that is not UTF-8.
+pub struct Decoded {
+    pub text: String,
+    pub encoding: Option<&'static str>,
+}
+
+/// First bytes of archives, among them spreadsheets, and of older spreadsheets.
+const SPREADSHEETS: [&[u8]; 2] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0"];
+
+/// Decodes UTF-8, UTF-16 with a byte order mark, and Latin-1.
+pub fn decode(bytes: &[u8], file: &str) -> Result<Decoded, FitError> {
+    if bytes.len() as u64 > MOST_BYTES {
+        let why = format!("is larger than {MOST_BYTES} bytes: keep every tenth row, or fewer");
+        return Err(refuse(file, 1, why));
+    }
+    if SPREADSHEETS.iter().any(|first| bytes.starts_with(first)) {
+        let why = "is a spreadsheet or another archive: export the table as CSV";
+        return Err(refuse(file, 1, why));
+    }
+    let (text, encoding) = match bytes {
+        [0xff, 0xfe, rest @ ..] => (utf16(rest, u16::from_le_bytes), Some("UTF-16")),
+        [0xfe, 0xff, rest @ ..] => (utf16(rest, u16::from_be_bytes), Some("UTF-16")),
+        _ => match std::str::from_utf8(bytes) {
+            Ok(text) => (Some(text.into()), None),
+            Err(_) => (latin_1(bytes), Some("Latin-1")),
+        },
+    };
+    let Some(text) = text.filter(|text| !text.contains('\0')) else {
+        return Err(refuse(
+            file,
+            1,
+            "is not text in UTF-8: save the file as UTF-8",
+        ));
+    };
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    if text.contains('\r') && !text.contains('\n') {
+        let why = "has line ends of CR alone: save it with line ends LF or CR LF";
+        return Err(refuse(file, 1, why));
+    }
+    Ok(Decoded {
+        text: text.into(),
+        encoding,
+    })
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
+    let (pairs, rest) = bytes.as_chunks::<2>();
+    let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+    String::from_utf16(&units).ok().filter(|_| rest.is_empty())
+}
+
+/// The bytes from 0x80 to 0x9f have no characters in Latin-1, and different ones in its kin.
+fn latin_1(bytes: &[u8]) -> Option<String> {
+    let known = bytes.iter().all(|byte| !(0x80..0xa0).contains(byte));
+    known.then(|| bytes.iter().copied().map(char::from).collect())
+}
+
+/// Units that stand without brackets, in small letters: programs write them in either case.
+const UNITS: [&str; 61] = [
+    "n", "mn", "un", "µn", "μn", "kn", "m", "dm", "cm", "mm", "um", "µm", "μm", "nm", "in", "inch",
+    "ft", "px", "pixel", "s", "sec", "ms", "min", "h", "hz", "khz", "rad", "deg", "°", "%", "g",
+    "mg", "kg", "gf", "kgf", "lbf", "pa", "kpa", "mpa", "gpa", "psi", "v", "mv", "j", "us", "µs",
+    "μs", "second", "seconds", "minute", "minutes", "lb", "oz", "dyn", "bar", "°c", "°f", "a",
+    "ma", "w", "count",
+];
+
+fn is_unit(cell: &str) -> bool {
+    let pairs = [('(', ')'), ('[', ']')];
+    let bracketed = |(open, close)| cell.starts_with(open) && cell.ends_with(close);
+    cell.len() > 1 && pairs.into_iter().any(bracketed) || is_product(cell)
+}
+
+/// Whether a cell is a product or a quotient of units, which may have exponents, as `N/mm2`.
+fn is_product(cell: &str) -> bool {
+    let small = cell.to_lowercase();
+    let base = |factor: &str| -> String {
+        let factor = factor.trim();
+        let exponent = |it: char| it.is_ascii_digit() || matches!(it, '^' | '-' | '²' | '³');
+        factor.trim_end_matches(exponent).into()
+    };
+    let mut factors = small.split(['/', '*', '·']).enumerate();
+    factors.all(|(at, factor)| match factor.trim() {
+        "1" => at == 0 && small.contains('/'),
+        factor => UNITS.contains(&base(factor).as_str()),
+    })
+}
+
+/// Whether a row has units: no number, and a unit in at least half of what else it has besides dashes.
+pub fn are_units<'c>(cells: impl Iterator<Item = &'c str>) -> bool {
+    let cells = cells.filter(|cell| !matches!(*cell, "" | "-"));
+    let cells: Vec<&str> = cells.collect();
+    let units = cells.iter().filter(|cell| is_unit(cell)).count();
+    units > 0 && 2 * units >= cells.len() && !cells.into_iter().any(is_number)
+}
