@@ -48,7 +48,7 @@ docs/command-line.md: in leaves of {} segments and more
 src/motion/explicit/mod.rs: PARALLEL_SEGMENTS: usize = {};
 docs/speed.md: From {} segments on, rods are shared
 
-src/leaf/system/mod.rs: PARALLEL_NODES: usize = {};
+src/leaf/system.rs: PARALLEL_NODES: usize = {};
 docs/command-line.md: in leaves of {} nodes
 
 src/study/trace/mod.rs: MOST_POINTS: usize = {};
