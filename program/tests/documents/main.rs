@@ -1,5 +1,6 @@
 //! Documents, files and figures say what the program does.
 
+mod architecture;
 mod documented_commands;
 mod documented_keys;
 mod figure_trace;
