@@ -77,7 +77,9 @@ fn a_motion_ends_whole_with_its_last_output() {
         wait_for_outputs(&place, &out);
         interrupt(&child);
         let run = Run::from(child.wait_with_output().unwrap()).ends(130);
-        place.holds(&out, &format!("energy.csv motion.json {file}"));
+        let mut files = ["energy.csv", "motion.json", file];
+        files.sort_unstable();
+        place.holds(&out, &files.join(" "));
         let json = place.json(&format!("{out}/motion.json"));
         assert_eq!(json, run.json());
         let told = (&json["outcome"], &json["exit_status"], &json["error"]);
